@@ -1,0 +1,64 @@
+"""The error tree. A message says what was got, what was expected and what to do.
+
+::
+
+    PiezoError
+    ├── ParameterError        (ValueError)       a value outside its bounds, an unknown name
+    ├── RecordError           (ValueError)       samples that are no record of a stage
+    ├── ModelError            (ValueError)       a chain or a model file that makes no sense
+    ├── IdentificationError   (RuntimeError)     data that do not determine what was asked
+    ├── DivergenceError       (ArithmeticError)  a simulation that ran away
+    ├── StageError            (OSError)          a stage or its limits, link, state
+    └── RecordingError        (OSError)          a file that cannot be read or written
+"""
+
+from __future__ import annotations
+
+
+class PiezoError(Exception):
+    """Whatever this package raises on purpose; one line that a user can act on."""
+
+
+class ParameterError(PiezoError, ValueError):
+    """A parameter value, name or unit that is not acceptable."""
+
+
+class RecordError(PiezoError, ValueError):
+    """Samples, periods or labels that do not form a record."""
+
+
+class ModelError(PiezoError, ValueError):
+    """An inconsistent model or model file."""
+
+
+class IdentificationError(PiezoError, RuntimeError):
+    """The data do not determine what was asked for."""
+
+
+class StageError(PiezoError, OSError):
+    """A stage refused, failed, or was asked to leave its limits."""
+
+
+class RecordingError(PiezoError, OSError):
+    """A recording that cannot be read or written."""
+
+
+class DivergenceError(PiezoError, ArithmeticError):
+    """A simulation left every physical range.
+
+    Parameters
+    ----------
+    effect : str
+        Identifier of the effect whose output ran away.
+    sample : int
+        Index of the first non-finite or runaway sample in the block.
+    time : float
+        Time of that sample since the start of the block [s].
+    """
+
+    def __init__(self, effect: str, sample: int, time: float) -> None:
+        super().__init__(
+            f"simulation diverged in '{effect}' at sample {sample} ({time:.6g} s): "
+            "expected a bounded output; check its parameters (stable ARX, beta >= |gamma|) and the drive"
+        )
+        self.effect, self.sample, self.time = effect, sample, time

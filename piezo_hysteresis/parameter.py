@@ -1,0 +1,107 @@
+"""`Parameter`: one row of the table that names, bounds and explains every number of a model.
+
+The table is the single source for Python, model files, ROS parameter descriptors and the docs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from .errors import ParameterError
+
+Value = float | tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A named physical quantity with unit, value, bounds, meaning and source.
+
+    Parameters
+    ----------
+    name : str
+        Identifier in Python, YAML and ROS, e.g. ``"gamma"``.
+    symbol : str
+        Symbol of docs/nomenclature, e.g. ``"γ"``.
+    unit : str
+        SI unit, ``"1"`` where dimensionless.
+    value : float or tuple of float
+        Default value; a tuple is an array parameter of any length.
+    lower, upper : float
+        Inclusive bounds of every element.
+    meaning : str
+        One line for a lab physicist.
+    source : str
+        Paper and equation.
+    off : float, optional
+        Value at which the effect is exactly absent; None where the parameter alone switches nothing off.
+    scale : float
+        Typical size; conditions the identification and sets finite steps.
+    per_record : bool
+        True for a quantity that is free in every record (the phase of mains hum).
+
+    Raises
+    ------
+    ParameterError
+        If the bounds are crossed or the default lies outside them.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    value: Value
+    lower: float
+    upper: float
+    meaning: str
+    source: str
+    off: float | None = None
+    scale: float = 1.0
+    per_record: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.lower <= self.upper:
+            raise ParameterError(f"{self.name}: bounds [{self.lower}, {self.upper}] are crossed")
+        self.check(self.value)
+
+    @property
+    def is_array(self) -> bool:
+        """True where the value is a tuple."""
+        return isinstance(self.value, tuple)
+
+    def check(self, value: object, prefix: str = "") -> Value:
+        """Return `value` as float or tuple of floats inside the bounds.
+
+        Parameters
+        ----------
+        value : object
+            Number, or sequence of numbers for an array parameter.
+        prefix : str
+            Put before the name in messages, e.g. ``"bouc_wen."``.
+
+        Raises
+        ------
+        ParameterError
+            On a wrong type, a non-finite number or one outside the bounds.
+        """
+        name = prefix + self.name
+        if self.is_array:
+            try:
+                return tuple(self._scalar(v, f"{name}[{i}]") for i, v in enumerate(value))  # type: ignore[arg-type, var-annotated]
+            except TypeError:
+                raise ParameterError(f"{name}: got {value!r}, expected a sequence of numbers [{self.unit}]") from None
+        return self._scalar(value, name)
+
+    def _scalar(self, value: object, name: str) -> float:
+        try:
+            number = float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            raise ParameterError(f"{name}: got {value!r}, expected a number [{self.unit}]") from None
+        if not math.isfinite(number) or not self.lower <= number <= self.upper:
+            raise ParameterError(
+                f"{name}: got {number:g} {self.unit}, expected {self.lower:g} to {self.upper:g} {self.unit}"
+            )
+        return number
+
+    def with_value(self, value: Value) -> Parameter:
+        """The same row with another value."""
+        return replace(self, value=value)

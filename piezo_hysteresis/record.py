@@ -1,0 +1,239 @@
+"""`Record`: what was applied to a stage and what it answered; `Experiment`: records in order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import RecordError
+
+Samples = NDArray[np.float64]
+
+
+def _channel(name: str, values: ArrayLike, length: int | None) -> Samples:
+    try:
+        samples = np.array(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise RecordError(f"{name}: got {type(values).__name__}, expected an array of numbers") from None
+    if samples.ndim != 1 or samples.size == 0:
+        raise RecordError(f"{name}: got shape {samples.shape}, expected one dimension with at least one sample")
+    if length is not None and samples.size != length:
+        raise RecordError(f"{name}: got {samples.size} samples, expected {length} as in voltage")
+    bad = ~np.isfinite(samples)
+    if bad.any():
+        raise RecordError(
+            f"{name}: sample {int(bad.argmax())} is {samples[bad.argmax()]}, expected finite values; "
+            f"drop or split the record at its {int(bad.sum())} non-finite samples"
+        )
+    samples.setflags(write=False)
+    return samples
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Record:
+    """One phase of an experiment at a constant sample period.
+
+    Parameters
+    ----------
+    voltage : (n,) array_like
+        Drive voltage before the amplifier [V].
+    displacement : (n,) array_like
+        Measured displacement [m].
+    sample_period : float
+        Time between samples [s], positive. In phases slower than the model the samples are block averages.
+    phase : str
+        Phase name, e.g. ``"triangle"``.
+    start_time : float
+        Time of the first sample since the start of the experiment [s].
+    continues : bool
+        True where the stage was not brought to rest since the record before.
+    truncated : bool
+        True where the beginning is missing, so that the initial state is unknown.
+    initial_voltage : float, optional
+        Voltage at which the stage had settled before the first sample [V]; default the first voltage.
+    other_displacement : (n,) array_like, optional
+        Displacement of the coupled axis [m].
+    temperature : (n,) array_like, optional
+        Stage temperature [K].
+
+    Raises
+    ------
+    RecordError
+        On empty, non-finite or unequal channels, or a sample period that is not positive.
+
+    Examples
+    --------
+    >>> r = Record([0.0, 1.0, 2.0], [0.0, 1e-6, 2e-6], 1e-3, phase="step")
+    >>> r.size, r.duration, r[1:].start_time
+    (3, 0.003, 0.001)
+    """
+
+    voltage: Samples
+    displacement: Samples
+    sample_period: float
+    phase: str = "record"
+    start_time: float = 0.0
+    continues: bool = False
+    truncated: bool = False
+    initial_voltage: float | None = None
+    other_displacement: Samples | None = None
+    temperature: Samples | None = None
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "voltage", _channel("voltage", self.voltage, None))
+        for name in ("displacement", "other_displacement", "temperature"):
+            if getattr(self, name) is not None:
+                put(self, name, _channel(name, getattr(self, name), self.voltage.size))
+        period = float(self.sample_period)
+        if not (np.isfinite(period) and period > 0):
+            raise RecordError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
+        put(self, "sample_period", period)
+        for name in ("start_time", "initial_voltage"):
+            number = getattr(self, name)
+            if number is not None and not np.isfinite(number):
+                raise RecordError(f"{name}: got {number!r}, expected a finite number")
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return int(self.voltage.size)
+
+    @property
+    def duration(self) -> float:
+        """Number of samples times sample period [s]."""
+        return self.size * self.sample_period
+
+    @property
+    def time(self) -> Samples:
+        """Time of every sample since the start of the experiment [s], shape (n,)."""
+        return np.asarray(self.start_time + self.sample_period * np.arange(self.size))
+
+    @property
+    def settled_voltage(self) -> float:
+        """Voltage at which the stage had settled before the first sample [V]."""
+        return float(self.voltage[0]) if self.initial_voltage is None else float(self.initial_voltage)
+
+    def __getitem__(self, part: slice) -> Record:
+        """A contiguous part; one that does not begin at the first sample continues what was before it."""
+        start, stop, step = part.indices(self.size)
+        if step != 1 or stop <= start:
+            raise RecordError(f"slice {part}: expected a non-empty contiguous part of {self.size} samples")
+        cut = slice(start, stop)
+        return replace(
+            self,
+            voltage=self.voltage[cut],
+            displacement=self.displacement[cut],
+            other_displacement=None if self.other_displacement is None else self.other_displacement[cut],
+            temperature=None if self.temperature is None else self.temperature[cut],
+            start_time=self.start_time + start * self.sample_period,
+            continues=self.continues if start == 0 else True,
+        )
+
+    def split(self, *boundaries: int) -> tuple[Record, ...]:
+        """Cut at the given sample indices; every part but the first continues the one before it."""
+        edges = [0, *boundaries, self.size]
+        return tuple(self[a:b] for a, b in zip(edges, edges[1:], strict=False))
+
+    def decimate(self, factor: int) -> Record:
+        """Average blocks of `factor` samples: anti-aliased, as slow phases are stored.
+
+        Parameters
+        ----------
+        factor : int
+            Samples per block, 1 or more; an incomplete last block is dropped.
+
+        Raises
+        ------
+        RecordError
+            If the factor is not between 1 and the number of samples.
+        """
+        if not 1 <= factor <= self.size:
+            raise RecordError(f"decimate: got factor {factor}, expected 1 to {self.size}")
+        blocks = self.size // factor
+
+        def mean(channel: Samples | None) -> Samples | None:
+            return None if channel is None else channel[: blocks * factor].reshape(blocks, factor).mean(axis=1)
+
+        return replace(
+            self,
+            voltage=mean(self.voltage),
+            displacement=mean(self.displacement),
+            other_displacement=mean(self.other_displacement),
+            temperature=mean(self.temperature),
+            sample_period=self.sample_period * factor,
+            initial_voltage=self.settled_voltage,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """One finding about the quality of data: told, never silently mended.
+
+    Parameters
+    ----------
+    kind : str
+        Stable word: ``gap``, ``clipped``, ``non_finite``, ``duplicate``, ``not_at_rest``, ``units``, …
+    message : str
+        One plain line.
+    phase : str
+        Phase it was found in; empty for the whole experiment.
+    severe : bool
+        True where no verdict should rest on the data.
+    """
+
+    kind: str
+    message: str
+    phase: str = ""
+    severe: bool = False
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Experiment:
+    """Records in the order in which they were taken, and what was noticed on reading them.
+
+    Raises
+    ------
+    RecordError
+        If there is no record.
+    """
+
+    records: tuple[Record, ...]
+    source: str = ""
+    notices: tuple[Notice, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "records", tuple(self.records))
+        if not self.records:
+            raise RecordError(f"experiment '{self.source}' holds no record; expected at least one phase")
+
+    def __iter__(self) -> Iterator[Record]:
+        return iter(self.records)
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    def __getitem__(self, index: int) -> Record:
+        return self.records[index]
+
+    @property
+    def size(self) -> int:
+        """Number of samples in all records."""
+        return sum(r.size for r in self.records)
+
+    @property
+    def fastest_period(self) -> float:
+        """Smallest sample period [s]."""
+        return min(r.sample_period for r in self.records)
+
+    def named(self, *phases: str) -> tuple[Record, ...]:
+        """Records whose phase name is, or begins with, one of `phases`.
+
+        >>> r = Record([0.0], [0.0], 1.0, phase="sine_50hz")
+        >>> len(Experiment((r,)).named("sine"))
+        1
+        """
+        return tuple(r for r in self.records if r.phase in phases or r.phase.split("_")[0] in phases)
