@@ -1,0 +1,1 @@
+"""Stages: the protocol (`stage`), the simulated plant (`simulated`), recorded ones (`replay`), real controllers."""

@@ -1,0 +1,259 @@
+"""The stage protocol: what every back end, simulated or real, offers to the driver.
+
+Two kinds of device exist. A *streaming* device takes a block of drive voltages and returns what it applied and measured,
+block after block without a gap. A device with *on-board memory* is given a whole waveform, armed, started, waited for and
+read out. Both have a slow path, one voltage and one displacement at a time. All voltages are drive voltages before the
+amplifier; a back end that measures behind it divides by `Description.amplifier_gain`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import StageError
+
+Samples = NDArray[np.float64]
+
+_PERIOD_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What a stage is and what it may be asked for.
+
+    Parameters
+    ----------
+    name : str
+        Model and serial number, or what is simulated; unique per device, so that a driver can lock it.
+    streaming : bool
+        True for a `StreamingStage`, False for a `MemoryStage`.
+    sample_period_min, sample_period_max : float
+        Shortest and longest sample period [s].
+    sample_period_step : float
+        Periods are whole multiples of it [s]; 0 where any period in the range is possible.
+    voltage_min, voltage_max : float
+        Drive limits before the amplifier [V].
+    max_slew_rate : float
+        Steepest drive that is accepted [V/s]; infinite where a step of one sample is harmless.
+    safe_voltage : float
+        Drive voltage of the stage at rest [V].
+    longest_block : int, optional
+        Samples per block that the device holds; None where there is no limit.
+    amplifier_gain : float
+        Piezo voltage over drive voltage [V/V].
+    displacement_min, displacement_max : float
+        Sensor range [m]; samples on it are clipped.
+    measured_voltage : bool
+        True where the voltage returned is measured, False where it is the one commanded.
+    ignores_drive : bool
+        True for a replayed recording: what is asked for is not played.
+
+    Raises
+    ------
+    StageError
+        If limits are crossed or the safe voltage lies outside them.
+    """
+
+    name: str
+    streaming: bool
+    sample_period_min: float
+    sample_period_max: float
+    voltage_min: float
+    voltage_max: float
+    sample_period_step: float = 0.0
+    max_slew_rate: float = math.inf
+    safe_voltage: float = 0.0
+    longest_block: int | None = None
+    amplifier_gain: float = 1.0
+    displacement_min: float = -math.inf
+    displacement_max: float = math.inf
+    measured_voltage: bool = False
+    ignores_drive: bool = False
+
+    def __post_init__(self) -> None:
+        for low, high in (
+            ("sample_period_min", "sample_period_max"),
+            ("voltage_min", "safe_voltage"),
+            ("safe_voltage", "voltage_max"),
+            ("displacement_min", "displacement_max"),
+        ):
+            if not getattr(self, low) <= getattr(self, high):
+                raise StageError(
+                    f"{self.name}: got {low} {getattr(self, low):g} above {high} {getattr(self, high):g}, "
+                    "expected ordered limits"
+                )
+        if not (self.sample_period_min > 0 and self.max_slew_rate > 0 and self.amplifier_gain != 0):
+            raise StageError(f"{self.name}: expected a positive sample period and slew rate and a gain other than zero")
+
+    def check_sample_period(self, sample_period: float) -> float:
+        """Return `sample_period` [s] if the stage can run at it.
+
+        Raises
+        ------
+        StageError
+            Outside the range, or no whole multiple of `sample_period_step`.
+        """
+        low, high, step = self.sample_period_min, self.sample_period_max, self.sample_period_step
+        inside = low * (1 - _PERIOD_TOLERANCE) <= sample_period <= high * (1 + _PERIOD_TOLERANCE)
+        if not inside:
+            raise StageError(f"{self.name}: got sample period {sample_period:g} s, expected {low:g} to {high:g} s")
+        if step > 0 and abs(sample_period / step - round(sample_period / step)) > _PERIOD_TOLERANCE * sample_period / step:
+            raise StageError(
+                f"{self.name}: got sample period {sample_period:g} s, expected a whole multiple of {step:g} s"
+            )
+        return float(sample_period)
+
+    def check_voltage(self, voltage: object, present_voltage: float, sample_period: float) -> Samples:
+        """Return `voltage` as a contiguous array if the stage may play it: the last line of defence.
+
+        Parameters
+        ----------
+        voltage : (n,) array_like
+            Drive voltage [V].
+        present_voltage : float
+            Voltage applied before the first sample [V]; the slew counts from it.
+        sample_period : float
+            Time between samples [s].
+
+        Returns
+        -------
+        (n,) ndarray of float64
+
+        Raises
+        ------
+        StageError
+            On another shape, too long a block, or samples that are not finite, outside the limits or too steep.
+        """
+        try:
+            block = np.ascontiguousarray(voltage, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise StageError(f"{self.name}: got {type(voltage).__name__} as drive, expected an array of volts") from None
+        if block.ndim != 1 or block.size == 0:
+            raise StageError(f"{self.name}: got drive of shape {block.shape}, expected one dimension, not empty")
+        if self.longest_block is not None and block.size > self.longest_block:
+            raise StageError(
+                f"{self.name}: got {block.size} samples, expected at most {self.longest_block} per block; cut the waveform"
+            )
+        inside = (block >= self.voltage_min) & (block <= self.voltage_max)
+        if not inside.all():
+            first = int(np.argmin(inside))
+            raise StageError(
+                f"{self.name}: drive sample {first} is {block[first]:g} V, expected {self.voltage_min:g} to "
+                f"{self.voltage_max:g} V; nothing was played"
+            )
+        if math.isfinite(self.max_slew_rate):
+            steepest = self.max_slew_rate * sample_period
+            step = np.abs(np.diff(block, prepend=present_voltage))
+            if step.max() > steepest * (1 + 1e-9) + 1e-12:
+                first = int(np.argmax(step > steepest))
+                raise StageError(
+                    f"{self.name}: drive sample {first} steps by {step[first]:g} V, expected at most {steepest:g} V per "
+                    f"sample ({self.max_slew_rate:g} V/s); nothing was played"
+                )
+        return block
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Acquired:
+    """What a stage applied and measured, sample by sample.
+
+    Parameters
+    ----------
+    voltage : (n,) ndarray
+        Drive voltage really applied [V].
+    displacement : (n,) ndarray
+        Measured displacement [m].
+    other_displacement : (n,) ndarray, optional
+        Displacement of the coupled axis [m].
+    temperature : (n,) ndarray, optional
+        Stage temperature [K].
+    """
+
+    voltage: Samples
+    displacement: Samples
+    other_displacement: Samples | None = None
+    temperature: Samples | None = None
+
+
+class Stage(Protocol):
+    """What both kinds of device share: description, clock, slow path and the way to safety."""
+
+    @property
+    def description(self) -> Description:
+        """Limits and kind of the device; does not change while it is open."""
+        ...
+
+    @property
+    def sample_period(self) -> float:
+        """Sample period in force [s]."""
+        ...
+
+    @property
+    def voltage(self) -> float:
+        """Drive voltage in force [V]."""
+        ...
+
+    def configure(self, sample_period: float) -> None:
+        """Set the sample period [s]; StageError if the device cannot run at it or is playing."""
+        ...
+
+    def set_voltage(self, voltage: float) -> None:
+        """Slow path: apply one voltage [V] at once and hold it; StageError outside the limits."""
+        ...
+
+    def read_displacement(self) -> float:
+        """Slow path: one reading of the sensor [m]."""
+        ...
+
+    def safe(self) -> None:
+        """Stop what plays and go to `Description.safe_voltage`, no steeper than `max_slew_rate`; harmless when repeated."""
+        ...
+
+    def close(self) -> None:
+        """Make safe and release the device; harmless when repeated, every other call then raises StageError."""
+        ...
+
+
+class StreamingStage(Stage, Protocol):
+    """A device whose clock runs on while blocks go to and fro."""
+
+    def exchange(self, voltage: Samples) -> Acquired:
+        """Apply a block of drive voltages and return the samples applied and measured, as many as were given.
+
+        Sample i of the answer belongs to sample i of the drive; the next block follows without a gap.
+
+        Raises
+        ------
+        StageError
+            If the drive breaks a limit (nothing is played), or the device fails.
+        """
+        ...
+
+
+class MemoryStage(Stage, Protocol):
+    """A device that plays and records from its own memory: upload, arm, start, wait, read."""
+
+    def upload(self, voltage: Samples) -> None:
+        """Store a waveform [V]; it counts from the voltage in force; StageError if it breaks a limit."""
+        ...
+
+    def arm(self) -> None:
+        """Make generator and recorder ready; StageError without a waveform."""
+        ...
+
+    def start(self) -> None:
+        """Start generator and recorder together and return; StageError unless armed."""
+        ...
+
+    def wait(self, timeout: float) -> None:
+        """Return when the waveform has been played; StageError after `timeout` seconds, the waveform plays on."""
+        ...
+
+    def read(self) -> Acquired:
+        """The record of the last waveform, of its length; StageError before it is complete. The last voltage is held."""
+        ...
