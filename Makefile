@@ -1,0 +1,18 @@
+# A machine without ROS needs git, make and python3 with venv; everything else is fetched into .venv, pinned.
+PYTHON ?= python3
+RUN := scripts/run
+
+.DELETE_ON_ERROR:
+.PHONY: setup demo test lint bench bench-naming soak docs
+
+setup: install/.built                 ## .venv with ROS 2 and all dependencies, and the colcon build
+demo: setup ; @$(RUN) python examples/demo.py $(DEMO)
+test: setup ; @$(RUN) python -m pytest $(TEST)
+lint: setup ; @$(RUN) scripts/lint
+bench: setup ; @$(RUN) python -m benchmarks $(BENCH)
+bench-naming: setup ; @$(RUN) python -m benchmarks.naming $(BENCH)
+soak: setup ; @$(RUN) python -m benchmarks.soak $(SOAK)
+docs: setup ; @$(RUN) python docs/generate.py
+
+.venv/.installed: requirements.txt constraints.txt ; @scripts/setup $(PYTHON) && touch $@
+install/.built: .venv/.installed package.xml setup.py setup.cfg $(wildcard config/* launch/*) ; @scripts/build && touch $@

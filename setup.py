@@ -1,0 +1,35 @@
+"""Build script of the ROS 2 package; colcon and pip read it."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "piezo_hysteresis"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Hysteresis and dynamics of piezo-actuated stages: models, identification, live prediction over ROS 2",
+    license="Apache-2.0",
+    maintainer="piezo_hysteresis maintainers",
+    maintainer_email="piezo-hysteresis@users.noreply.github.com",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/config", glob("config/*")),
+        (f"share/{NAME}/launch", glob("launch/*.launch.py")),
+    ],
+    python_requires=">=3.11",
+    install_requires=["h5py", "matplotlib", "mcap", "numba", "numpy", "PyYAML", "rich", "rosbags", "scipy"],
+    extras_require={"test": ["hypothesis", "pytest"]},
+    zip_safe=True,
+    entry_points={
+        "console_scripts": [
+            f"driver_node = {NAME}.nodes.driver_node:main",
+            f"model_node = {NAME}.nodes.model_node:main",
+            f"identification_node = {NAME}.nodes.identification_node:main",
+            f"piezo = {NAME}.cli.main:main",
+        ]
+    },
+)
