@@ -1,0 +1,1 @@
+"""Identification: excite, then delay, linear dynamics, hysteresis, and all of them jointly."""
