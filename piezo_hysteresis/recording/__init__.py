@@ -1,0 +1,119 @@
+"""Experiments on disk, without ROS: rosbag2, NPZ, CSV, MAT and GCS arrays become an `Experiment` and back.
+
+>>> experiment = read("measured.csv", columns={"voltage": 1, "displacement": 5},
+...                   units={"displacement": "um"}, sample_period=5e-3)          # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ..errors import RecordingError
+from ..record import Experiment
+from .format import Format, WritableFormat
+from .layout import Column, Layout
+from .npz import Npz
+
+__all__ = ["FORMATS", "Format", "Layout", "Npz", "read", "write"]
+
+FORMATS: Mapping[str, Format] = {"npz": Npz()}
+"""Name of every format to its reader, in the order in which they are asked whether they know a path."""
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    format: str | None = None,
+    axis: str | None = None,
+    columns: Mapping[str, Column] | None = None,
+    units: Mapping[str, str | float] | None = None,
+    sample_period: float | None = None,
+    initial_voltage: float | None = None,
+    rows: tuple[int | None, int | None] | None = None,
+    phases: str | Sequence[tuple[float, str]] | None = None,
+    include: Sequence[str] = (),
+    decimate: Mapping[str, int] | None = None,
+) -> Experiment:
+    """Read a recording, whatever its format.
+
+    Parameters
+    ----------
+    path : path-like
+        File or folder.
+    format : str, optional
+        Key of `FORMATS`; default what the path looks like.
+    axis, columns, units, sample_period, initial_voltage, rows, phases, include
+        What the file does not say: see `Layout`.
+    decimate : mapping of str to int, optional
+        Phase name to the number of samples that are averaged into one on reading (`Record.decimate`).
+
+    Returns
+    -------
+    Experiment
+        In SI units; `notices` tell what was found in the data and what was done about it.
+
+    Raises
+    ------
+    RecordingError
+        If the path cannot be read as an experiment.
+    RecordError
+        If the samples form no record.
+    """
+    place = Path(path).expanduser()
+    layout = Layout(axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include)
+    experiment = _format(place, format).read(place, layout)
+    records = experiment.records
+    if initial_voltage is not None:
+        records = tuple(
+            r if r.continues or r.truncated else replace(r, initial_voltage=initial_voltage) for r in records
+        )
+    if decimate:
+        records = tuple(r.decimate(decimate.get(r.phase, decimate.get(r.phase.split("_")[0], 1))) for r in records)
+    return replace(experiment, records=records)
+
+
+def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str | None = None) -> None:
+    """Write an experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Records in order.
+    path : path-like
+        ``.csv`` and ``.mat`` give a file, ``.mcap`` a bag, anything else a folder of NPZ files.
+    format : str, optional
+        Key of `FORMATS` instead of what the ending says.
+
+    Raises
+    ------
+    RecordingError
+        If the format cannot be written, or the path not.
+    """
+    place = Path(path).expanduser()
+    chosen = _named(format or _BY_SUFFIX.get(place.suffix.lower(), "npz"))
+    if not isinstance(chosen, WritableFormat):
+        raise RecordingError(f"{place}: format '{format}' is only read; expected npz, csv, mat or rosbag2")
+    chosen.write(experiment, place)
+
+
+_BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
+
+
+def _named(format: str) -> Format:
+    if format not in FORMATS:
+        raise RecordingError(f"format: got '{format}', expected one of {', '.join(FORMATS)}")
+    return FORMATS[format]
+
+
+def _format(path: Path, name: str | None) -> Format:
+    if not path.exists():
+        raise RecordingError(f"{path}: no such file or folder, expected a recording")
+    if name is not None:
+        return _named(name)
+    for chosen in FORMATS.values():
+        if chosen.recognises(path):
+            return chosen
+    raise RecordingError(f"{path}: not a recording this package knows; expected one of {', '.join(FORMATS)}")

@@ -1,0 +1,123 @@
+"""NPZ folders: exact round trips, holes told, no pickle, no allocation beyond the file."""
+
+import io
+import pickle
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.errors import PiezoError, RecordError, RecordingError
+from piezo_hysteresis.record import Experiment, Record
+from piezo_hysteresis.recording import read, write
+
+
+def keys(**changes):
+    return {"voltage": np.arange(4.0), "displacement": np.arange(4.0) * 1e-6, "sample_period": 1e-3} | changes
+
+
+def test_a_file_with_the_three_keys_is_a_phase_named_by_its_file(tmp_path):
+    np.savez(tmp_path / "03_sine_50hz.npz", **keys())
+    (record,) = read(tmp_path)
+    assert (record.phase, record.size, record.sample_period) == ("sine_50hz", 4, 1e-3)
+    assert (record.start_time, record.continues, record.initial_voltage) == (0.0, False, None)
+
+
+def test_files_are_ordered_by_number_and_follow_each_other_in_time(tmp_path):
+    for number, phase in ((10, "hold"), (2, "step"), (1, "rest")):
+        np.savez(tmp_path / f"{number}_{phase}.npz", **keys())
+    experiment = read(tmp_path)
+    assert [r.phase for r in experiment] == ["rest", "step", "hold"]
+    assert [r.start_time for r in experiment] == [0.0, 4e-3, 8e-3]
+
+
+@pytest.mark.parametrize("phase", [np.array("triangle"), np.array(["triangle"]), np.array(b"triangle")])
+def test_phase_may_be_any_numpy_text(tmp_path, phase):
+    np.savez(tmp_path / "01_x.npz", **keys(phase=phase))
+    assert read(tmp_path)[0].phase == "triangle"
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"sample_period": None}, "sample_period"),
+        ({"voltage": None}, "voltage"),
+        ({"sample_period": 0.0}, "positive"),
+        ({"sample_period": [1.0, 2.0]}, "one number"),
+        ({"displacement": np.arange(3.0)}, "3 samples"),
+        ({"voltage": np.ones((2, 2)), "displacement": np.ones((2, 2))}, "one dimension"),
+        ({"voltage": np.array(["a"])}, "real numbers"),
+        ({"voltage": np.full(4, np.nan)}, "no finite"),
+        ({"phase": 3.0}, "one text"),
+    ],
+)
+def test_what_is_no_phase_is_one_line_that_names_the_file(tmp_path, changes, says):
+    np.savez(tmp_path / "01_bad.npz", **{k: v for k, v in keys(**changes).items() if v is not None})
+    with pytest.raises((RecordingError, RecordError), match=says) as error:
+        read(tmp_path)
+    assert "01_bad.npz" in str(error.value) and "\n" not in str(error.value)
+
+
+def test_non_finite_samples_split_the_phase_and_are_told(tmp_path):
+    displacement = np.arange(100.0) * 1e-6
+    displacement[[40, 41]] = np.nan, np.inf
+    np.savez(tmp_path / "01_x.npz", **keys(voltage=np.arange(100.0), displacement=displacement))
+    experiment = read(tmp_path)
+    assert [(r.size, r.continues, r.truncated) for r in experiment] == [(40, False, False), (58, True, True)]
+    assert experiment[1].start_time == pytest.approx(42e-3)
+    assert "non_finite" in {n.kind for n in experiment.notices}
+
+
+class Bomb:
+    """Creates a file when it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return (Path.touch, (Path(self.path),))
+
+
+@pytest.mark.parametrize("key", ["voltage", "displacement", "phase", "sample_period"])
+def test_pickled_objects_are_refused_unopened(tmp_path, key):
+    marker = tmp_path / "executed"
+    bomb = np.array([Bomb(str(marker))], dtype=object)
+    np.savez(tmp_path / "01_bad.npz", **keys(**{key: bomb}))
+    with pytest.raises(RecordingError, match="pickled"):
+        read(tmp_path)
+    (tmp_path / "01_bad.npz").write_bytes(pickle.dumps(Bomb(str(marker))))
+    with pytest.raises(PiezoError):
+        read(tmp_path)
+    assert not marker.exists()
+
+
+def test_an_array_declared_larger_than_the_file_is_refused(tmp_path):
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (1 << 40,)})
+    with zipfile.ZipFile(tmp_path / "01_bad.npz", "w") as archive:
+        archive.writestr("voltage.npy", header.getvalue())
+        archive.writestr("sample_period.npy", header.getvalue())
+    with pytest.raises(RecordingError, match="more than the file"):
+        read(tmp_path)
+
+
+def test_a_second_experiment_is_not_mixed_into_a_folder(tmp_path):
+    experiment = Experiment((Record([0.0, 1.0], [0.0, 1e-6], 1e-3),))
+    write(experiment, tmp_path / "e")
+    with pytest.raises(RecordingError, match="already"):
+        write(experiment, tmp_path / "e")
+
+
+def test_keys_units_and_period_of_a_foreign_archive_can_be_named(tmp_path):
+    np.savez(tmp_path / "scan.npz", u=np.arange(4.0), y=np.arange(4.0))
+    (record,) = read(
+        tmp_path / "scan.npz",
+        columns={"voltage": "u", "displacement": "y"},
+        units={"displacement": "nm"},
+        sample_period=2e-5,
+        initial_voltage=-1.0,
+        phases="triangle",
+    )
+    assert record.phase == "triangle" and record.sample_period == 2e-5 and record.initial_voltage == -1.0
+    np.testing.assert_array_equal(record.displacement, np.arange(4.0) * 1e-9)
