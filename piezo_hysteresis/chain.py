@@ -1,0 +1,199 @@
+"""`Chain`: a model's coefficients at one sample period, ready to run.
+
+The blocks of the effects in the order of physics, with the two changes of unit (volts to v, position to metres) between
+them. Everything is composed over blocks of samples; only kernels loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .effects import Effect, Place, Setting
+from .effects.block import Block, ChannelBlock, MemorylessBlock, State, SumBlock
+from .errors import DivergenceError
+
+Array = NDArray[np.float64]
+Channels = Mapping[str, Array]
+
+RUNAWAY = 1e9
+"""Displacement scales beyond which a simulation counts as diverged."""
+
+
+class _Scale(MemorylessBlock):
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    def value(self, x: Array) -> Array:
+        return x * self.factor
+
+    def slope(self, x: Array) -> Array:
+        return np.full(x.size, self.factor)
+
+    def by_parameter(self, x: Array) -> Array:
+        return np.empty((0, x.size))
+
+
+@dataclass(frozen=True, slots=True)
+class ChainState:
+    """What a chain carries from one block of samples to the next."""
+
+    blocks: tuple[State, ...]
+    inputs: tuple[float, ...]
+    """Last input of every block."""
+    time: float
+    """Time of the next sample [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChainTangent:
+    """What the sensitivities carry from one block of samples to the next."""
+
+    blocks: tuple[State, ...]
+    inputs: tuple[Array, ...]
+
+
+class Chain:
+    """Blocks from drive voltage to displacement at one sample period.
+
+    Parameters
+    ----------
+    effects : tuple of Effect
+        In chain order.
+    setting : Setting
+        Sample periods and scales.
+    """
+
+    def __init__(self, effects: tuple[Effect, ...], setting: Setting) -> None:
+        self.setting = setting
+        hosted: dict[str, tuple[Effect, ...]] = {
+            e.name: tuple(t for t in effects if t.host == e.name) for e in effects if e.host is None
+        }
+
+        def blocks(place: Place) -> list[tuple[str, Block]]:
+            here = [e for e in effects if e.place is place and e.host is None]
+            return [(e.name, e.block(setting, hosted[e.name])) for e in here]
+
+        hysteresis = blocks(Place.HYSTERESIS)
+        if len(hysteresis) > 1:
+            hysteresis = [(hysteresis[0][0], SumBlock(tuple(b for _, b in hysteresis)))]
+        parts = [
+            *blocks(Place.DRIVE),
+            ("voltage_scale", _Scale(1.0 / setting.voltage_scale)),
+            *hysteresis,
+            *blocks(Place.MATERIAL),
+            *blocks(Place.DYNAMICS),
+            *blocks(Place.SENSOR),
+            ("displacement_scale", _Scale(setting.displacement_scale)),
+            *blocks(Place.ENVIRONMENT),
+        ]
+        self.labels = tuple(label for label, _ in parts)
+        self.blocks = tuple(block for _, block in parts)
+
+    def rest(self, voltage: float, time: float = 0.0) -> ChainState:
+        """State of a stage settled at `voltage` [V]; `time` is that of the first sample [s]."""
+        states, inputs, x = [], [], float(voltage)
+        for block in self.blocks:
+            states.append(block.rest(x, time))
+            inputs.append(x)
+            x = block.static(x)
+        return ChainState(tuple(states), tuple(inputs), time)
+
+    def rest_tangent(self, voltage: float, wanted: Collection[str]) -> ChainTangent:
+        """Tangent state at rest for the parameters `wanted`."""
+        states, inputs, x, dx = [], [], float(voltage), np.empty(0)
+        for block in self.blocks:
+            states.append(block.rest_tangent(x, dx))
+            inputs.append(dx)
+            slope, own = block.static_slopes(x)
+            dx = np.concatenate((slope * dx, own[[n in wanted for n in block.names]] if block.names else own))
+            x = block.static(x)
+        return ChainTangent(tuple(states), tuple(inputs))
+
+    def resume(self, state: ChainState) -> ChainState:
+        """Take over from a chain at another sample period: memories pass on, filters start settled."""
+        states = tuple(
+            s if block.keeps_state else block.rest(x, state.time)
+            for block, s, x in zip(self.blocks, state.blocks, state.inputs, strict=True)
+        )
+        return ChainState(states, state.inputs, state.time)
+
+    def resume_tangent(self, state: ChainState, tangent: ChainTangent) -> ChainTangent:
+        """`resume` for the tangent state."""
+        states = tuple(
+            t if block.keeps_state else block.rest_tangent(x, dx)
+            for block, t, x, dx in zip(self.blocks, tangent.blocks, state.inputs, tangent.inputs, strict=True)
+        )
+        return ChainTangent(states, tangent.inputs)
+
+    def run(self, u: Array, state: ChainState, channels: Channels | None = None) -> tuple[Array, ChainState]:
+        """Displacement of the next samples.
+
+        Parameters
+        ----------
+        u : (n,) ndarray
+            Drive voltage [V], contiguous float64.
+        state : ChainState
+            From `rest` or the block before.
+        channels : mapping of str to (n,) ndarray, optional
+            ``other_displacement`` [m], ``temperature`` [K].
+
+        Raises
+        ------
+        DivergenceError
+            With effect, sample and time of the first runaway.
+        """
+        states, inputs, x = [], [], u
+        for block, s in zip(self.blocks, state.blocks, strict=True):
+            inputs.append(float(x[-1]))
+            if isinstance(block, ChannelBlock):
+                s = (channels or {}).get(block.channel)
+            x, s = block.run(x, s)
+            states.append(s)
+        if not np.abs(x).max(initial=0.0) < RUNAWAY * self.setting.displacement_scale:
+            self._tell_divergence(u, state, channels)
+        time = state.time + u.size * self.setting.sample_period
+        return x, ChainState(tuple(states), tuple(inputs), time)
+
+    def _tell_divergence(self, u: Array, state: ChainState, channels: Channels | None) -> None:
+        x = u
+        for label, block, s in zip(self.labels, self.blocks, state.blocks, strict=True):
+            if isinstance(block, ChannelBlock):
+                s = (channels or {}).get(block.channel)
+            x, _ = block.run(x, s)
+            bad = ~(np.abs(x) < RUNAWAY)
+            if bad.any():
+                sample = int(bad.argmax())
+                raise DivergenceError(label, sample, state.time + sample * self.setting.sample_period)
+        raise DivergenceError(self.labels[-1], u.size - 1, state.time + u.size * self.setting.sample_period)
+
+    def linearise(
+        self,
+        u: Array,
+        state: ChainState,
+        tangent: ChainTangent,
+        wanted: Collection[str],
+        channels: Channels | None = None,
+    ) -> tuple[Array, dict[str, Array], ChainState, ChainTangent]:
+        """`run`, and ∂y/∂θ of shape (n,) for every parameter `wanted`, in one pass."""
+        states, tangents, inputs, dinputs = [], [], [], []
+        x, dx, rows = u, np.empty((0, u.size)), []
+        for block, s, t in zip(self.blocks, state.blocks, tangent.blocks, strict=True):
+            inputs.append(float(x[-1]))
+            dinputs.append(dx[:, -1].copy())
+            if isinstance(block, ChannelBlock):
+                s = (channels or {}).get(block.channel)
+            before = len(dx)
+            x, dx, s, t = block.linearise(x, dx, s, t)
+            keep = [n in wanted for n in block.names]
+            if not all(keep):
+                dx = np.vstack((dx[:before], dx[before:][keep]))
+            rows += [n for n, k in zip(block.names, keep, strict=True) if k]
+            states.append(s)
+            tangents.append(t)
+        time = state.time + u.size * self.setting.sample_period
+        slopes = dict(zip(rows, dx, strict=True))
+        return x, slopes, ChainState(tuple(states), tuple(inputs), time), ChainTangent(tuple(tangents), tuple(dinputs))

@@ -1,0 +1,270 @@
+"""`Block`: an effect realised at one sample period, able to run and to propagate sensitivities.
+
+A block maps samples x to samples y. *Rest* is the state of a stage that has been at the constant input x0 for long.
+Sensitivities travel as rows: `linearise` takes ∂x/∂θ of everything upstream, shape (m, n), and returns those m rows
+mapped through the block, followed by the rows of the block's own `names`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+State = Any
+"""Opaque to everyone but the block that made it."""
+
+
+class Block(ABC):
+    """One effect at one sample period.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Own parameters, in the order of the own rows of `linearise`.
+    keeps_state : bool
+        True where the state does not depend on the sample period, so that it passes to a record at another period.
+    """
+
+    names: tuple[str, ...] = ()
+    keeps_state: bool = False
+
+    @abstractmethod
+    def static(self, x0: float) -> float:
+        """Output of a stage at rest at x0."""
+
+    @abstractmethod
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        """∂static/∂x0, and ∂static/∂θ for the own parameters, shape (p,)."""
+
+    @abstractmethod
+    def rest(self, x0: float, time: float) -> State:
+        """State of a stage settled at x0; `time` is that of the first sample [s]."""
+
+    @abstractmethod
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        """Next samples: y of shape (n,), and the state after them."""
+
+    @abstractmethod
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        """Tangent state at rest, for incoming slopes dx0 of shape (m,)."""
+
+    @abstractmethod
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        """`run`, and the sensitivities: y (n,), dy (m + p, n), state, tangent state."""
+
+
+class MemorylessBlock(Block):
+    """y_i = f(x_i; θ)."""
+
+    keeps_state = True
+
+    @abstractmethod
+    def value(self, x: Array) -> Array:
+        """f(x), shape (n,)."""
+
+    @abstractmethod
+    def slope(self, x: Array) -> Array:
+        """∂f/∂x, shape (n,)."""
+
+    @abstractmethod
+    def by_parameter(self, x: Array) -> Array:
+        """∂f/∂θ, shape (p, n)."""
+
+    def static(self, x0: float) -> float:
+        return float(self.value(np.array([x0]))[0])
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        at = np.array([x0])
+        return float(self.slope(at)[0]), self.by_parameter(at)[:, 0]
+
+    def rest(self, x0: float, time: float) -> State:
+        return None
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        return self.value(x), None
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return None
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        return self.value(x), np.vstack((self.slope(x) * dx, self.by_parameter(x))), None, None
+
+
+class LinearBlock(Block):
+    """Linear dynamics acting on the deviation from the rest point: y = K·x0 + filter(x − x0).
+
+    At rest the filter state is exactly zero, so a stage at rest stays there without rounding drift.
+    """
+
+    gain: float = 1.0
+
+    @abstractmethod
+    def zeros(self, rows: int) -> Array:
+        """Filter state of `rows` parallel signals at rest, shape (rows, s)."""
+
+    @abstractmethod
+    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
+        """Filter `rows` signals (rows, n) from state (rows, s); returns the outputs and a new state."""
+
+    @abstractmethod
+    def own_rest(self) -> State:
+        """Tangent state of the own parameters at rest."""
+
+    @abstractmethod
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
+        """∂ filter/∂θ, shape (p, n), for deviations x, outputs y (both (n,)), state z (s,) before the block."""
+
+    def gain_slopes(self) -> Array:
+        """∂K/∂θ, shape (p,)."""
+        return np.zeros(len(self.names))
+
+    def static(self, x0: float) -> float:
+        return self.gain * x0
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return self.gain, self.gain_slopes() * x0
+
+    def rest(self, x0: float, time: float) -> State:
+        return x0, self.zeros(1)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        x0, z = state
+        y, z = self.filter((x - x0)[None, :], z)
+        return self.gain * x0 + y[0], (x0, z)
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return np.array(dx0), self.zeros(len(dx0)), self.own_rest()
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        x0, z = state
+        dx0, dz, own = tangent
+        deviation = x - x0
+        y, z_next = self.filter(deviation[None, :], z)
+        mapped, dz = self.filter(dx - dx0[:, None], dz)
+        mapped += (self.gain * dx0)[:, None]
+        mine, own = self.by_parameter(deviation, y[0], z[0], own)
+        mine += (self.gain_slopes() * x0)[:, None]
+        return self.gain * x0 + y[0], np.vstack((mapped, mine)), (x0, z_next), (dx0, dz, own)
+
+
+class SumBlock(Block):
+    """Blocks side by side on the same input; their outputs add up."""
+
+    keeps_state = True
+
+    def __init__(self, members: tuple[Block, ...]) -> None:
+        self.members = members
+        self.names = tuple(name for member in members for name in member.names)
+
+    def static(self, x0: float) -> float:
+        return sum(m.static(x0) for m in self.members)
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        slopes = [m.static_slopes(x0) for m in self.members]
+        return sum(s for s, _ in slopes), np.concatenate([own for _, own in slopes])
+
+    def rest(self, x0: float, time: float) -> State:
+        return tuple(m.rest(x0, time) for m in self.members)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        outputs, states = zip(*(m.run(x, s) for m, s in zip(self.members, state, strict=True)), strict=True)
+        return sum(outputs[1:], outputs[0]), states
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return tuple(m.rest_tangent(x0, dx0) for m in self.members)
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        y, mapped = np.zeros_like(x), np.zeros_like(dx)
+        mine, states, tangents = [], [], []
+        for member, s, t in zip(self.members, state, tangent, strict=True):
+            part, dpart, s, t = member.linearise(x, dx, s, t)
+            y += part
+            mapped += dpart[: len(dx)]
+            mine.append(dpart[len(dx) :])
+            states.append(s)
+            tangents.append(t)
+        return y, np.vstack((mapped, *mine)), tuple(states), tuple(tangents)
+
+
+class TimeBlock(Block):
+    """y = x + d(t; θ), or x·(…): functions of absolute time; state is (time of the record's start, samples since)."""
+
+    def __init__(self, sample_period: float) -> None:
+        self.sample_period = sample_period
+
+    @abstractmethod
+    def value(self, x: Array, t: Array) -> Array:
+        """y for inputs x and times t [s], both (n,)."""
+
+    def slope(self, x: Array, t: Array) -> Array:
+        """∂y/∂x, shape (n,)."""
+        return np.ones_like(x)
+
+    @abstractmethod
+    def by_parameter(self, x: Array, t: Array) -> Array:
+        """∂y/∂θ, shape (p, n)."""
+
+    def static(self, x0: float) -> float:
+        return x0
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return 1.0, np.zeros(len(self.names))
+
+    def rest(self, x0: float, time: float) -> State:
+        return time, 0
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return None
+
+    def _times(self, n: int, state: State) -> tuple[Array, State]:
+        start, count = state
+        return start + self.sample_period * (count + np.arange(n)), (start, count + n)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        t, state = self._times(x.size, state)
+        return self.value(x, t), state
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        t, state = self._times(x.size, state)
+        return self.value(x, t), np.vstack((self.slope(x, t) * dx, self.by_parameter(x, t))), state, None
+
+
+class ChannelBlock(Block):
+    """y = x + f(c; θ) of another measured channel c, which the chain hands over as the state.
+
+    A record without the channel gets nothing added.
+    """
+
+    keeps_state = True
+    channel: str
+
+    @abstractmethod
+    def addition(self, c: Array) -> Array:
+        """f(c), shape (n,)."""
+
+    @abstractmethod
+    def by_parameter(self, c: Array) -> Array:
+        """∂f/∂θ, shape (p, n)."""
+
+    def static(self, x0: float) -> float:
+        return x0
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return 1.0, np.zeros(len(self.names))
+
+    def rest(self, x0: float, time: float) -> State:
+        return None
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return None
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        return (x if state is None else x + self.addition(state)), None
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        rows = np.zeros((len(self.names), x.size)) if state is None else self.by_parameter(state)
+        return self.run(x, state)[0], np.vstack((dx, rows)), None, None

@@ -1,0 +1,165 @@
+"""`Effect`: the contract of the catalogue. One physical effect, its equation, its parameters, its place in the chain.
+
+Three moments, three names: *parameters* (physical, with units) become *coefficients* for one sample period when
+`Effect.block` is called, and the block runs a *kernel* per sample.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar, Self
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..parameter import Parameter, Value
+from .block import Block
+
+
+class Place(IntEnum):
+    """Where along u → v → w → x → y an effect acts; the chain is sorted by it."""
+
+    DRIVE = 0
+    """Between the drive voltage and the actuator: volts in, volts out."""
+    HYSTERESIS = 1
+    """From the normalised actuator input v to the hysteresis output w; members add up."""
+    MATERIAL = 2
+    """On w, before the mechanics: creep."""
+    DYNAMICS = 3
+    """From w to the normalised position of the stage."""
+    SENSOR = 4
+    """On the normalised position."""
+    ENVIRONMENT = 5
+    """Added to the displacement [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What an effect must know to become coefficients.
+
+    Parameters
+    ----------
+    sample_period : float
+        Period of the samples that will be run [s].
+    model_period : float
+        Period at which discrete dynamics were identified [s]; smaller than `sample_period` in slow phases.
+    voltage_scale : float
+        v = u / voltage_scale [V].
+    displacement_scale : float
+        Normalised output times this is displacement [m].
+    """
+
+    sample_period: float
+    model_period: float
+    voltage_scale: float = 1.0
+    displacement_scale: float = 1.0
+
+    @property
+    def is_slow(self) -> bool:
+        """True where discrete dynamics act as dc gain plus group delay."""
+        return self.sample_period > 1.001 * self.model_period
+
+
+class Effect(ABC):
+    """One physical effect with its parameter values; frozen, ``with_values`` returns a new one.
+
+    Parameters
+    ----------
+    **values : float or sequence of float
+        Parameter values by name; the others take the defaults of the table.
+
+    Raises
+    ------
+    ParameterError
+        On an unknown name, or a value outside its bounds.
+    """
+
+    name: ClassVar[str]
+    family: ClassVar[str]
+    place: ClassVar[Place]
+    host: ClassVar[str | None] = None
+    """Effect whose kernel holds this one as a term (terms of the Bouc-Wen loop, softening of the ARX mode)."""
+    channel: ClassVar[str | None] = None
+    """Extra channel of the record that is needed: ``other_displacement`` or ``temperature``."""
+    equation: ClassVar[str]
+    signature: ClassVar[str]
+    source: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+
+    def __init__(self, **values: Value) -> None:
+        table = {p.name: p for p in self.parameters}
+        for name in values:
+            if name not in table:
+                raise ParameterError(f"{self.name}: got unknown parameter '{name}', expected one of {', '.join(table)}")
+        self._values = {n: p.check(values.get(n, p.value), f"{self.name}.") for n, p in table.items()}
+        self.check()
+
+    def check(self) -> None:
+        """Refuse values that are each inside their bounds but make no sense together."""
+
+    def __getitem__(self, name: str) -> float:
+        value = self._values[name]
+        assert not isinstance(value, tuple)
+        return value
+
+    def array(self, name: str) -> np.ndarray:
+        """An array parameter, shape (any,)."""
+        return np.array(self._values[name], dtype=np.float64)
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """Parameter values by name."""
+        return dict(self._values)
+
+    @property
+    def is_off(self) -> bool:
+        """True where every parameter that can switch the effect off does."""
+        rows = [p for p in self.parameters if p.off is not None]
+        return bool(rows) and all(np.all(np.asarray(self._values[p.name]) == p.off) for p in rows)
+
+    def with_values(self, **values: Value) -> Self:
+        """The same effect with some other values."""
+        return type(self)(**{**self._values, **values})
+
+    def off(self) -> Self:
+        """The same effect, exactly switched off."""
+        switched: dict[str, Value] = {
+            p.name: (p.off,) * len(v) if isinstance(v := self._values[p.name], tuple) else p.off
+            for p in self.parameters
+            if p.off is not None
+        }
+        return self.with_values(**switched)
+
+    def free_names(self) -> Iterator[str]:
+        """Names of all scalar numbers: ``"gamma"``, or ``"a[0]"`` for elements of an array parameter."""
+        for row in self.parameters:
+            value = self._values[row.name]
+            if isinstance(value, tuple):
+                yield from (f"{row.name}[{i}]" for i in range(len(value)))
+            else:
+                yield row.name
+
+    @abstractmethod
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        """Coefficients and kernels for one sample period.
+
+        Parameters
+        ----------
+        setting : Setting
+            Sample periods and scales.
+        terms : tuple of Effect
+            Effects hosted by this one, for hosts.
+        """
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and other._values == self._values  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash((self.name, tuple(self._values.items())))
+
+    def __repr__(self) -> str:
+        inside = ", ".join(f"{n}={v!r}" for n, v in self._values.items())
+        return f"{type(self).__name__}({inside})"
