@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -213,12 +213,24 @@ class Model:
             outputs.append(y)
         return outputs
 
-    def sensitivities(
-        self, records: Sequence[Record], wanted: Collection[str]
-    ) -> Iterator[tuple[Array, dict[str, Array]]]:
-        """For every record the free-run displacement (n,) and ∂y/∂θ (n,) of every number `wanted`."""
+    def linearise(
+        self, records: Iterable[Record], wanted: Collection[str], block: int = 8192
+    ) -> Iterator[tuple[int, slice, Array, dict[str, Array]]]:
+        """Free run with sensitivities, block by block, so that records of any length fit in memory.
+
+        Yields
+        ------
+        index : int
+            Of the record.
+        part : slice
+            Samples of the record in this block.
+        y : (k,) ndarray
+            Displacement [m].
+        slopes : dict of str to (k,) ndarray
+            ∂y/∂θ for every number `wanted`.
+        """
         state, tangent, chain = None, None, None
-        for record in records:
+        for index, record in enumerate(records):
             before, chain = chain, self.at(record.sample_period)
             if state is None or tangent is None or not record.continues:
                 state = chain.rest(record.settled_voltage, record.start_time)
@@ -226,10 +238,18 @@ class Model:
             elif before is not chain:
                 tangent = chain.resume_tangent(state, tangent)
                 state = chain.resume(state)
-            y, slopes, state, tangent = chain.linearise(
-                np.array(record.voltage), state, tangent, wanted, channels_of(record)
-            )
-            yield y, slopes
+            channels = channels_of(record)
+            for start in range(0, record.size, block):
+                part = slice(start, min(start + block, record.size))
+                now = {name: c[part].copy() for name, c in channels.items()}
+                u = np.array(record.voltage[part])
+                y, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
+                yield index, part, y, slopes
+
+    def sensitivities(self, record: Record, wanted: Collection[str]) -> tuple[Array, dict[str, Array]]:
+        """Free-run displacement (n,) of a record from rest, and ∂y/∂θ (n,) of every number `wanted`."""
+        ((_, _, y, slopes),) = self.linearise([record], wanted, block=record.size)
+        return y, slopes
 
     def contributions(self, record: Record) -> dict[str, Array]:
         """How much each effect beyond hysteresis, dynamics and offset adds to the displacement [m], shape (n,)."""

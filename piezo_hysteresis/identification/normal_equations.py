@@ -1,0 +1,120 @@
+"""Inner products of residual, sensitivities and nuisances of every record: all that fitting and score tests need.
+
+The matrices are small, so records of any length are summed up block by block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Model
+from ..record import Record
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Nuisance:
+    """What is free and linear in every record, and is eliminated exactly.
+
+    Parameters
+    ----------
+    offset : bool
+        A sensor zero of its own per record.
+    hum_frequency : float, optional
+        Mains frequency [Hz] whose amplitude and phase are free per record.
+    harmonics : int
+        Harmonics of the hum.
+    """
+
+    offset: bool = False
+    hum_frequency: float | None = None
+    harmonics: int = 3
+
+    def rows(self, record: Record, part: slice) -> Array:
+        """Basis functions, shape (k, n)."""
+        t = record.sample_period * np.arange(part.start, part.stop)
+        rows = [np.ones(t.size)] if self.offset else []
+        if self.hum_frequency is not None:
+            for order in range(1, self.harmonics + 1):
+                if 2.2 * order * self.hum_frequency * record.sample_period < 1.0:
+                    angle = 2 * np.pi * order * self.hum_frequency * t
+                    rows += [np.cos(angle), np.sin(angle)]
+        return np.array(rows).reshape(len(rows), t.size)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Gram:
+    """Inner products of one record after elimination of its nuisances.
+
+    Parameters
+    ----------
+    size : int
+        Number of samples.
+    matrix : (q + 1, q + 1) ndarray
+        Of the q sensitivities in the order asked for, and the residual last.
+    nuisance : (k,) ndarray
+        Amplitudes of the nuisances at the present parameters.
+    """
+
+    size: int
+    matrix: Array
+    nuisance: Array
+
+    @property
+    def rms(self) -> float:
+        """RMS residual [m]."""
+        return float(np.sqrt(max(self.matrix[-1, -1], 0.0) / self.size))
+
+
+def grams(
+    model: Model, records: Sequence[Record], wanted: Sequence[str] = (), nuisance: Nuisance | None = None
+) -> list[Gram]:
+    """Inner products for every record.
+
+    Parameters
+    ----------
+    model : Model
+        Simulated free-run.
+    records : sequence of Record
+        In experiment order, so that those that continue do.
+    wanted : sequence of str
+        Numbers of the model whose sensitivities enter, e.g. ``"creep.gamma"``.
+    nuisance : Nuisance, optional
+        Eliminated per record.
+    """
+    nuisance = nuisance or Nuisance()
+    q = len(wanted)
+    sums: list[Array] = []
+    for index, part, y, slopes in model.linearise(records, wanted):
+        record = records[index]
+        residual = record.displacement[part] - y
+        rows = np.vstack((*(slopes[n] for n in wanted), residual, nuisance.rows(record, part)))
+        product = rows @ rows.T
+        if index == len(sums):
+            sums.append(product)
+        else:
+            sums[index] += product
+    result = []
+    for record, total in zip(records, sums, strict=True):
+        inner, cross, free = total[: q + 1, : q + 1], total[q + 1 :, : q + 1], total[q + 1 :, q + 1 :]
+        amplitudes = np.linalg.lstsq(free, cross, rcond=None)[0] if len(free) else cross
+        result.append(Gram(record.size, inner - cross.T @ amplitudes, amplitudes[:, -1].copy()))
+    return result
+
+
+def residuals(model: Model, records: Sequence[Record], nuisance: Nuisance | None = None) -> list[Array]:
+    """Measured minus free-run displacement of every record [m], nuisances removed."""
+    nuisance = nuisance or Nuisance()
+    result = []
+    for record, y in zip(records, model.simulate(records), strict=True):
+        residual = record.displacement - y
+        rows = nuisance.rows(record, slice(0, record.size))
+        if len(rows):
+            residual = residual - np.linalg.lstsq(rows.T, residual, rcond=None)[0] @ rows
+        result.append(residual)
+    return result
