@@ -1,0 +1,228 @@
+"""Messages <-> arrays and plain values: one block of samples, one waveform, one status."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from numpy.typing import ArrayLike, NDArray
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Header
+
+from ..errors import RecordError
+from .cloud import from_cloud, to_cloud
+
+Samples = NDArray[np.float64]
+
+SAMPLES = {"time": "f8", "voltage": "f8", "displacement": "f8", "index": "u4", "phase": "u4"}
+"""Point of `samples`: time@0, voltage@8, displacement@16, index@24, phase@28."""
+
+PREDICTED_SAMPLES = {
+    "time": "f8",
+    "displacement": "f8",
+    "prediction": "f8",
+    "residual": "f8",
+    "index": "u4",
+    "model": "u4",
+}
+"""Point of `predicted_samples`: time@0, displacement@8, prediction@16, residual@24, index@32, model@36."""
+
+COMMAND = {"time": "f8", "voltage": "f8"}
+"""Point of `command`; `time` is optional."""
+
+_PERIOD_TOLERANCE = 0.01
+"""Largest departure of a sample from its place on the clock, in sample periods."""
+
+_PHASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SampleBlock:
+    """Consecutive samples of a stage, as one message of `samples`.
+
+    Parameters
+    ----------
+    stamp : int
+        Time of the first sample on the driver's clock [ns].
+    time : (n,) ndarray of float64
+        Time of every sample since the stamp [s].
+    voltage : (n,) ndarray of float64
+        Drive voltage before the amplifier [V].
+    displacement : (n,) ndarray of float64
+        Measured displacement [m].
+    index : (n,) ndarray of uint32
+        Running number of the sample, modulo 2^32.
+    phase : (n,) ndarray of uint32
+        Number of the phase.
+    stage : str
+        Name of the stage.
+    follows_gap : bool
+        True where samples before the block were never measured (a device reading out its memory), as told by the
+        index; False where a jump of the index means lost messages.
+    """
+
+    stamp: int
+    time: Samples
+    voltage: Samples
+    displacement: Samples
+    index: NDArray[np.uint32]
+    phase: NDArray[np.uint32]
+    stage: str = ""
+    follows_gap: bool = False
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return int(self.time.size)
+
+    @property
+    def sample_period(self) -> float | None:
+        """Time between samples [s]; None for a block of one."""
+        return float(self.time[-1] - self.time[0]) / (self.size - 1) if self.size > 1 else None
+
+
+def samples_to_cloud(block: SampleBlock) -> PointCloud2:
+    """Message of `samples`."""
+    columns = {name: getattr(block, name) for name in SAMPLES}
+    return to_cloud(columns, SAMPLES, to_stamp(block.stamp), block.stage, dense=not block.follows_gap)
+
+
+def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
+    """Block of a message of `samples`, ours or foreign.
+
+    Raises
+    ------
+    RecordError
+        On missing or wrong fields, wrong sizes, non-finite values.
+    """
+    arrays = from_cloud(cloud, SAMPLES)
+    return SampleBlock(
+        from_stamp(cloud.header.stamp), **arrays, stage=cloud.header.frame_id, follows_gap=not cloud.is_dense
+    )
+
+
+def predicted_to_cloud(
+    block: SampleBlock, prediction: ArrayLike, residual: ArrayLike, model: int, *, valid: bool = True
+) -> PointCloud2:
+    """Message of `predicted_samples` for the samples of a block.
+
+    Parameters
+    ----------
+    block : SampleBlock
+        What was measured.
+    prediction, residual : (n,) array_like
+        Predicted displacement and measured minus predicted [m].
+    model : int
+        First 32 bits of the model's hash.
+    valid : bool
+        False while warming up or bridging a gap.
+    """
+    columns = {
+        "time": block.time,
+        "displacement": block.displacement,
+        "prediction": prediction,
+        "residual": residual,
+        "index": block.index,
+        "model": np.full(block.size, model, np.uint32),
+    }
+    return to_cloud(columns, PREDICTED_SAMPLES, to_stamp(block.stamp), block.stage, dense=valid)
+
+
+def command_to_cloud(voltage: ArrayLike, sample_period: float, phase: str, stamp: Time | None = None) -> PointCloud2:
+    """Message of `command`: a waveform that opens the phase named `phase`.
+
+    Parameters
+    ----------
+    voltage : (n,) array_like
+        Drive voltage [V].
+    sample_period : float
+        Time between samples [s]; the driver refuses another one than its own.
+    phase : str
+        Name of the phase.
+    stamp : builtin_interfaces.msg.Time, optional
+        Now; without it the driver does not check the age of the command.
+    """
+    values = np.asarray(voltage, dtype=np.float64)
+    columns = {"time": sample_period * np.arange(values.size), "voltage": values}
+    return to_cloud(columns, COMMAND, stamp or Time(), phase)
+
+
+def waveform_from_cloud(cloud: PointCloud2, sample_period: float) -> Samples:
+    """Waveform of a message of `command` [V], shape (n,).
+
+    Raises
+    ------
+    RecordError
+        On a cloud without `voltage`, or a `time` that does not agree with `sample_period`.
+    """
+    arrays = from_cloud(cloud, {"voltage": "f8"}, {"time": "f8"})
+    time, voltage = arrays.get("time"), arrays["voltage"]
+    if time is not None:
+        off = np.abs(time - time[0] - sample_period * np.arange(time.size))
+        if off.max() > _PERIOD_TOLERANCE * sample_period:
+            got = float(time[-1] - time[0]) / (time.size - 1)
+            raise RecordError(
+                f"time: got {got:g} s between samples, {off.max():.3g} s off at worst, expected {sample_period:g} s"
+            )
+    return voltage
+
+
+def phase_name(frame_id: str) -> str:
+    """Name of a commanded phase; `command` where none is given.
+
+    Raises
+    ------
+    RecordError
+        On a name that could not stand in a file name.
+    """
+    if not frame_id:
+        return "command"
+    if not _PHASE_NAME.fullmatch(frame_id):
+        raise RecordError(
+            f"frame_id: got {frame_id[:80]!r} as phase name, expected 1 to 64 letters, digits, '_', '.', '-'"
+        )
+    return frame_id
+
+
+def phase_from_text(text: str) -> tuple[int, str]:
+    """Number and name of a message of `phase`, ``"<number> <name>"``.
+
+    Raises
+    ------
+    RecordError
+        On any other text.
+    """
+    number, _, name = text.partition(" ")
+    if not (number.isascii() and number.isdigit() and name):
+        raise RecordError(f"phase: got {text[:80]!r}, expected '<number> <name>'")
+    return int(number), name
+
+
+def live(stamp: Time, frame_id: str, **values: float) -> JointState:
+    """Stamped scalars by name, in `position`: PlotJuggler and Foxglove draw loops from it."""
+    return JointState(header=Header(stamp=stamp, frame_id=frame_id), name=list(values), position=list(values.values()))
+
+
+def diagnostic(level: bytes, name: str, message: str, hardware_id: str = "", **values: object) -> DiagnosticStatus:
+    """Status with its values as text; floats with six digits."""
+    pairs = [KeyValue(key=key, value=f"{v:.6g}" if isinstance(v, float) else str(v)) for key, v in values.items()]
+    return DiagnosticStatus(level=level, name=name, message=message, hardware_id=hardware_id, values=pairs)
+
+
+def values_of(status: DiagnosticStatus) -> dict[str, str]:
+    """Values of a status by key."""
+    return {pair.key: pair.value for pair in status.values}
+
+
+def to_stamp(nanoseconds: int) -> Time:
+    """Message time of nanoseconds since the epoch."""
+    seconds, rest = divmod(nanoseconds, 1_000_000_000)
+    return Time(sec=seconds, nanosec=rest)
+
+
+def from_stamp(stamp: Time) -> int:
+    """Nanoseconds since the epoch of a message time."""
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

@@ -1,0 +1,17 @@
+"""Quality of service of every topic; a depth covers the longest stall times the message rate."""
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+SAMPLES = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+"""`samples`, `predicted_samples`: one second of blocks of 10 ms."""
+
+COMMAND = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+"""`command`, `set_voltage`, and the live scalars."""
+
+LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""`phase`, `model`, `status`: a late joiner gets the last one."""
+
+COMMAND_STATUS = QoSProfile(
+    depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+"""`command_status`: a late joiner gets the last ten."""
