@@ -1,0 +1,220 @@
+"""Step 2: linear dynamics, an ARX model by least squares (paper, Sec. 3.3).
+
+The equation error that least squares makes small is not the output error: noise of the sensor on y enters the
+regressors and biases A(z). Steiglitz-McBride iterations (prefiltering with 1/A of the step before) remove that bias
+where the noise is white.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.linalg import lstsq, qr
+from scipy.signal import lfilter
+
+from ..effects import Arx, Setting
+from ..errors import IdentificationError
+from ..record import Notice, Samples
+
+Signals = Sequence[tuple[Samples, Samples]]
+"""Input and output of every record, at one sample period."""
+
+BLOCK = 1 << 15
+"""Rows of the regressor matrix held at a time."""
+LARGEST_POLE = 0.99999
+"""Radius to which poles on or just outside the unit circle are drawn back."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Dynamics:
+    """G(z) = B(z)/A(z)·z^(−d), Eq. (4) and (5), and how well it describes its data.
+
+    Parameters
+    ----------
+    arx : Arx
+        The effect, with a, b and d.
+    sample_period : float
+        Sample period [s].
+    one_step_error : float
+        RMS of y minus its prediction from measured y one sample before; what ARX makes small [unit of y].
+    free_run_error : float
+        RMS of y minus the simulation from the input alone; what counts [unit of y].
+    notices : tuple of Notice
+        ``unstable_reflected`` where poles were mirrored into the unit circle.
+    """
+
+    arx: Arx
+    sample_period: float
+    one_step_error: float = float("nan")
+    free_run_error: float = float("nan")
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def lag(self) -> float:
+        """Group delay of G at dc, d and that of B/A [s]."""
+        return self.arx.group_delay * self.sample_period
+
+    def response(self, frequency: Samples) -> NDArray[np.complex128]:
+        """G at the given frequencies [Hz], complex, shape of `frequency`."""
+        return self.arx.response(frequency, self.sample_period)
+
+    def simulate(self, u: Samples) -> Samples:
+        """Free-run output for the input `u`, starting settled at its first value, shape (n,)."""
+        block = self.arx.block(Setting(self.sample_period, self.sample_period))
+        y, _ = block.run(u, block.rest(float(u[0]), 0.0))
+        return y
+
+    def __str__(self) -> str:
+        orders = f"na = {self.arx.array('a').size}, nb = {self.arx.array('b').size}, d = {self.arx['delay']:g}"
+        return (
+            f"G: {orders}, dc gain {self.arx.dc_gain:.5g}, lag {self.lag * 1e6:.4g} µs, "
+            f"one-step error {self.one_step_error:.3g}, free-run error {self.free_run_error:.3g}"
+        )
+
+
+def _triangle(signals: Signals, orders: tuple[int, int], delay: int) -> NDArray[np.float64]:
+    """R factor of [−y_(i−1) … −y_(i−na), u_(i−d) … u_(i−d−nb+1), y_i], every record freed of its own offset."""
+    na, nb = orders
+    first = max(na, delay + nb - 1)
+    r = np.zeros((0, na + nb + 1))
+    for u, y in signals:
+        rows = y.size - first
+        if rows < 1:
+            raise IdentificationError(
+                f"ARX: got a record of {y.size} samples, expected more than {first} for its orders"
+            )
+        # row i holds y_i, y_(i−1), …: the window reversed
+        past_y = sliding_window_view(y[first - na :], na + 1)[:, ::-1]
+        past_u = sliding_window_view(u[first - delay - nb + 1 : u.size - delay], nb)[:, ::-1]
+        means = np.concatenate((past_y.mean(axis=0), past_u.mean(axis=0)))
+        for start in range(0, rows, BLOCK):
+            part = slice(start, start + BLOCK)
+            block = np.hstack((past_y[part], past_u[part])) - means
+            block = np.hstack((-block[:, 1 : na + 1], block[:, na + 1 :], block[:, :1]))
+            r = qr(np.vstack((r, block)), mode="r", overwrite_a=True, check_finite=False)[0][: na + nb + 1]
+    return r
+
+
+def _solve(r: NDArray[np.float64], count: int) -> tuple[Samples, float]:
+    """Least squares from the triangle: coefficients of the first `count` columns, and the norm of what is left."""
+    scale = np.linalg.norm(r[:, :count], axis=0)
+    scale[scale == 0.0] = 1.0
+    theta = lstsq(r[:, :count] / scale, r[:, -1], check_finite=False)[0] / scale
+    return theta, float(np.linalg.norm(r[:, -1] - r[:, :count] @ theta))
+
+
+def _reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
+    """Mirror poles outside the unit circle into it and scale B so that |B/A| stays; the number mirrored."""
+    poles = np.roots(np.concatenate(([1.0], a)))
+    outside = np.abs(poles) > LARGEST_POLE
+    if not outside.any():
+        return a, b, 0
+    radius = np.abs(poles[outside])
+    poles[outside] *= np.minimum(1.0 / radius, LARGEST_POLE) / radius
+    return np.real(np.poly(poles))[1:], b / np.prod(np.maximum(radius, 1.0)), int(outside.sum())
+
+
+def _free_run_error(model: Dynamics, signals: Signals) -> float:
+    squares, count = 0.0, 0
+    for u, y in signals:
+        error = y - model.simulate(u)
+        squares += float(np.sum((error - error.mean()) ** 2))
+        count += y.size
+    return float(np.sqrt(squares / count))
+
+
+def identify_arx(
+    signals: Signals, delay: int, sample_period: float, orders: tuple[int, int] = (8, 8), iterations: int = 0
+) -> Dynamics:
+    """ARX model by least squares, with a free offset per record.
+
+    Parameters
+    ----------
+    signals : sequence of (u, y)
+        Input and output of every record; the input may be the voltage or the hysteresis output.
+    delay : int
+        d, samples.
+    sample_period : float
+        Sample period [s].
+    orders : (int, int)
+        na and nb.
+    iterations : int
+        Steiglitz-McBride iterations after plain least squares; 0 is the paper.
+
+    Returns
+    -------
+    Dynamics
+        A stable model with its one-step and its free-run error.
+
+    Raises
+    ------
+    IdentificationError
+        If a record is shorter than the orders, the input does not move, or the orders make no sense.
+
+    Notes
+    -----
+    Paper, Sec. 3.3; Steiglitz and McBride 1965.
+    """
+    na, nb = orders
+    if na < 0 or nb < 1 or delay < 1:
+        raise IdentificationError(f"ARX: got na = {na}, nb = {nb}, d = {delay}, expected na >= 0, nb >= 1, d >= 1")
+    if not any(np.ptp(u) > 0.0 for u, _ in signals):
+        raise IdentificationError("ARX: the input does not move; expected a record with excitation, e.g. noise")
+    theta, left = _solve(_triangle(signals, orders, delay), na + nb)
+    one_step = left / float(np.sqrt(sum(y.size for _, y in signals)))
+    candidates: list[Dynamics] = []
+    for iteration in range(iterations + 1):
+        if iteration:
+            whitener = np.concatenate(([1.0], candidates[-1].arx.array("a")))
+            whitened = [(lfilter([1.0], whitener, u - u[0]), lfilter([1.0], whitener, y - y[0])) for u, y in signals]
+            theta, _ = _solve(_triangle(whitened, orders, delay), na + nb)
+        a, b, mirrored = _reflected(theta[:na], theta[na:])
+        told = (Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),)
+        arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
+        model = Dynamics(arx, sample_period, one_step, notices=told if mirrored else ())
+        candidates.append(replace(model, free_run_error=_free_run_error(model, signals)))
+    return min(candidates, key=lambda model: model.free_run_error)
+
+
+@dataclass(frozen=True, slots=True)
+class OrderError:
+    """Errors of one order na = nb: on the data it was fitted to (one step), and free-run on the records held out."""
+
+    order: int
+    one_step_error: float
+    free_run_error: float
+
+
+def compare_orders(
+    signals: Signals, delay: int, sample_period: float, highest: int = 12, iterations: int = 4
+) -> tuple[OrderError, ...]:
+    """Error against order na = nb = 1 … `highest`: fitted to the first two thirds of every record, judged on the rest.
+
+    Parameters are those of `identify_arx`.
+
+    Returns
+    -------
+    tuple of OrderError
+        In rising order.
+    """
+    cuts = [2 * y.size // 3 for _, y in signals]
+    early = [(u[:cut], y[:cut]) for (u, y), cut in zip(signals, cuts, strict=True)]
+    table = []
+    for order in range(1, highest + 1):
+        model = identify_arx(early, delay, sample_period, (order, order), iterations)
+        errors = []
+        for (u, y), cut in zip(signals, cuts, strict=True):
+            late = (y - model.simulate(u))[cut:]
+            errors.append(late - late.mean())
+        table.append(OrderError(order, model.one_step_error, float(np.std(np.concatenate(errors)))))
+    return tuple(table)
+
+
+def choose_order(table: Sequence[OrderError], slack: float = 0.01) -> int:
+    """Smallest order whose free-run error is within `slack` of the best."""
+    best = min(row.free_run_error for row in table)
+    return next(row.order for row in table if row.free_run_error <= best * (1.0 + slack))

@@ -1,0 +1,84 @@
+"""The delay is exact from the step, whatever the noise, and the answer says when it cannot be known."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from piezo_hysteresis.errors import IdentificationError
+from piezo_hysteresis.identification import protocol
+from piezo_hysteresis.identification.delay import identify_delay
+from piezo_hysteresis.identification.edges import find_edges
+from piezo_hysteresis.record import Record
+
+from .published_plant import SAMPLE_PERIOD, STROKE, displacement
+
+STEP = next(p.voltage for p in protocol.paper() if p.name == "step")
+CLEAN = displacement(STEP)
+
+
+def step_record(noise, seed=0, every=1):
+    random = np.random.default_rng(seed)
+    y = CLEAN + noise * STROKE * random.standard_normal(CLEAN.size)
+    return Record(STEP[::every], 1e-6 * y[::every], SAMPLE_PERIOD * every, "step")
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.0005, 0.01])
+def test_three_samples_at_every_noise(noise):
+    for seed in range(20):
+        delay = identify_delay([step_record(noise, seed)])
+        assert delay.samples == 3
+        assert delay.time == pytest.approx(60e-6)
+        assert delay.is_resolved
+
+
+def test_sample_times_agree_on_60_microseconds():
+    delay = identify_delay([step_record(0.0005)])
+    assert [round(o.sample_period / SAMPLE_PERIOD) for o in delay.onsets] == [1, 2, 3, 5]
+    assert all(o.earliest < 60e-6 <= o.latest + 1e-12 for o in delay.onsets)
+    assert not delay.notices
+
+
+def test_records_taken_at_other_periods_are_compared():
+    delay = identify_delay([step_record(0.0005), step_record(0.0005, 1, every=3)], factors=())
+    assert [o.samples for o in delay.onsets] == [3, 1]
+
+
+def test_the_deviation_of_the_averaged_response_is_that_of_the_noise():
+    errors = []
+    exact = identify_delay([step_record(0.0)]).response.mean
+    for seed in range(10):
+        response = identify_delay([step_record(0.005, seed)], factors=()).response
+        errors.append((response.mean[:40] - exact[:40]) / response.deviation[:40])
+    assert np.std(errors) == pytest.approx(1.0, abs=0.15)
+
+
+def test_slow_data_give_a_bound_and_say_so():
+    voltage = np.repeat([0.0, 5.0, 0.0, 5.0], 60)
+    pole = np.exp(-5e-3 / 13e-3)
+    y = lfilter([0.0, 1.0 - pole], [1.0, -pole], voltage)
+    random = np.random.default_rng(0)
+    delay = identify_delay([Record(voltage, 1e-6 * (y + 1e-3 * random.standard_normal(y.size)), 5e-3, "step")])
+    assert delay.samples == 1
+    assert not delay.is_resolved
+    assert any(n.kind == "delay_unresolved" for n in delay.notices)
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        Record(np.zeros(1000), np.zeros(1000), 1e-3),
+        Record(np.sin(np.arange(1000.0)), np.zeros(1000), 1e-3),
+        Record(STEP, np.random.default_rng(0).standard_normal(STEP.size), SAMPLE_PERIOD),
+    ],
+)
+def test_without_a_visible_step_the_error_says_what_is_missing(record):
+    with pytest.raises(IdentificationError, match=r"step"):
+        identify_delay([record])
+
+
+def test_edges_are_found_with_their_heights():
+    voltage = np.concatenate(
+        [np.zeros(50), np.full(40, 2.0), np.linspace(2.0, 1.0, 200), np.full(60, 1.0), np.zeros(30)]
+    )
+    edges = find_edges(voltage, 8, 4)
+    assert [(e.start, e.height) for e in edges] == [(50, 2.0), (350, -1.0)]
