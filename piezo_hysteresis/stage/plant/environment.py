@@ -1,0 +1,90 @@
+"""What acts on the stage from outside: temperature, mains, and the motion of the other axis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel import kernel
+from .quantity import Group, quantity
+
+Samples = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Environment(Group):
+    """Hidden effects that depend on absolute time, all off by default.
+
+    The temperature rises by T − T0 = `temperature_rise` (1 − exp(−t/`temperature_time`)) from the start of the stage. The other axis
+    moves by q(t) = `other_amplitude` [0.7 sin(2π f t + a) + 0.3 sin(2π √7 f t + b)].
+    """
+
+    temperature: float = quantity(293.15, "K", 0.0, 1000.0, "temperature at the start")
+    temperature_rise: float = quantity(1.0, "K", -100.0, 100.0, "final rise of temperature")
+    temperature_time: float = quantity(600.0, "s", 0.1, 1e6, "time constant of the rise")
+    thermometer: int = quantity(0, "1", 0, 1, "1 where the temperature is acquired")
+    thermal_expansion: float = quantity(0.0, "m/K", -1e-3, 1e-3, "hidden effect: thermal drift of the displacement")
+    gain_per_kelvin: float = quantity(0.0, "1/K", -0.1, 0.1, "hidden effect: gain drift")
+    hum: float = quantity(0.0, "m", 0.0, 1.0, "hidden effect: amplitude of mains hum")
+    hum_frequency: float = quantity(50.0, "Hz", 0.1, 1e4, "frequency of the mains")
+    hum_harmonics: tuple[float, ...] = quantity((0.0, 0.3), "1", 0.0, 10.0, "2nd, 3rd, … harmonic over the first")
+    coupling: float = quantity(0.0, "1", -1.0, 1.0, "hidden effect: part of the other axis' motion that is seen")
+    other_amplitude: float = quantity(0.0, "m", 0.0, 1.0, "motion of the other axis; 0 where there is none")
+    other_frequency: float = quantity(3.0, "Hz", 1e-3, 1e4, "its frequency")
+
+
+class Surroundings:
+    """The environment in motion from absolute time `time` [s]; `phases` holds random phases in turns."""
+
+    def __init__(self, environment: Environment, sample_period: float, time: float, phases: Samples) -> None:
+        e = environment
+        turn = 2 * math.pi
+        lines = [1.0, *e.hum_harmonics] if e.hum else []
+        self._hum = np.array([[e.hum * a, turn * e.hum_frequency * (k + 1)] for k, a in enumerate(lines)]).reshape(-1, 2)
+        self._hum_phase = turn * np.resize(phases[2:], len(lines))
+        f = turn * e.other_frequency
+        self._other = e.other_amplitude * np.array([[0.7, 0.0], [0.3, 0.0]]) + np.array([[0, f], [0, math.sqrt(7) * f]])
+        self._other_phase = turn * phases[:2]
+        self._moves = e.other_amplitude > 0
+        self._environment, self._period, self._start = e, sample_period, time
+        self._count = 0
+        self._warmth = np.array([-math.expm1(-time / e.temperature_time)])
+
+    @property
+    def time(self) -> float:
+        """Absolute time of the next sample [s]."""
+        return self._start + self._count * self._period
+
+    def run(self, size: int) -> tuple[Samples, Samples | None, Samples]:
+        """Rise of temperature [K], motion of the other axis [m] and hum [m] at the next `size` samples."""
+        warmth, hum, other = np.empty(size), np.zeros(size), np.zeros(size)
+        share = -math.expm1(-self._period / self._environment.temperature_time)
+        _warm(self._warmth, share, warmth)
+        if self._hum.size:
+            _lines(self._hum, self._hum_phase, self._start, self._period, self._count, hum)
+        if self._moves:
+            _lines(self._other, self._other_phase, self._start, self._period, self._count, other)
+        self._count += size
+        return warmth * self._environment.temperature_rise, other if self._moves else None, hum
+
+
+@kernel
+def _warm(state, share, out):  # type: ignore[no-untyped-def]
+    warmth = state[0]
+    for i in range(out.size):
+        out[i] = warmth
+        warmth += share * (1.0 - warmth)
+    state[0] = warmth
+
+
+@kernel
+def _lines(lines, phase, start, period, count, out):  # type: ignore[no-untyped-def]
+    for i in range(out.size):
+        t = start + (count + i) * period
+        total = 0.0
+        for k in range(phase.size):
+            total += lines[k, 0] * math.sin(lines[k, 1] * t + phase[k])
+        out[i] = total

@@ -1,0 +1,145 @@
+"""`PlantParameters`: everything that defines a simulated stage, from and to a mapping."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from ...errors import ParameterError
+from ...parameter import Parameter, Value
+from .creep import Creep
+from .electronics import Electronics
+from .environment import Environment
+from .hysteresis import Hysteresis
+from .quantity import Group
+from .sensor import Sensor
+from .structure import Structure
+
+_GROUPS: dict[str, type[Group]] = {
+    "electronics": Electronics,
+    "hysteresis": Hysteresis,
+    "creep": Creep,
+    "structure": Structure,
+    "sensor": Sensor,
+    "environment": Environment,
+}
+
+
+@dataclass(frozen=True)
+class PlantParameters:
+    """The simulated stage, part by part in the order of the chain; SI units; every hidden effect off by default.
+
+    Parameters
+    ----------
+    electronics, hysteresis, creep, structure, sensor, environment : Group
+        The parts.
+    sub_step : float
+        Longest internal step of the simulation [s].
+
+    Raises
+    ------
+    ParameterError
+        If the full stroke does not fit the sensor, or drive limits do not fit converter and amplifier.
+
+    Examples
+    --------
+    >>> PlantParameters().with_values({"creep.gamma": 0.015}).creep.gamma
+    0.015
+    """
+
+    electronics: Electronics = field(default_factory=Electronics)
+    hysteresis: Hysteresis = field(default_factory=Hysteresis)
+    creep: Creep = field(default_factory=Creep)
+    structure: Structure = field(default_factory=Structure)
+    sensor: Sensor = field(default_factory=Sensor)
+    environment: Environment = field(default_factory=Environment)
+    sub_step: float = 5e-6
+
+    def __post_init__(self) -> None:
+        e, gain = self.electronics, self.electronics.amplifier_gain
+        low, high = max(-e.dac_range, e.amplifier_min / gain), min(e.dac_range, e.amplifier_max / gain)
+        if not low <= e.voltage_min < e.voltage_max <= high:
+            raise ParameterError(
+                f"electronics: got voltage_min {e.voltage_min:g} V and voltage_max {e.voltage_max:g} V, expected them "
+                f"ordered and within {low:g} to {high:g} V, which converter and amplifier can give"
+            )
+        reach = max(abs(self.stroke(0.0, e.voltage_min)), abs(self.stroke(0.0, e.voltage_max)))
+        if reach > self.sensor.range:
+            raise ParameterError(
+                f"sensor.range: got ±{self.sensor.range:g} m for a stage that reaches {reach:g} m, expected at least that; "
+                "enlarge sensor.range or reduce structure.displacement_scale"
+            )
+
+    def stroke(self, start: float, stop: float) -> float:
+        """Displacement when the settled stage goes slowly from drive `start` to `stop` [V], without creep [m]."""
+        return self.structure.gain * self.hysteresis.rise(start, stop)
+
+    @property
+    def full_stroke(self) -> float:
+        """Displacement from the lowest to the highest drive [m]; noise and nonlinearities are relative to it."""
+        return abs(self.stroke(self.electronics.voltage_min, self.electronics.voltage_max))
+
+    @classmethod
+    def table(cls) -> tuple[Parameter, ...]:
+        """Every quantity with its default, named ``part.quantity``, for ROS descriptors and documentation."""
+        rows = (replace(row, name=f"{part}.{row.name}") for part, group in _GROUPS.items() for row in group.table())
+        return tuple(rows)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> PlantParameters:
+        """Defaults changed by a mapping, nested or with dotted keys, as a YAML file gives it.
+
+        ``hysteresis.operator`` may be ``bouc_wen`` (default) or ``prandtl_ishlinskii``; other values of the part are
+        then changes to that operator's own defaults.
+
+        Raises
+        ------
+        ParameterError
+            On an unknown name or a value that is not acceptable.
+        """
+        flat = _flatten(mapping)
+        operator = flat.pop("hysteresis.operator", "bouc_wen")
+        if operator not in ("bouc_wen", "prandtl_ishlinskii"):
+            raise ParameterError(f"hysteresis.operator: got {operator!r}, expected bouc_wen or prandtl_ishlinskii")
+        sub_step = float(flat.pop("sub_step", cls.sub_step))
+        if not 1e-8 <= sub_step <= 1e-3:
+            raise ParameterError(f"sub_step: got {sub_step:g} s, expected 1e-08 to 0.001 s")
+        hysteresis = Hysteresis() if operator == "bouc_wen" else Hysteresis.prandtl_ishlinskii()
+        return cls(hysteresis=hysteresis, sub_step=sub_step).with_values(flat)
+
+    def with_values(self, values: Mapping[str, Any]) -> PlantParameters:
+        """The same stage with some quantities changed, named ``part.quantity``.
+
+        Raises
+        ------
+        ParameterError
+            On an unknown name or a value that is not acceptable.
+        """
+        changes: dict[str, dict[str, Any]] = {}
+        for name, value in _flatten(values).items():
+            part, _, quantity = name.partition(".")
+            known = {row.name for row in _GROUPS[part].table()} if part in _GROUPS else set()
+            if quantity not in known:
+                expected = f"one of {', '.join(sorted(known))}" if known else f"a part of {', '.join(_GROUPS)}"
+                raise ParameterError(f"{name}: unknown quantity of the simulated stage, expected {expected}")
+            changes.setdefault(part, {})[quantity] = value
+        return replace(self, **{part: replace(getattr(self, part), **new) for part, new in changes.items()})
+
+    def to_mapping(self) -> dict[str, Value]:
+        """Every quantity by its dotted name; `from_mapping` gives back an equal stage."""
+        values: dict[str, Value] = {"sub_step": self.sub_step}
+        for part, group in _GROUPS.items():
+            for row in group.table():
+                values[f"{part}.{row.name}"] = getattr(getattr(self, part), row.name)
+        return values
+
+
+def _flatten(mapping: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in mapping.items():
+        if isinstance(value, Mapping):
+            flat.update(_flatten(value, f"{prefix}{key}."))
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat

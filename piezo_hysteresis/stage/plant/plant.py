@@ -1,0 +1,129 @@
+"""`Plant`: the simulated stage in motion, from drive voltage to what the sensor reads."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .clock import Clock
+from .creep import Bank
+from .electronics import Amplifier
+from .environment import Surroundings
+from .hysteresis import Operator
+from .parameters import PlantParameters
+from .sensor import Noise
+from .structure import Mechanics
+
+Samples = NDArray[np.float64]
+
+_CHUNK = 4096
+
+
+class Reading(NamedTuple):
+    """What one run of the plant gives, one value per sample."""
+
+    voltage: Samples
+    displacement: Samples
+    other_displacement: Samples | None
+    temperature: Samples | None
+
+
+class Plant:
+    """A simulated stage: parameters, and the physical state it is in.
+
+    The chain is converter with hold → dead time → amplifier → backlash → hysteresis → creep → modes, softening → other
+    axis → sensor → drift, hum, noise → converter. Every part is advanced by its exact solution over sub-steps
+    of at most `PlantParameters.sub_step`, so results do not depend on how the drive is cut into blocks, bit for bit.
+
+    Parameters
+    ----------
+    parameters : PlantParameters
+    sample_period : float
+        Time between samples [s].
+    seed : int
+        Fixes noise and the random phases of hum and of the other axis.
+    voltage : float
+        Drive at which the stage has settled [V].
+    """
+
+    def __init__(self, parameters: PlantParameters, sample_period: float, seed: int = 0, voltage: float = 0.0) -> None:
+        self.parameters = parameters
+        self._noise_seed, phases = np.random.SeedSequence(seed).spawn(2)
+        self._phases = np.random.default_rng(phases).random(16)
+        self._full = parameters.full_stroke
+        self._time = 0.0
+        self.configure(sample_period, voltage)
+
+    @property
+    def time(self) -> float:
+        """Time since the plant was made [s]."""
+        return self._surroundings.time
+
+    @property
+    def voltage(self) -> float:
+        """Drive in force [V]."""
+        return self._voltage
+
+    def configure(self, sample_period: float, voltage: float) -> None:
+        """Sample at another period [s] from now on; the stage settles at `voltage` [V], its time goes on."""
+        p = self.parameters
+        time = self._surroundings.time if hasattr(self, "_surroundings") else 0.0
+        self._surroundings = Surroundings(p.environment, sample_period, time, self._phases)
+        noise, other = self._noise_seed.spawn(2)
+        self._noise = Noise(p.sensor, self._full, sample_period, noise)
+        self._other_noise = Noise(p.sensor, self._full, sample_period, other)
+        delay = p.electronics.delay + p.electronics.extra_delay
+        self._clock = Clock.cut(sample_period, delay, p.sub_step)
+        self.settle(voltage)
+
+    def settle(self, voltage: float) -> None:
+        """Bring the stage to rest at `voltage` [V]: hysteresis and creep relaxed, nothing moving; no time passes."""
+        p, clock = self.parameters, self._clock
+        self._voltage = float(p.electronics.convert(np.array([voltage]))[0])
+        self._amplifier = Amplifier(p.electronics, clock, self._voltage)
+        self._operator = Operator(p.hysteresis, clock, self._amplifier.settled())
+        self._bank = Bank(p.creep, clock, self._operator.rest)
+        self._mechanics = Mechanics(
+            p.structure, p.sensor.time_constants, self._amplifier.time_constant, clock,
+            self._full / p.structure.gain, self._bank.rest,
+        )  # fmt: skip
+
+    def run(self, voltage: Samples) -> Reading:
+        """Apply a block of drive voltages.
+
+        Parameters
+        ----------
+        voltage : (n,) ndarray
+            Drive asked for [V], contiguous; limits are the business of the stage.
+
+        Returns
+        -------
+        Reading
+            Drive converted [V] and readings [m, K], shape (n,); reading i is taken when drive i is converted.
+        """
+        applied = self.parameters.electronics.convert(voltage)
+        blocks = [self._run(applied[i : i + _CHUNK]) for i in range(0, applied.size, _CHUNK)]
+        self._voltage = float(applied[-1])
+        displacement, other, temperature = zip(*blocks, strict=True)
+        return Reading(applied, np.concatenate(displacement), _joined(other), _joined(temperature))
+
+    def _run(self, applied: Samples) -> tuple[Samples, Samples | None, Samples | None]:
+        e, sensor = self.parameters.environment, self.parameters.sensor
+        w = self._bank.run(self._operator.run(self._amplifier.run(applied)))
+        x = self._mechanics.run(w)
+        rise, other, hum = self._surroundings.run(x.size)
+        if other is not None:
+            x += e.coupling * other
+        y = sensor.distort(x, self._full)
+        if e.gain_per_kelvin:
+            y = y * (1.0 + e.gain_per_kelvin * rise)
+        y = sensor.offset + y + e.thermal_expansion * rise + hum + self._noise.run(x.size)
+        if other is not None:
+            other = sensor.convert(other + self._other_noise.run(x.size))
+        return sensor.convert(y), other, e.temperature + rise if e.thermometer else None
+
+
+def _joined(blocks: tuple[Samples | None, ...]) -> Samples | None:
+    return None if blocks[0] is None else np.concatenate([b for b in blocks if b is not None])
