@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .effects import Effect, Place, Setting
-from .effects.block import Block, ChannelBlock, MemorylessBlock, State, SumBlock
+from .effects.block import Block, MemorylessBlock, State, SumBlock
+from .effects.channel_block import ChannelBlock
 from .errors import DivergenceError
 
 Array = NDArray[np.float64]

@@ -39,6 +39,8 @@ class Parameter:
         Typical size; conditions the identification and sets finite steps.
     per_record : bool
         True for a quantity that is free in every record (the phase of mains hum).
+    fixed : bool
+        True for a quantity that is chosen and never fitted (the time range of a creep bank); it has no sensitivity.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class Parameter:
     off: float | None = None
     scale: float = 1.0
     per_record: bool = False
+    fixed: bool = False
 
     def __post_init__(self) -> None:
         if not self.lower <= self.upper:

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from ..errors import ParameterError
 from ..kernel import kernel
 from ..parameter import Parameter
-from .block import Block, LinearBlock, State
+from .block import Block, State
 from .effect import Effect, Place, Setting
 from .lag import LagBlock
+from .linear_block import LinearBlock
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import ModelError, ParameterError
 from ..parameter import Parameter, Value
 from .block import Block
 
@@ -163,3 +163,12 @@ class Effect(ABC):
     def __repr__(self) -> str:
         inside = ", ".join(f"{n}={v!r}" for n, v in self._values.items())
         return f"{type(self).__name__}({inside})"
+
+
+class Term(Effect):
+    """An effect inside another one's recursion: the block of its `host` holds it."""
+
+    host: ClassVar[str]
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        raise ModelError(f"'{self.name}' has no block of its own: it acts inside '{self.host}', which takes it as a term")

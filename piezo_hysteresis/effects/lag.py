@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .block import Array, LinearBlock, State
+from .block import Array, State
+from .linear_block import LinearBlock
 
 
 class LagBlock(LinearBlock):

@@ -1,0 +1,46 @@
+"""`ChannelBlock`: functions of another measured channel."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+
+from .block import Array, Block, State
+
+
+class ChannelBlock(Block):
+    """y = x + f(c; θ) of another measured channel c, which the chain hands over as the state.
+
+    A record without the channel gets nothing added.
+    """
+
+    keeps_state = True
+    channel: str
+
+    @abstractmethod
+    def addition(self, c: Array) -> Array:
+        """f(c), shape (n,)."""
+
+    @abstractmethod
+    def by_parameter(self, c: Array) -> Array:
+        """∂f/∂θ, shape (p, n)."""
+
+    def static(self, x0: float) -> float:
+        return x0
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return 1.0, np.zeros(len(self.names))
+
+    def rest(self, x0: float, time: float) -> State:
+        return None
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return None
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        return (x if state is None else x + self.addition(state)), None
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        rows = np.zeros((len(self.names), x.size)) if state is None else self.by_parameter(state)
+        return self.run(x, state)[0], np.vstack((dx, rows)), None, None

@@ -1,0 +1,90 @@
+"""`LinearBlock`: linear dynamics around the rest point, alone or beside a direct path."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+
+from .block import Array, Block, State
+
+
+class LinearBlock(Block):
+    """Linear dynamics acting on the deviation from the rest point: y = K·x0 + filter(x − x0).
+
+    At rest the filter state is exactly zero, so a stage at rest stays there without rounding drift.
+    """
+
+    gain: float = 1.0
+
+    @abstractmethod
+    def zeros(self, rows: int) -> Array:
+        """Filter state of `rows` parallel signals at rest, shape (rows, s)."""
+
+    @abstractmethod
+    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
+        """Filter `rows` signals (rows, n) from state (rows, s); returns the outputs and a new state."""
+
+    @abstractmethod
+    def own_rest(self) -> State:
+        """Tangent state of the own parameters at rest."""
+
+    @abstractmethod
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
+        """∂ filter/∂θ, shape (p, n), for deviations x, outputs y (both (n,)), state z (s,) before the block."""
+
+    def gain_slopes(self) -> Array:
+        """∂K/∂θ, shape (p,)."""
+        return np.zeros(len(self.names))
+
+    def static(self, x0: float) -> float:
+        return self.gain * x0
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return self.gain, self.gain_slopes() * x0
+
+    def rest(self, x0: float, time: float) -> State:
+        return x0, self.zeros(1)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        x0, z = state
+        y, z = self.filter((x - x0)[None, :], z)
+        return self.gain * x0 + y[0], (x0, z)
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return np.array(dx0), self.zeros(len(dx0)), self.own_rest()
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        x0, z = state
+        dx0, dz, own = tangent
+        deviation = x - x0
+        y, z_next = self.filter(deviation[None, :], z)
+        mapped, dz = self.filter(dx - dx0[:, None], dz)
+        mapped += (self.gain * dx0)[:, None]
+        mine, own = self.by_parameter(deviation, y[0], z[0], own)
+        mine += (self.gain_slopes() * x0)[:, None]
+        return self.gain * x0 + y[0], np.vstack((mapped, mine)), (x0, z_next), (dx0, dz, own)
+
+
+class AddedBlock(LinearBlock):
+    """A direct path with linear dynamics beside it: y = x + K·x0 + filter(x − x0).
+
+    An addition of zero leaves every bit of x as it is, so that effects in this form are exactly absent when off.
+    """
+
+    gain = 0.0
+
+    def static(self, x0: float) -> float:
+        return x0 + self.gain * x0
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return 1.0 + self.gain, self.gain_slopes() * x0
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        added, state = super().run(x, state)
+        return x + added, state
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        added, rows, state, tangent = super().linearise(x, dx, state, tangent)
+        rows[: len(dx)] += dx
+        return x + added, rows, state, tangent

@@ -1,0 +1,52 @@
+"""`TimeBlock`: functions of absolute time."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+
+from .block import Array, Block, State
+
+
+class TimeBlock(Block):
+    """y = x + d(t; θ), or x·(…): functions of absolute time; state is (time of the record's start, samples since)."""
+
+    def __init__(self, sample_period: float) -> None:
+        self.sample_period = sample_period
+
+    @abstractmethod
+    def value(self, x: Array, t: Array) -> Array:
+        """y for inputs x and times t [s], both (n,)."""
+
+    def slope(self, x: Array, t: Array) -> Array:
+        """∂y/∂x, shape (n,)."""
+        return np.ones_like(x)
+
+    @abstractmethod
+    def by_parameter(self, x: Array, t: Array) -> Array:
+        """∂y/∂θ, shape (p, n)."""
+
+    def static(self, x0: float) -> float:
+        return x0
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return 1.0, np.zeros(len(self.names))
+
+    def rest(self, x0: float, time: float) -> State:
+        return time, 0
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return None
+
+    def _times(self, n: int, state: State) -> tuple[Array, State]:
+        start, count = state
+        return start + self.sample_period * (count + np.arange(n)), (start, count + n)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        t, state = self._times(x.size, state)
+        return self.value(x, t), state
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        t, state = self._times(x.size, state)
+        return self.value(x, t), np.vstack((self.slope(x, t) * dx, self.by_parameter(x, t))), state, None
