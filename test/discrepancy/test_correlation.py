@@ -1,0 +1,60 @@
+"""The residual tests fire when they should, at the rate they promise; one frequency decides nothing."""
+
+import numpy as np
+import pytest
+from scipy.signal import correlate as scipy_correlate
+from scipy.signal import lfilter
+
+from piezo_hysteresis.discrepancy.correlation import correlate
+from piezo_hysteresis.errors import RecordError
+
+RANDOM = np.random.default_rng(7)
+
+
+def test_equals_the_definition():
+    e, u = RANDOM.normal(size=300), RANDOM.normal(size=300)
+    found = correlate(e, u, 0.1, lags=20)
+    e, u = e - e.mean(), u - u.mean()
+    np.testing.assert_allclose(found.auto, scipy_correlate(e, e)[299:320] / (e @ e), atol=1e-12)
+    np.testing.assert_allclose(found.cross, scipy_correlate(e, u)[279:320] / np.sqrt((e @ e) * (u @ u)), atol=1e-12)
+    assert found.cross_lag[[0, -1]] == pytest.approx([-2.0, 2.0])
+
+
+def test_bounds_hold_for_coloured_noise_that_does_not_know_the_drive():
+    beyond = []
+    for _ in range(60):
+        e = lfilter([1.0], [1.0, -0.9], RANDOM.normal(size=4000))
+        u = lfilter([1.0], [1.0, -0.8], RANDOM.normal(size=4000))
+        found = correlate(e, u, 1.0)
+        beyond.append(np.mean(np.abs(found.cross) > found.cross_bound))
+    assert np.mean(beyond) < 0.03
+
+
+def test_white_noise_passes_and_coloured_noise_does_not():
+    white = RANDOM.normal(size=4000)
+    u = RANDOM.normal(size=4000)
+    assert correlate(white, u, 1.0).is_white
+    assert not correlate(lfilter([1.0], [1.0, -0.5], white), u, 1.0).is_white
+
+
+def test_a_missing_lag_of_the_drive_shows_at_that_lag():
+    u = RANDOM.normal(size=4000)
+    e = RANDOM.normal(size=4000) + np.roll(u, 7) * 0.5
+    found = correlate(e, u, 1e-3)
+    assert found.cross_lag[np.argmax(np.abs(found.cross))] == pytest.approx(7e-3)
+    assert abs(found.cross).max() > 5 * found.cross_bound
+
+
+def test_one_frequency_decides_nothing():
+    t = np.arange(4000) / 4000
+    found = correlate(np.cos(2 * np.pi * 10 * t), np.sin(2 * np.pi * 10 * t), 1 / 4000)
+    assert found.cross_bound > 1.0
+    assert found.is_independent
+
+
+@pytest.mark.parametrize(
+    ("e", "u"), [(np.ones(50), np.arange(50.0)), (np.arange(50.0), np.ones(50)), (np.arange(9.0),) * 2]
+)
+def test_constant_or_short_signals_are_refused(e, u):
+    with pytest.raises(RecordError, match="correlation"):
+        correlate(e, u, 1.0)
