@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from piezo_hysteresis.model import Model
 from piezo_hysteresis.effects import Arx, PublishedBoucWen
+from piezo_hysteresis.model import Model
 
 SAMPLE_PERIOD = 2e-5
 """Sample time of the control board [s]."""

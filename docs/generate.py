@@ -1,0 +1,125 @@
+"""`make docs`: write what the docs take from the code, so that it is written down once.
+
+The catalogue as a whole; tables between ``<!-- generated: name -->`` and ``<!-- end -->`` in the other pages; the
+pictures. ``--check`` writes nothing and fails if a page differs from the code.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
+from piezo_hysteresis.parameter import Parameter
+
+DOCS = Path(__file__).parent
+PICTURES = DOCS / "pictures.py"
+MARKED = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def table(head: str, rows: Iterable[Iterable[str]]) -> str:
+    """A Markdown table; `head` is its first line without the outer bars."""
+    columns = head.split("|")
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "".join(f"| {' | '.join(cell.strip().replace('|', '&#124;') for cell in line)} |\n" for line in lines)
+
+
+def number(value: float) -> str:
+    """Short, with a typographic minus."""
+    return f"{value:g}".replace("-", "−")
+
+
+def default(row: Parameter) -> str:
+    """Default value of a parameter; arrays in brackets."""
+    return f"[{', '.join(map(number, row.value))}]" if isinstance(row.value, tuple) else number(row.value)
+
+
+def parameters() -> str:
+    """Symbols of all effects, in chain order."""
+    return table(
+        "effect | symbol | in code | unit | meaning",
+        ((f"`{e.name}`", p.symbol, f"`{p.name}`", p.unit, p.meaning) for e in CHAIN for p in e.parameters),
+    )
+
+
+def section(effect: type[Effect]) -> str:
+    """One effect: what it is, its equation, how its absence shows, its parameters."""
+    summary = (effect.__doc__ or "").strip().splitlines()[0]
+    facts = [f"*Family* `{effect.family}`, *place* {effect.place.name.lower()}"]
+    if effect.host:
+        facts.append(f"a term of `{effect.host}`")
+    if effect.channel:
+        facts.append(f"needs the channel `{effect.channel}`")
+    rows = (
+        (
+            p.symbol,
+            f"`{p.name}`",
+            p.unit,
+            default(p),
+            f"{number(p.lower)} … {number(p.upper)}",
+            "" if p.off is None else number(p.off),
+            p.meaning,
+        )
+        for p in effect.parameters
+    )
+    return (
+        f"## `{effect.name}`\n\n{summary}\n\n{', '.join(facts)}.\n\n    {effect.equation}\n\n"
+        f"*Shows as:* {effect.signature}.\n*Source:* {effect.source}.\n\n"
+        + table("symbol | in code | unit | default | bounds | off at | meaning", rows)
+    )
+
+
+def catalogue() -> str:
+    """The whole page docs/catalogue.md."""
+    listed = table(
+        "effect | family | place | in the published model",
+        (
+            (f"[`{e.name}`](#{e.name})", f"`{e.family}`", e.place.name.lower(), "yes" if e in BASELINE else "")
+            for e in CHAIN
+        ),
+    )
+    return (
+        "# Catalogue of effects\n\nGenerated from `piezo_hysteresis/effects` by `make docs`; `piezo effects` prints it too. "
+        "In the order in which the effects act.\nEvery effect has a value that switches it off exactly.\n\n"
+        + listed
+        + "\n"
+        + "\n".join(section(e) for e in CHAIN)
+    )
+
+
+TABLES: dict[str, Callable[[], str]] = {"parameters": parameters}
+
+
+def filled(text: str) -> str:
+    """A page with the tables between its marks made anew."""
+    return MARKED.sub(lambda mark: mark[1] + TABLES[mark[2]]() + mark[3], text)
+
+
+def pages() -> dict[Path, str]:
+    """Every page that holds something generated, with the text it should have."""
+    marked = [p for p in (DOCS.parent / "README.md", *sorted(DOCS.glob("*.md"))) if p.exists()]
+    made = {p: filled(p.read_text()) for p in marked if MARKED.search(p.read_text())}
+    return {DOCS / "catalogue.md": catalogue(), **made}
+
+
+def main() -> int:
+    """Write the pages, or check them; 1 where a page was out of date under ``--check``."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true", help="write nothing; fail where a page differs from the code")
+    check = parser.parse_args().check
+    stale = [p for p, text in pages().items() if not p.exists() or p.read_text() != text]
+    for page in stale:
+        print(f"{'out of date, run make docs' if check else 'written'}: {page.relative_to(DOCS.parent)}")
+        if not check:
+            page.write_text(pages()[page])
+    if not check and PICTURES.exists():
+        return subprocess.run([sys.executable, PICTURES], check=False).returncode
+    return int(check and bool(stale))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
