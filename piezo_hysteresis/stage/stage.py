@@ -1,9 +1,9 @@
 """The stage protocol: what every back end, simulated or real, offers to the driver.
 
-Two kinds of device exist. A *streaming* device takes a block of drive voltages and returns what it applied and measured,
-block after block without a gap. A device with *on-board memory* is given a whole waveform, armed, started, waited for and
-read out. Both have a slow path, one voltage and one displacement at a time. All voltages are drive voltages before the
-amplifier; a back end that measures behind it divides by `Description.amplifier_gain`.
+Two kinds of device exist. A *streaming* device takes a block of drive voltages and returns what it applied and
+measured, block after block without a gap. A device with *on-board memory* is given a whole waveform, armed, started,
+waited for and read out. Both have a slow path, one voltage and one displacement at a time. All voltages are drive
+voltages before the amplifier; a back end that measures behind it divides by `Description.amplifier_gain`.
 """
 
 from __future__ import annotations
@@ -102,7 +102,8 @@ class Description:
         inside = low * (1 - _PERIOD_TOLERANCE) <= sample_period <= high * (1 + _PERIOD_TOLERANCE)
         if not inside:
             raise StageError(f"{self.name}: got sample period {sample_period:g} s, expected {low:g} to {high:g} s")
-        if step > 0 and abs(sample_period / step - round(sample_period / step)) > _PERIOD_TOLERANCE * sample_period / step:
+        multiple = sample_period / step if step > 0 else 0.0
+        if abs(multiple - round(multiple)) > _PERIOD_TOLERANCE * multiple:
             raise StageError(
                 f"{self.name}: got sample period {sample_period:g} s, expected a whole multiple of {step:g} s"
             )
@@ -132,12 +133,14 @@ class Description:
         try:
             block = np.ascontiguousarray(voltage, dtype=np.float64)
         except (TypeError, ValueError):
-            raise StageError(f"{self.name}: got {type(voltage).__name__} as drive, expected an array of volts") from None
+            kind = type(voltage).__name__
+            raise StageError(f"{self.name}: got {kind} as drive, expected an array of volts") from None
         if block.ndim != 1 or block.size == 0:
             raise StageError(f"{self.name}: got drive of shape {block.shape}, expected one dimension, not empty")
         if self.longest_block is not None and block.size > self.longest_block:
             raise StageError(
-                f"{self.name}: got {block.size} samples, expected at most {self.longest_block} per block; cut the waveform"
+                f"{self.name}: got {block.size} samples, expected at most {self.longest_block} per block; "
+                "cut the waveform"
             )
         inside = (block >= self.voltage_min) & (block <= self.voltage_max)
         if not inside.all():
@@ -152,8 +155,8 @@ class Description:
             if step.max() > steepest * (1 + 1e-9) + 1e-12:
                 first = int(np.argmax(step > steepest))
                 raise StageError(
-                    f"{self.name}: drive sample {first} steps by {step[first]:g} V, expected at most {steepest:g} V per "
-                    f"sample ({self.max_slew_rate:g} V/s); nothing was played"
+                    f"{self.name}: drive sample {first} steps by {step[first]:g} V, expected at most {steepest:g} V "
+                    f"per sample ({self.max_slew_rate:g} V/s); nothing was played"
                 )
         return block
 
@@ -211,7 +214,7 @@ class Stage(Protocol):
         ...
 
     def safe(self) -> None:
-        """Stop what plays and go to `Description.safe_voltage`, no steeper than `max_slew_rate`; harmless when repeated."""
+        """Stop what plays and go to the safe voltage, no steeper than `max_slew_rate`; harmless when repeated."""
         ...
 
     def close(self) -> None:
@@ -255,5 +258,5 @@ class MemoryStage(Stage, Protocol):
         ...
 
     def read(self) -> Acquired:
-        """The record of the last waveform, of its length; StageError before it is complete. The last voltage is held."""
+        """The record of the last waveform; StageError before it is complete. The last voltage is held."""
         ...

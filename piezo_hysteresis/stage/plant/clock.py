@@ -1,8 +1,8 @@
 """`Clock`: how one hold interval of the converter is cut into the sub-steps of the plant.
 
-The plant is time-invariant from converter to displacement, so its dead time may stand at the very front: the plant lives on a time
-axis shifted by the dead time, where the hold begins at a sub-step and the reading falls on another one. A dead time of any
-length is then exact, without interpolation.
+The plant is time-invariant from converter to displacement, so its dead time may stand at the very front: the plant
+lives on a time axis shifted by the dead time, where the hold begins at a sub-step and the reading falls on another one.
+A dead time of any length is then exact, without interpolation.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Clock:
         Whole sample periods that pass before a new voltage begins to act.
     before, after : int
         Number of sub-steps of the hold interval before and after the reading.
-    short, long : float
+    step_before, step_after : float
         Duration of one sub-step before and after the reading [s].
     """
 

@@ -1,8 +1,8 @@
 """Creep: a fine bank of Kelvin-Voigt elements in series with the piezo.
 
 Each element relaxes towards w with its own time; together they make the step response logarithmic,
-L(t) = L(0.1 s) [1 + γ log10(t / 0.1 s)], fractional (weights ∝ τ^λ), or any given sum of exponentials (Croft, Shed, Devasia 2001).
-Four elements per decade leave a ripple far below a nanometre. Inputs are taken as linear over a sub-step.
+L(t) = L(0.1 s) [1 + γ log10(t / 0.1 s)], fractional (weights ∝ τ^λ), or any given sum of exponentials
+(Croft, Shed, Devasia 2001). Inputs are taken as linear over a sub-step.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ class Creep(Group):
         start = 1.0 - self.gamma * grown
         if start <= 0.0:
             raise ParameterError(
-                f"creep: got gamma {self.gamma:g} with slope {self.slope:g}, expected a response that starts above zero; "
-                "take a smaller gamma"
+                f"creep: got gamma {self.gamma:g} with slope {self.slope:g}, expected a response that starts above "
+                "zero; take a smaller gamma"
             )
         return np.r_[tau, self.times], np.r_[self.gamma * shape / start, self.weights], start
 
@@ -91,7 +91,7 @@ class Bank:
 
 
 @kernel
-def _relax(w, kind, decay, early, late, start, state, last, out):  # type: ignore[no-untyped-def]
+def _relax(w, kind, decay, early, late, start, state, last, out):
     w0 = last[0]
     size = state.size
     k = 0

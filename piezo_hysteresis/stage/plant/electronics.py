@@ -86,7 +86,7 @@ def _saturate(v: float, low: float, high: float, corner: float) -> float:
 
 
 @kernel
-def _amplify(u, held, oldest, holds, state, step, limits, out):  # type: ignore[no-untyped-def]
+def _amplify(u, held, oldest, holds, state, step, limits, out):
     tau, slew, low, high, corner = limits[0], limits[1], limits[2], limits[3], limits[4]
     count = step.size
     v, k = state[0], oldest[0]

@@ -18,8 +18,8 @@ Samples = NDArray[np.float64]
 class Environment(Group):
     """Hidden effects that depend on absolute time, all off by default.
 
-    The temperature rises by T − T0 = `temperature_rise` (1 − exp(−t/`temperature_time`)) from the start of the stage. The other axis
-    moves by q(t) = `other_amplitude` [0.7 sin(2π f t + a) + 0.3 sin(2π √7 f t + b)].
+    From the start of the stage its temperature rises by `temperature_rise` (1 − exp(−t/`temperature_time`)). The other
+    axis moves by q(t) = `other_amplitude` [0.7 sin(2π f t + a) + 0.3 sin(2π √7 f t + b)].
     """
 
     temperature: float = quantity(293.15, "K", 0.0, 1000.0, "temperature at the start")
@@ -42,12 +42,11 @@ class Surroundings:
     def __init__(self, environment: Environment, sample_period: float, time: float, phases: Samples) -> None:
         e = environment
         turn = 2 * math.pi
-        lines = [1.0, *e.hum_harmonics] if e.hum else []
-        self._hum = np.array([[e.hum * a, turn * e.hum_frequency * (k + 1)] for k, a in enumerate(lines)]).reshape(-1, 2)
-        self._hum_phase = turn * np.resize(phases[2:], len(lines))
-        f = turn * e.other_frequency
-        self._other = e.other_amplitude * np.array([[0.7, 0.0], [0.3, 0.0]]) + np.array([[0, f], [0, math.sqrt(7) * f]])
-        self._other_phase = turn * phases[:2]
+        relative = np.array([1.0, *e.hum_harmonics] if e.hum else [])
+        orders = 1.0 + np.arange(relative.size)
+        self._hum = e.hum * relative, turn * e.hum_frequency * orders, turn * np.resize(phases[2:], relative.size)
+        ratios, shares = np.array([1.0, math.sqrt(7)]), np.array([0.7, 0.3])
+        self._other = e.other_amplitude * shares, turn * e.other_frequency * ratios, turn * phases[:2]
         self._moves = e.other_amplitude > 0
         self._environment, self._period, self._start = e, sample_period, time
         self._count = 0
@@ -63,16 +62,16 @@ class Surroundings:
         warmth, hum, other = np.empty(size), np.zeros(size), np.zeros(size)
         share = -math.expm1(-self._period / self._environment.temperature_time)
         _warm(self._warmth, share, warmth)
-        if self._hum.size:
-            _lines(self._hum, self._hum_phase, self._start, self._period, self._count, hum)
+        if self._environment.hum:
+            _lines(*self._hum, self._start, self._period, self._count, hum)
         if self._moves:
-            _lines(self._other, self._other_phase, self._start, self._period, self._count, other)
+            _lines(*self._other, self._start, self._period, self._count, other)
         self._count += size
         return warmth * self._environment.temperature_rise, other if self._moves else None, hum
 
 
 @kernel
-def _warm(state, share, out):  # type: ignore[no-untyped-def]
+def _warm(state, share, out):
     warmth = state[0]
     for i in range(out.size):
         out[i] = warmth
@@ -81,10 +80,10 @@ def _warm(state, share, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _lines(lines, phase, start, period, count, out):  # type: ignore[no-untyped-def]
+def _lines(amplitude, frequency, phase, start, period, count, out):
     for i in range(out.size):
         t = start + (count + i) * period
         total = 0.0
         for k in range(phase.size):
-            total += lines[k, 0] * math.sin(lines[k, 1] * t + phase[k])
+            total += amplitude[k] * math.sin(frequency[k] * t + phase[k])
         out[i] = total

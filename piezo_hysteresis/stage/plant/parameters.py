@@ -67,8 +67,8 @@ class PlantParameters:
         reach = max(abs(self.stroke(0.0, e.voltage_min)), abs(self.stroke(0.0, e.voltage_max)))
         if reach > self.sensor.range:
             raise ParameterError(
-                f"sensor.range: got ±{self.sensor.range:g} m for a stage that reaches {reach:g} m, expected at least that; "
-                "enlarge sensor.range or reduce structure.displacement_scale"
+                f"sensor.range: got ±{self.sensor.range:g} m for a stage that reaches {reach:g} m, expected at least "
+                "that; enlarge sensor.range or reduce structure.displacement_scale"
             )
 
     def stroke(self, start: float, stop: float) -> float:

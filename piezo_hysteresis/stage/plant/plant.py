@@ -53,8 +53,7 @@ class Plant:
         self._noise_seed, phases = np.random.SeedSequence(seed).spawn(2)
         self._phases = np.random.default_rng(phases).random(16)
         self._full = parameters.full_stroke
-        self._time = 0.0
-        self.configure(sample_period, voltage)
+        self._open(sample_period, voltage, 0.0)
 
     @property
     def time(self) -> float:
@@ -68,8 +67,10 @@ class Plant:
 
     def configure(self, sample_period: float, voltage: float) -> None:
         """Sample at another period [s] from now on; the stage settles at `voltage` [V], its time goes on."""
+        self._open(sample_period, voltage, self.time)
+
+    def _open(self, sample_period: float, voltage: float, time: float) -> None:
         p = self.parameters
-        time = self._surroundings.time if hasattr(self, "_surroundings") else 0.0
         self._surroundings = Surroundings(p.environment, sample_period, time, self._phases)
         noise, other = self._noise_seed.spawn(2)
         self._noise = Noise(p.sensor, self._full, sample_period, noise)

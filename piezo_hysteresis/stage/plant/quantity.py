@@ -1,4 +1,4 @@
-"""`quantity`: a number of the plant with unit, bounds and meaning, as a dataclass field; `Group`: a part made of them."""
+"""`quantity`: a number of the plant with unit, bounds and meaning; `Group`: a part of the plant made of them."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ class Noise:
 
 
 @kernel
-def _cascade(x, pole, zero, state):  # type: ignore[no-untyped-def]
+def _cascade(x, pole, zero, state):
     for i in range(x.size):
         value = x[i]
         for k in range(pole.size):

@@ -1,8 +1,8 @@
-"""Mechanics and sensor electronics: two modes, an optional third, softening, and the poles of the sensor, in one state space.
+"""Mechanics: two modes, an optional third, softening, and the poles of the sensor, in one state space.
 
-Discretised exactly by matrix exponentials for the shape in which w really moves: between two converter steps the amplifier output,
-and with it w, approaches its end exponentially with the amplifier's time constant. Only the curvature of the hysteresis
-within one sub-step is neglected, second order in a step that is a fraction of a sample.
+Discretised exactly by matrix exponentials for the shape in which w really moves: between two converter steps the
+amplifier output, and with it w, approaches its end exponentially with the amplifier's time constant. Only the curvature
+of the hysteresis within one sub-step is neglected, second order in a step that is a fraction of a sample.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ Samples = NDArray[np.float64]
 class Structure(Group):
     """Mechanics: a parallel sum of modes, x = `dc_gain` · `displacement_scale` · Σ share_i M_i(s) w.
 
-    With the electronics and the sensor, the default frequencies and dampings were fitted to the frequency and step response
-    of the published ARX model (paper, Sec. 3.3): its dc gain, its 98.5 µs of lag near dc, its onset 60 µs after a step.
+    With the electronics and the sensor, the default frequencies and dampings were fitted to the frequency and step
+    response of the published ARX model (paper, Sec. 3.3): its dc gain, its 98.5 µs of lag near dc, its onset 60 µs
+    after a step.
     """
 
     dc_gain: float = quantity(0.24641, "1", 1e-6, 1e6, "normalised displacement over w of the settled stage")
@@ -50,7 +51,7 @@ class Structure(Group):
         return self.dc_gain * self.displacement_scale
 
     def spring(self, x: float, full: float) -> float:
-        """Relative change of stiffness of the first mode at modal displacement `x`, in units of w; `full` is the full stroke."""
+        """Relative change of stiffness of the first mode at displacement `x`; `full` stroke, both in units of w."""
         return self.softening_quadratic * abs(x / full) + self.softening_cubic * (x / full) ** 2
 
     def static_mode1(self, w: float, full: float) -> float:
@@ -103,10 +104,11 @@ class Mechanics:
         self._kind, self._before = clock.kind, clock.before
         self._output = output * structure.gain
         first = structure.static_mode1(w, full)
-        total = first + (1 - structure.share1) * w
-        self._state = np.zeros(load.size)
-        self._state[0], self._state[2], self._state[4::2] = first, (1 - structure.share1) * w, total
-        self._state[6:] = total
+        second = (1 - structure.share1) * w
+        self._state = np.full(load.size, first + second)
+        self._state[:4] = first, 0.0, second, 0.0
+        if structure.resonance_share:
+            self._state[5] = 0.0
         self._last = np.array([w])
 
     def run(self, w: Samples) -> Samples:
@@ -120,26 +122,26 @@ class Mechanics:
 
 
 def _state_space(s: Structure, poles: tuple[float, ...]) -> tuple[Samples, Samples, Samples]:
-    """Matrix, input column for w and output row; states are position and velocity/ω of three modes, then the sensor poles."""
-    n = 6 + len(poles)
-    a, load, output = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-    modes = ((s.frequency1, s.damping1), (s.frequency2, s.damping2), (s.resonance_frequency, s.resonance_damping))
+    """Matrix, input column, output row; the states are position and velocity/ω of each mode, then the sensor."""
+    modes = [(s.frequency1, s.damping1), (s.frequency2, s.damping2)]
+    if s.resonance_share:
+        modes.append((s.resonance_frequency, s.resonance_damping))
+    n = 2 * len(modes) + len(poles)
+    a, load, moved = np.zeros((n, n)), np.zeros(n), np.zeros(n)
     for k, (frequency, damping) in enumerate(modes):
         omega = 2 * math.pi * frequency
         a[2 * k, 2 * k + 1] = omega
         a[2 * k + 1, 2 * k : 2 * k + 2] = -omega, -2 * damping * omega
     load[1] = 2 * math.pi * s.frequency1 * s.share1
     load[3] = 2 * math.pi * s.frequency2 * (1 - s.share1)
-    a[5, [0, 2]] = 2 * math.pi * s.resonance_frequency
-    moved = np.zeros(n)
     moved[[0, 2]] = 1 - s.resonance_share
-    moved[4] = s.resonance_share
-    for k, tau in enumerate(poles):
-        row = 6 + k
-        a[row] = (moved if k == 0 else np.eye(n)[row - 1]) / tau
+    if s.resonance_share:
+        a[5, [0, 2]] = 2 * math.pi * s.resonance_frequency
+        moved[4] = s.resonance_share
+    for row, tau in enumerate(poles, 2 * len(modes)):
+        a[row] = (moved if row == 2 * len(modes) else np.eye(n)[row - 1]) / tau
         a[row, row] = -1 / tau
-    output = np.eye(n)[-1] if poles else moved
-    return a, load, output
+    return a, load, np.eye(n)[-1] if poles else moved
 
 
 def _discretise(a: Samples, column: Samples, dt: float, time_constant: float) -> tuple[Samples, Samples, Samples]:
@@ -166,7 +168,7 @@ def _discretise(a: Samples, column: Samples, dt: float, time_constant: float) ->
 
 
 @kernel
-def _vibrate(w, kind, before, transition, early, late, force0, force1, spring, output, state, last, x):  # type: ignore[no-untyped-def]
+def _vibrate(w, kind, before, transition, early, late, force0, force1, spring, output, state, last, x):
     n = state.size
     count = kind.size
     new = np.empty(n)
