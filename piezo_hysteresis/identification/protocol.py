@@ -164,7 +164,8 @@ class _Plan:
         self.add("conditioning", excitation.ramps(self.limits, corners, self.limits.ramp_rate), CORNERED)
 
     def step(self, edges: int, duration: float) -> None:
-        levels = tuple(0.8 if k % 2 else 0.2 for k in range(edges + 1))
+        """Edges of a fifth of the range up and down at several levels: high enough to average, low enough to be gentle."""
+        levels = tuple((0.2, 0.4, 0.6, 0.4)[k % 4] for k in range(edges + 1))
         self.add("step", excitation.steps(self.limits, levels, duration))
 
     def noise(self, rms: float, duration: float) -> None:
