@@ -98,10 +98,10 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
     both = irfft(spectrum_e * np.conj(spectrum_u), length) / np.sqrt(power_e * power_u)
     k = np.arange(-lags, lags + 1)
     return Correlation(
-        lag=sample_period * np.arange(lags + 1),
+        lag=np.asarray(sample_period * np.arange(lags + 1)),
         auto=auto_e[: lags + 1],
         auto_bound=CONFIDENCE / np.sqrt(n),
-        cross_lag=sample_period * k,
+        cross_lag=np.asarray(sample_period * k),
         cross=both[k],
         cross_bound=CONFIDENCE * float(np.sqrt(max(auto_e @ auto_u, 0.0) / n)),
     )

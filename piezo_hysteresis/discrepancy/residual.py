@@ -7,7 +7,6 @@ of the measured displacement over the whole experiment. The paper's Table 1 uses
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ from ..errors import RecordError
 from ..identification.normal_equations import Nuisance
 from ..model import Model
 from ..record import Experiment, Record
+from .noise_floor import stroke
 
 Array = NDArray[np.float64]
 
@@ -107,23 +107,6 @@ class Errors:
         return {n: float(np.sqrt(np.mean([r.percent**2 for r in self.rows if r.phase == n]))) for n in names}
 
 
-def stroke(records: Sequence[Record] | Experiment) -> float:
-    """Range of the experiment: peak-to-peak of the measured displacement over all records [m].
-
-    Raises
-    ------
-    RecordError
-        If the displacement never changes, so that no error can be given in per cent of it.
-    """
-    low = min(float(r.displacement.min()) for r in records)
-    high = max(float(r.displacement.max()) for r in records)
-    if high <= low:
-        raise RecordError(
-            f"displacement is {low:g} m in every sample, expected a stage that moves; check the sensor and its column"
-        )
-    return high - low
-
-
 def drive_frequency(record: Record) -> float | None:
     """Frequency of a phase named ``sine_<f>hz`` [Hz], None for every other phase.
 
@@ -161,7 +144,12 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
     DivergenceError
         If the simulation runs away.
     """
-    span = stroke(experiment)
+    span = stroke(experiment.records)
+    if not span > 0.0:
+        raise RecordError(
+            f"displacement is {experiment[0].displacement[0]:g} m in every sample, expected a stage that moves; "
+            "check the sensor and its column"
+        )
     free_run = model.simulate(experiment)
     if nuisance is None:
         zero = float(np.mean([np.mean(r.displacement - y) for r, y in zip(experiment, free_run, strict=True)]))
