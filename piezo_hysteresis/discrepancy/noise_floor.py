@@ -1,0 +1,96 @@
+"""The floor: below which residual no effect can be seen, for every record at its own sample period.
+
+Three parts: white noise from the top of the spectrum, where a stage no longer moves; the scatter between periods of a
+periodic record, which also holds jitter and 1/f noise; and an adequacy floor of 0.03 % of range, below which a model is
+as good as any lab needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import periodogram
+from scipy.signal.windows import hann
+
+from ..record import Record
+
+Array = NDArray[np.float64]
+
+ADEQUACY = 3e-4
+"""Share of the range of the experiment that counts as perfect."""
+MAINS = (50.0, 60.0)
+"""Mains frequencies [Hz]."""
+TOP_BAND = 0.7
+"""Share of the Nyquist frequency above which a record holds noise alone."""
+
+
+def stroke(records: Sequence[Record]) -> float:
+    """Range of displacement over all records [m]: the 100 % of every percentage."""
+    low = min(float(r.displacement.min()) for r in records)
+    return max(float(r.displacement.max()) for r in records) - low
+
+
+def white_noise(record: Record) -> float:
+    """RMS of the white noise of a record [m], from the median of its spectrum near the Nyquist frequency."""
+    if record.size < 32:
+        return float(np.std(np.diff(record.displacement)) / np.sqrt(2.0))
+    third = np.diff(record.displacement, 2)
+    _, density = periodogram(third, window=hann(third.size), detrend=False)
+    frequency = np.linspace(0.0, np.pi, density.size)
+    response = (2.0 * np.sin(frequency / 2.0)) ** 4
+    top = slice(int(TOP_BAND * density.size), -1)
+    # a periodogram is exponentially distributed: its median is ln 2 of its mean
+    return float(np.sqrt(np.median(density[top] / response[top]) / np.log(2.0) / 2.0))
+
+
+def period_scatter(record: Record) -> float | None:
+    """RMS of what does not repeat from one drive period to the next [m]; None for fewer than three periods.
+
+    The first period settles and is left out; mains hum, which is an effect and no floor, is taken out.
+    """
+    period = drive_period(record.voltage)
+    if period is None or record.size < 3 * period:
+        return None
+    y = record.displacement[period:]
+    steps = y[period:] - y[:-period]
+    t = record.sample_period * np.arange(steps.size)
+    lines = [f for base in MAINS for f in (base, 2 * base, 3 * base) if f * record.sample_period < 0.45]
+    basis = np.array([np.ones(t.size), *(w(2 * np.pi * f * t) for f in lines for w in (np.cos, np.sin))])
+    steps = steps - np.linalg.lstsq(basis.T, steps, rcond=1e-6)[0] @ basis
+    return float(np.sqrt(np.mean(steps**2) / 2.0))
+
+
+def drive_period(voltage: Array) -> int | None:
+    """Samples of the shortest exact period of a drive that holds at least two; None where it has none."""
+    moving = voltage - voltage.mean()
+    power = float(moving @ moving)
+    if power == 0.0:
+        return None
+    size = 1 << (2 * voltage.size - 1).bit_length()
+    spectrum = np.fft.rfft(moving, size)
+    product = np.fft.irfft(spectrum * spectrum.conj(), size)[: voltage.size // 2 + 1]
+    energy = np.concatenate(([0.0], np.cumsum(moving * moving)))
+    lags = np.arange(product.size)
+    overlap = energy[voltage.size - lags] + (energy[-1] - energy[lags])
+    mismatch = (overlap - 2.0 * product) / np.maximum(overlap, 1e-300)
+    (exact,) = np.nonzero(mismatch[2:] < 1e-6)
+    return int(exact[0]) + 2 if exact.size else None
+
+
+def noise_floors(records: Sequence[Record]) -> Array:
+    """Noise of every record at its own sample period [m], shape (r,), without the adequacy floor.
+
+    Records without periods take the excess of scatter over white noise that the periodic ones show.
+    """
+    white = np.array([white_noise(r) for r in records])
+    scatter = [period_scatter(r) for r in records]
+    excess = [s / w for s, w in zip(scatter, white, strict=True) if s is not None and w > 0]
+    typical = max(1.0, float(np.median(excess))) if excess else 1.0
+    return np.array([w * typical if s is None else max(s, w) for s, w in zip(scatter, white, strict=True)])
+
+
+def floors(records: Sequence[Record]) -> Array:
+    """Floor of every record [m], shape (r,): the larger of its noise and the adequacy floor."""
+    return np.maximum(noise_floors(records), ADEQUACY * stroke(records))
