@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import ModelError, ParameterError
 from ..parameter import Parameter, Value
 from .block import Block
+from .extent import Extent
 
 
 class Place(IntEnum):
@@ -142,6 +143,20 @@ class Effect(ABC):
             else:
                 yield row.name
 
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Values at which a search for the effect begins.
+
+        Switched off where the sensitivity at the off value shows the way; at a finite size where it vanishes there
+        (a limit that is not reached), and at several where the search has more than one valley.
+
+        Parameters
+        ----------
+        extent : Extent
+            What the experiment spans.
+        """
+        return (cls(),)
+
     @abstractmethod
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         """Coefficients and kernels for one sample period.
@@ -171,4 +186,4 @@ class Term(Effect):
     host: ClassVar[str]
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
-        raise ModelError(f"'{self.name}' has no block of its own: it acts inside '{self.host}', which takes it as a term")
+        raise ModelError(f"'{self.name}' has no block of its own: it is a term of '{self.host}'; give it to that block")

@@ -1,0 +1,45 @@
+"""`Extent`: what an experiment spans; from it an effect proposes the values at which a search for it begins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """Ranges covered by the records of an experiment.
+
+    Parameters
+    ----------
+    voltage_min, voltage_max : float
+        Drive voltage [V].
+    max_slew : float
+        Steepest drive between two samples [V/s].
+    voltage_scale : float
+        v = u / voltage_scale [V].
+    displacement_scale : float
+        Displacement at normalised output 1 [m].
+    fastest_period : float
+        Smallest sample period [s].
+    duration : float
+        From the first to the last sample [s].
+    longest_record : float
+        Duration of the longest record [s].
+    peaks : tuple of float
+        Frequencies at which the residual stands out of the displacement [Hz], highest first.
+    """
+
+    voltage_min: float
+    voltage_max: float
+    max_slew: float
+    voltage_scale: float
+    displacement_scale: float
+    fastest_period: float
+    duration: float
+    longest_record: float
+    peaks: tuple[float, ...] = ()
+
+    @property
+    def span(self) -> float:
+        """Range of the drive voltage [V]."""
+        return self.voltage_max - self.voltage_min
