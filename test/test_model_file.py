@@ -1,0 +1,197 @@
+"""A model file carries a model bit for bit, and refuses everything that is not one in a single clear line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from piezo_hysteresis.effects import BY_NAME, CHAIN, Arx, BoucWen, Offset
+from piezo_hysteresis.errors import ModelError, ParameterError, PiezoError
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.model_file import dumps, load, loads, save
+from piezo_hysteresis.model_parameters import from_parameters, hash_number, model_hash, to_parameters
+from piezo_hysteresis.parameter import Parameter
+from piezo_hysteresis.parameter_file import parameters
+
+MODEL = Model((BoucWen(), Arx(a=[-0.5], b=[1e-05, 0.5]), Offset(y0=3e-9)), 2e-5, displacement_scale=1e-6)
+PUBLISHED = Path(__file__).parent.parent / "config" / "published_stage.yaml"
+
+
+def _values(row: Parameter) -> st.SearchStrategy:
+    low, high = max(row.lower, -row.scale), min(row.upper, row.scale)
+    number = st.floats(low, high, allow_subnormal=False) if low <= high else st.just(row.lower)
+    if not row.is_array:
+        return number | st.just(row.value)
+    # |a_i| < 1/4 keeps any four poles stable
+    return st.lists(number.map(lambda x: x / 4.1 if low <= x / 4.1 <= high else x), max_size=4)
+
+
+@st.composite
+def models(draw: st.DrawFn) -> Model:
+    kinds = draw(st.sets(st.sampled_from(CHAIN), min_size=1, max_size=6))
+    kinds |= {BY_NAME[kind.host] for kind in kinds if kind.host}
+    try:
+        effects = tuple(kind(**{row.name: draw(_values(row)) for row in kind.parameters}) for kind in kinds)
+    except ParameterError:
+        assume(False)
+    scales = st.floats(1e-9, 1e3)
+    words = st.text(st.characters(exclude_categories=["Cs"]))
+    return Model(
+        effects,
+        draw(scales),
+        draw(scales),
+        draw(scales),
+        draw(st.dictionaries(st.from_regex(r"[a-z][a-z0-9_]{0,8}", fullmatch=True), words, max_size=3)),
+    )
+
+
+def _same(one: Model, other: Model) -> None:
+    assert one.effects == other.effects
+    for name in ("sample_period", "voltage_scale", "displacement_scale"):
+        assert getattr(one, name) == getattr(other, name)
+    assert dict(one.provenance) == dict(other.provenance)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+@given(models())
+def test_text_and_parameters_carry_any_model_bit_for_bit(model: Model) -> None:
+    _same(loads(dumps(model)), model)
+    _same(from_parameters(to_parameters(model)), model)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+@given(models())
+def test_pyyaml_reads_the_same_numbers_as_rcl(model: Model) -> None:
+    """`ros2 param load` goes through PyYAML, `--params-file` through rcl."""
+
+    def flat(tree: dict, prefix: str = "") -> dict:
+        items: dict = {}
+        for key, value in tree.items():
+            items |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
+        return items
+
+    text = dumps(model)
+    assert flat(yaml.safe_load(text)["/**"]["ros__parameters"]) == parameters(text)["/**"]
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_every_number_survives(number: float) -> None:
+    text = dumps(MODEL.with_values({"bouc_wen.p2": 1.0})).replace("p2: 1.0", f"p2: {number!r}")
+    (read,) = {v for n, v in parameters(text)["/**"].items() if n == "model.bouc_wen.p2"}
+    assert read == number
+
+
+@pytest.mark.parametrize("key", ["/**", "/stage_x/identification_node", "identification_node"])
+def test_a_parameter_dump_is_a_model_file(key: str) -> None:
+    """As `ros2 param dump` writes it: keyed by the node, sorted, other parameters around, no decimal points."""
+    tree: dict = {"protocol": "short", "use_sim_time": False, "qos": {"depth": 3}, "model": {}}
+    for name, value in to_parameters(MODEL).items():
+        into = tree
+        *path, last = name.split(".")
+        for part in path:
+            into = into.setdefault(part, {})
+        into[last] = value
+    text = yaml.safe_dump({key: {"ros__parameters": tree}}).replace("1.0e-05", "1e-05")
+    _same(loads(text), MODEL)
+
+
+def test_numbers_in_the_provenance_stay_numbers() -> None:
+    model = Model(MODEL.effects, 2e-5, provenance={"free_run_error": "1e-08", "run": "1e-8", "data": "1234e567"})
+    assert to_parameters(model)["model.provenance.free_run_error"] == 1e-08
+    _same(loads(dumps(model)), model)
+
+
+def test_hash_tells_models_apart_and_ignores_their_provenance() -> None:
+    other = Model(MODEL.effects, 2e-5, displacement_scale=1e-6, provenance={"date": "2020-01-01"})
+    assert model_hash(other) == model_hash(MODEL)
+    next_up = MODEL.with_values({"arx.b[0]": float(np.nextafter(1e-05, 1.0))})
+    assert model_hash(next_up) != model_hash(MODEL)
+    assert model_hash(MODEL).startswith(f"sha256:{hash_number(MODEL):08x}")
+
+
+def test_a_lost_empty_array_is_noticed() -> None:
+    text = "\n".join(line for line in dumps(MODEL).splitlines() if " a: " not in line)
+    with pytest.raises(ModelError, match=r"model\.hash.*delete model\.hash"):
+        loads(text)
+    assert loads("\n".join(line for line in text.splitlines() if " hash:" not in line))["arx"].array("a").size == 0
+
+
+def test_save_and_load(tmp_path: Path) -> None:
+    path = save(MODEL, tmp_path / "new" / "model.yaml")
+    _same(load(path), MODEL)
+    assert [p.name for p in path.parent.iterdir()] == ["model.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("p2: 2.1925", "p3: 2.1925", "'model.bouc_wen.p2' is missing"),
+        ("p2: 2.1925", "p2: 2.1925\n        p9: 1.0", "unknown 'model.bouc_wen.p9'"),
+        ("p2: 2.1925", "p2: 2", "expected a number .* with a decimal point; write 2.0"),
+        ("p2: 2.1925", "p2: 2.1925 V", "got '2.1925 V', expected a number"),
+        ("p2: 2.1925", "p2: true", "got True, expected a number"),
+        ("p2: 2.1925", "p2: [2.0]", "expected a number"),
+        ("p2: 2.1925", "p2: .nan", "expected -1000 to 1000"),
+        ("beta: 4.6075", "beta: 0.1", "beta >= |gamma|"),
+        ("a: [-0.5]", "a: [-1.5]", "unstable"),
+        ("a: [-0.5]", "a: -0.5", "expected a list of numbers"),
+        ("a: [-0.5]", "a: [-0.5, 1]", r"model.arx.a\[1\]: got 1, expected a number"),
+        ("sample_period: 2.0e-05", "sample_period: -2.0e-05", "sample_period: got -2e-05"),
+        ("sample_period: 2.0e-05", "sample_period: 20 us", "got '20 us', expected a number .s."),
+        ("sample_period: 2.0e-05", "", "'model.sample_period' is missing"),
+        ("voltage_scale: 10.0", "voltage_scale: 11.0", "model.hash"),
+        ("valid: true", "valid: false", "identify the stage first"),
+        ('"bouc_wen", ', "", "unknown 'model.bouc_wen"),
+        ('"bouc_wen"', '"bouc_wem"', "unknown effect 'bouc_wem'"),
+        ('["bouc_wen", "arx", "offset"]', "bouc_wen", "expected a list of effect names"),
+        ("/**:", "/**: [", "broken YAML in line"),
+        ("    model:", "    modell:", "no 'model'"),
+        ("ros__parameters", "parameters", "no 'ros__parameters'"),
+        ("p2: 2.1925", "p2: 2.1925\n        p2: 2.1925", "given twice"),
+        ("p2: 2.1925", "p2: [[1.0]]", "list of lists"),
+    ],
+)
+def test_what_is_no_model_is_refused_in_one_line(old: str, new: str, told: str) -> None:
+    text = dumps(MODEL)
+    assert old in text
+    with pytest.raises(PiezoError, match=told.replace("|", r"\|")) as error:
+        loads(text.replace(old, new, 1), "model.yaml")
+    assert "\n" not in str(error.value)
+    assert str(error.value).startswith("model.yaml")
+
+
+def test_two_different_models_in_one_file_are_refused() -> None:
+    other = dumps(MODEL.with_values({"offset.y0": 1e-6})).replace("/**", "/b")
+    with pytest.raises(ModelError, match="2 different models"):
+        loads(dumps(MODEL).replace("/**", "/a") + other)
+    _same(loads(dumps(MODEL).replace("/**", "/a") + dumps(MODEL).replace("/**", "/b")), MODEL)
+
+
+@pytest.mark.parametrize("text", ["", "\0", "[" * 5000, "- 1", "a: &x {b: *x}", "? {a: 1}\n: 2"])
+def test_any_text_is_refused_in_one_line(text: str) -> None:
+    with pytest.raises(PiezoError) as error:
+        loads(text)
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_file_and_a_foreign_one(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="No such file"):
+        load(tmp_path / "absent.yaml")
+    (tmp_path / "image.yaml").write_bytes(b"\xff\xd8\xff")
+    with pytest.raises(ModelError, match="UTF-8"):
+        load(tmp_path / "image.yaml")
+
+
+def test_published_stage_holds_the_figures_of_the_paper() -> None:
+    model = load(PUBLISHED)
+    assert parameters(dumps(model)) == parameters(PUBLISHED.read_text())
+    assert model["arx"]["delay"] == 3.0
+    assert round(model["arx"].dc_gain, 5) == 0.24641
+    assert model["published_bouc_wen"].values == {
+        "A": -0.7691, "beta": 4.6075, "gamma": -0.8725, "p1": -0.1085, "p2": 2.1925, "n": 1.0,
+    }  # fmt: skip
