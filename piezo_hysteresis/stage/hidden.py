@@ -99,10 +99,8 @@ def _asymmetry(rng: np.random.Generator, base: PlantParameters, highest: float) 
     share = float(rng.uniform(0.0, 1.0))
     total = min(0.4 * base.hysteresis.beta, room) * float(rng.uniform(0.4, 0.9))
     signs = rng.choice([-1.0, 1.0], 2)
-    return {
-        "hysteresis.phi1": float(signs[0] * total * share),
-        "hysteresis.phi2": float(signs[1] * total * (1 - share)),
-    }
+    phi1, phi2 = signs * total * np.array([share, 1.0 - share])
+    return {"hysteresis.phi1": float(phi1), "hysteresis.phi2": float(phi2)}
 
 
 def _thermal_drift(rng: np.random.Generator, base: PlantParameters, highest: float) -> Changes:
@@ -136,7 +134,7 @@ def _slew(rng: np.random.Generator, base: PlantParameters, highest: float) -> Ch
 
 def _resonance(rng: np.random.Generator, base: PlantParameters, highest: float) -> Changes:
     return {
-        "structure.resonance_share": _size(rng, 0.01, 0.06),
+        "structure.resonance_share": _size(rng, 0.02, 0.08),
         "structure.resonance_frequency": _size(rng, 500.0, 3000.0),
         "structure.resonance_damping": _size(rng, 0.005, 0.03),
     }
@@ -176,7 +174,7 @@ _DRAWS: dict[str, Draw] = {
     "asymmetric_hysteresis": _asymmetry,
     "hysteresis_exponent": _one("hysteresis.exponent", 1.2, 1.9),
     "hysteresis_memory": _memory,
-    "rate_dependent_hysteresis": _one("hysteresis.rate_gain", 0.02, 0.1),
+    "rate_dependent_hysteresis": _one("hysteresis.rate_gain", 0.01, 0.04),
     "initial_state": _one("hysteresis.initial_state", 0.03, 0.15, signed=True),
     "backlash": _one("hysteresis.backlash", 0.01, 0.06),
     "softening": _one("structure.softening_cubic", 0.01, 0.05, signed=True),

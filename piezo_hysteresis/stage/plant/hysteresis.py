@@ -43,7 +43,7 @@ class Hysteresis(Group):
     exponent: float = quantity(1.0, "1", 1.0, 5.0, "hidden effect: Bouc-Wen n above 1")
     reference_state: float = quantity(0.2, "1", 1e-6, 10.0, "state at which the exponent changes nothing")
     rate_gain: float = quantity(0.0, "1", -1.0, 1.0, "hidden effect: growth of the loop with ln|dv/dt|")
-    rate_exponent: float = quantity(0.25, "1", 0.01, 2.0, "exponent of the rate law, 0 would be logarithmic")
+    rate_exponent: float = quantity(0.1, "1", 0.01, 2.0, "exponent of the rate law, 0 would be logarithmic")
     rate_time: float = quantity(200e-6, "s", 1e-6, 1.0, "memory of the rate, a lag on |dv/dt|")
     initial_state: float = quantity(0.0, "1", -10.0, 10.0, "hidden effect: h of the settled stage")
     backlash: float = quantity(0.0, "V", 0.0, 100.0, "hidden effect: half width of a dead band of the drive")

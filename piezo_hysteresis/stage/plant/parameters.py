@@ -40,7 +40,7 @@ class PlantParameters:
     Raises
     ------
     ParameterError
-        If the full stroke does not fit the sensor, or drive limits do not fit converter and amplifier.
+        If the full stroke does not fit the sensor, or the drive limits do not fit the converter.
 
     Examples
     --------
@@ -57,12 +57,11 @@ class PlantParameters:
     sub_step: float = 5e-6
 
     def __post_init__(self) -> None:
-        e, gain = self.electronics, self.electronics.amplifier_gain
-        low, high = max(-e.dac_range, e.amplifier_min / gain), min(e.dac_range, e.amplifier_max / gain)
-        if not low <= e.voltage_min < e.voltage_max <= high:
+        e = self.electronics
+        if not -e.dac_range <= e.voltage_min < e.voltage_max <= e.dac_range:
             raise ParameterError(
                 f"electronics: got voltage_min {e.voltage_min:g} V and voltage_max {e.voltage_max:g} V, expected them "
-                f"ordered and within {low:g} to {high:g} V, which converter and amplifier can give"
+                f"ordered and within ±{e.dac_range:g} V, which the converter can give"
             )
         reach = max(abs(self.stroke(0.0, e.voltage_min)), abs(self.stroke(0.0, e.voltage_max)))
         if reach > self.sensor.range:

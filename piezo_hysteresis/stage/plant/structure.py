@@ -147,7 +147,7 @@ def _state_space(s: Structure, poles: tuple[float, ...]) -> tuple[Samples, Sampl
 def _discretise(a: Samples, column: Samples, dt: float, time_constant: float) -> tuple[Samples, Samples, Samples]:
     """Transition over `dt` and weights of the input at its start and end.
 
-    In between the input approaches its end exponentially with `time_constant`: a jump for 0, a straight line for infinity.
+    In between the input approaches its end exponentially with `time_constant`: a jump for 0, a line for infinity.
     """
     n = column.size
     big = np.zeros((n + 2, n + 2))
