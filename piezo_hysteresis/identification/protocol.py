@@ -164,8 +164,8 @@ class _Plan:
         self.add("conditioning", excitation.ramps(self.limits, corners, self.limits.ramp_rate), CORNERED)
 
     def step(self, edges: int, duration: float) -> None:
-        """Edges of a fifth of the range up and down at several levels: high enough to average, low enough to be gentle."""
-        levels = tuple((0.2, 0.4, 0.6, 0.4)[k % 4] for k in range(edges + 1))
+        """Edges of 0.3 of the range at several levels: high enough to see the onset, low enough to be gentle."""
+        levels = tuple((0.2, 0.5, 0.8, 0.5)[k % 4] for k in range(edges + 1))
         self.add("step", excitation.steps(self.limits, levels, duration))
 
     def noise(self, rms: float, duration: float) -> None:
@@ -207,7 +207,7 @@ def paper(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
         Seed of everything random.
     """
     plan = _Plan(limits or DriveLimits(), seed)
-    plan.step(edges=8, duration=0.02)
+    plan.step(edges=32, duration=0.01)
     plan.noise(rms=0.012, duration=2.0)
     plan.triangle()
     plan.sines(SINES, slow_period=CORNERED)
@@ -221,7 +221,7 @@ def short(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
     limits = plan.limits
     plan.conditioning()
     plan.add("rest", excitation.hold(limits, 0.0, 0.2))
-    plan.step(edges=16, duration=0.01)
+    plan.step(edges=32, duration=0.01)
     plan.noise(rms=0.012, duration=0.8)
     plan.noise(rms=0.003, duration=0.4)
     plan.triangle()
@@ -241,7 +241,7 @@ def rich(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
     span, ramp_rate = limits.span, limits.ramp_rate
     plan.conditioning()
     plan.add("rest", excitation.hold(limits, 0.0, 2.0), slow)
-    plan.step(edges=16, duration=0.02)
+    plan.step(edges=32, duration=0.01)
     for rms in (0.012, 0.003):
         plan.noise(rms, duration=0.5)
         plan.noise(rms, duration=0.5)
