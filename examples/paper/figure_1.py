@@ -16,7 +16,7 @@ from piezo_hysteresis.model import Model
 
 def loop(effect: Effect, v: NDArray[np.float64]) -> NDArray[np.float64]:
     """Hysteresis output w of one operator, from rest at v[0]."""
-    model = Model((effect,), sample_period=published.SAMPLE_PERIOD, voltage_scale=1.0)
+    model = Model((effect,), sample_period=1.0, voltage_scale=1.0)
     return model.run(v, model.rest(v[0]))[0]
 
 

@@ -13,12 +13,12 @@ from exhibit import DYNAMIC, MEASURED, STATIC, Exhibit, canvas, main
 
 def lag_error(frequency: float, periods: int = 3) -> float:
     """RMS difference between dc gain and G on the hysteresis output, in % of peak-to-peak, last period."""
-    model, u = published.model(), published.sine(frequency, periods)
+    model, u = published.MODEL, published.sine(frequency, periods)
     y, _ = model.run(u, model.rest(u[0]))
     hysteresis = model.without("arx")
     w, _ = hysteresis.run(u, hysteresis.rest(u[0]))
     last = slice(-u.size // periods, None)
-    return published.percent_of_range(y[last] - published.LINEAR.dc_gain * w[last], y[last])
+    return published.percent_of_range(y[last] - model["arx"].dc_gain * w[last], y[last])
 
 
 def table_1() -> Exhibit:
