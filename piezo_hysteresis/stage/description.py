@@ -1,0 +1,154 @@
+"""`Description`: what a stage is, what it may be asked for, and the last line of defence of its limits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import StageError
+
+Samples = NDArray[np.float64]
+
+_PERIOD_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What a stage is and what it may be asked for.
+
+    Parameters
+    ----------
+    name : str
+        Model and serial number, or what is simulated; unique per device, so that a driver can lock it.
+    streaming : bool
+        True for a `StreamingStage`, False for a `MemoryStage`.
+    sample_period_min, sample_period_max : float
+        Shortest and longest sample period [s].
+    sample_period_step : float
+        Periods are whole multiples of it [s]; 0 where any period in the range is possible.
+    voltage_min, voltage_max : float
+        Drive limits before the amplifier [V].
+    max_slew_rate : float
+        Steepest drive that is accepted [V/s]; infinite where a step of one sample is harmless.
+    safe_voltage : float
+        Drive voltage of the stage at rest [V].
+    longest_block : int, optional
+        Samples per block that the device holds; None where there is no limit.
+    amplifier_gain : float
+        Piezo voltage over drive voltage [V/V].
+    displacement_min, displacement_max : float
+        Sensor range [m]; samples on it are clipped.
+    measured_voltage : bool
+        True where the voltage returned is measured, False where it is the one commanded.
+    ignores_drive : bool
+        True for a replayed recording: what is asked for is not played.
+
+    Raises
+    ------
+    StageError
+        If limits are crossed or the safe voltage lies outside them.
+    """
+
+    name: str
+    streaming: bool
+    sample_period_min: float
+    sample_period_max: float
+    voltage_min: float
+    voltage_max: float
+    sample_period_step: float = 0.0
+    max_slew_rate: float = math.inf
+    safe_voltage: float = 0.0
+    longest_block: int | None = None
+    amplifier_gain: float = 1.0
+    displacement_min: float = -math.inf
+    displacement_max: float = math.inf
+    measured_voltage: bool = False
+    ignores_drive: bool = False
+
+    def __post_init__(self) -> None:
+        for low, high in (
+            ("sample_period_min", "sample_period_max"),
+            ("voltage_min", "safe_voltage"),
+            ("safe_voltage", "voltage_max"),
+            ("displacement_min", "displacement_max"),
+        ):
+            if not getattr(self, low) <= getattr(self, high):
+                raise StageError(
+                    f"{self.name}: got {low} {getattr(self, low):g} above {high} {getattr(self, high):g}, "
+                    "expected ordered limits"
+                )
+        if not (self.sample_period_min > 0 and self.max_slew_rate > 0 and self.amplifier_gain != 0):
+            raise StageError(f"{self.name}: expected a positive sample period and slew rate and a gain other than zero")
+
+    def check_sample_period(self, sample_period: float) -> float:
+        """Return `sample_period` [s] if the stage can run at it.
+
+        Raises
+        ------
+        StageError
+            Outside the range, or no whole multiple of `sample_period_step`.
+        """
+        low, high, step = self.sample_period_min, self.sample_period_max, self.sample_period_step
+        inside = low * (1 - _PERIOD_TOLERANCE) <= sample_period <= high * (1 + _PERIOD_TOLERANCE)
+        if not inside:
+            raise StageError(f"{self.name}: got sample period {sample_period:g} s, expected {low:g} to {high:g} s")
+        multiple = sample_period / step if step > 0 else 0.0
+        if abs(multiple - round(multiple)) > _PERIOD_TOLERANCE * multiple:
+            raise StageError(
+                f"{self.name}: got sample period {sample_period:g} s, expected a whole multiple of {step:g} s"
+            )
+        return float(sample_period)
+
+    def check_voltage(self, voltage: ArrayLike, present_voltage: float, sample_period: float) -> Samples:
+        """Return `voltage` as a contiguous array if the stage may play it: the last line of defence.
+
+        Parameters
+        ----------
+        voltage : (n,) array_like
+            Drive voltage [V].
+        present_voltage : float
+            Voltage applied before the first sample [V]; the slew counts from it.
+        sample_period : float
+            Time between samples [s].
+
+        Returns
+        -------
+        (n,) ndarray of float64
+
+        Raises
+        ------
+        StageError
+            On another shape, too long a block, or samples that are not finite, outside the limits or too steep.
+        """
+        try:
+            block = np.ascontiguousarray(voltage, dtype=np.float64)
+        except (TypeError, ValueError):
+            kind = type(voltage).__name__
+            raise StageError(f"{self.name}: got {kind} as drive, expected an array of volts") from None
+        if block.ndim != 1 or block.size == 0:
+            raise StageError(f"{self.name}: got drive of shape {block.shape}, expected one dimension, not empty")
+        if self.longest_block is not None and block.size > self.longest_block:
+            raise StageError(
+                f"{self.name}: got {block.size} samples, expected at most {self.longest_block} per block; "
+                "cut the waveform"
+            )
+        inside = (block >= self.voltage_min) & (block <= self.voltage_max)
+        if not inside.all():
+            first = int(np.argmin(inside))
+            raise StageError(
+                f"{self.name}: drive sample {first} is {block[first]:g} V, expected {self.voltage_min:g} to "
+                f"{self.voltage_max:g} V; nothing was played"
+            )
+        if math.isfinite(self.max_slew_rate):
+            steepest = self.max_slew_rate * sample_period
+            step = np.abs(np.diff(block, prepend=present_voltage))
+            if step.max() > steepest * (1 + 1e-9) + 1e-12:
+                first = int(np.argmax(step > steepest))
+                raise StageError(
+                    f"{self.name}: drive sample {first} steps by {step[first]:g} V, expected at most {steepest:g} V "
+                    f"per sample ({self.max_slew_rate:g} V/s); nothing was played"
+                )
+        return block

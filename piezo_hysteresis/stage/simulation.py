@@ -1,0 +1,165 @@
+"""`Simulation`: a plant behind the limits and the slow path of a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import StageError
+from ..record import Record
+from .description import Description, Samples
+from .plant import Plant, PlantParameters, Reading
+
+_SHORTEST_PERIOD = 1e-6
+_LONGEST_PERIOD = 10e-3
+
+
+class Simulation:
+    """What both kinds of simulated stage share: a plant behind limits, the slow path, whole phases played from rest."""
+
+    _streaming: bool
+    _longest_block: int | None = None
+
+    def __init__(
+        self, parameters: PlantParameters | None = None, *, seed: int = 0, sample_period: float = 20e-6
+    ) -> None:
+        self.parameters = PlantParameters() if parameters is None else parameters
+        e, sensor = self.parameters.electronics, self.parameters.sensor
+        rest = min(max(0.0, e.voltage_min), e.voltage_max)
+        self._description = Description(
+            name=f"simulated {'streaming' if self._streaming else 'memory'} stage, seed {seed}",
+            streaming=self._streaming,
+            sample_period_min=_SHORTEST_PERIOD,
+            sample_period_max=_LONGEST_PERIOD,
+            voltage_min=e.voltage_min,
+            voltage_max=e.voltage_max,
+            safe_voltage=rest,
+            longest_block=self._longest_block,
+            amplifier_gain=e.amplifier_gain,
+            displacement_min=-sensor.range,
+            displacement_max=sensor.range - sensor.lsb,
+        )
+        self._sample_period = self._description.check_sample_period(sample_period)
+        self._plant = Plant(self.parameters, self._sample_period, seed, rest)
+        self._closed = False
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any], *, seed: int = 0, sample_period: float = 20e-6) -> Self:
+        """A stage whose parameters are the defaults changed by a mapping, see `PlantParameters.from_mapping`."""
+        return cls(PlantParameters.from_mapping(mapping), seed=seed, sample_period=sample_period)
+
+    @property
+    def description(self) -> Description:
+        """Limits and kind of the simulated device."""
+        return self._description
+
+    @property
+    def sample_period(self) -> float:
+        """Sample period in force [s]."""
+        return self._sample_period
+
+    @property
+    def voltage(self) -> float:
+        """Drive voltage in force [V]."""
+        return self._plant.voltage
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the stage was opened [s]; it passes only while samples are taken."""
+        return self._plant.time
+
+    def configure(self, sample_period: float) -> None:
+        """Sample at another period [s]; the plant is taken as settled at the voltage in force."""
+        self._require_open()
+        period = self._description.check_sample_period(sample_period)
+        if period != self._sample_period:
+            self._plant.configure(period, self.voltage)
+            self._sample_period = period
+
+    def set_voltage(self, voltage: float) -> None:
+        """Apply one voltage [V] and hold it; takes one sample period of simulated time."""
+        self._run(np.array([voltage], dtype=np.float64))
+
+    def read_displacement(self) -> float:
+        """One reading [m] while the voltage is held; takes one sample period of simulated time."""
+        return float(self._run(np.array([self.voltage])).displacement[0])
+
+    def safe(self) -> None:
+        """Apply the safe voltage and hold it."""
+        if not self._closed and self.voltage != self._description.safe_voltage:
+            self.set_voltage(self._description.safe_voltage)
+
+    def close(self) -> None:
+        """Make safe; every later call but `close` and `safe` raises StageError."""
+        self.safe()
+        self._closed = True
+
+    def play(
+        self,
+        voltage: ArrayLike,
+        phase: str = "record",
+        *,
+        initial_voltage: float | None = None,
+        continues: bool = False,
+        average: int = 1,
+    ) -> Record:
+        """Play a whole phase as fast as the machine can and return its record.
+
+        Parameters
+        ----------
+        voltage : (n,) array_like
+            Drive voltage at the sample period of the stage [V], of any length.
+        phase : str
+            Name of the phase.
+        initial_voltage : float, optional
+            Voltage at which the stage has settled before [V]; default the first voltage.
+        continues : bool
+            True to go on from the state the stage is in.
+        average : int
+            Slow phases: simulated at the sample period of the stage, then averaged over blocks of so many samples.
+
+        Returns
+        -------
+        Record
+            With the simulated time of its first sample.
+
+        Raises
+        ------
+        StageError
+            If the drive breaks a limit; nothing is played.
+        """
+        self._require_open()
+        start = self.voltage
+        if not continues:
+            start = float(np.ravel(voltage)[0]) if initial_voltage is None else float(initial_voltage)
+        drive = self._check(voltage, start)
+        if not continues:
+            self._plant.settle(self._check([start], start)[0])
+        settled, time_before = self.voltage, self.time
+        reading = self._plant.run(drive)
+        record = Record(
+            reading.voltage,
+            reading.displacement,
+            self._sample_period,
+            phase,
+            time_before,
+            continues=continues,
+            initial_voltage=settled,
+            other_displacement=reading.other_displacement,
+            temperature=reading.temperature,
+        )
+        return record.decimate(average) if average > 1 else record
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise StageError(f"{self._description.name}: is closed, expected an open stage; make a new one")
+
+    def _check(self, voltage: ArrayLike, start: float) -> Samples:
+        return self._description.check_voltage(voltage, start, self._sample_period)
+
+    def _run(self, voltage: Samples) -> Reading:
+        self._require_open()
+        return self._plant.run(self._check(voltage, self.voltage))
