@@ -18,6 +18,13 @@ from piezo_hysteresis.parameter import Parameter
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures.py"
+HEAD = """\
+# Catalogue of effects
+
+Generated from `piezo_hysteresis/effects` by `make docs`; `piezo effects` prints it too. In the order in which the
+effects act; every one has a value that switches it off exactly.
+
+"""
 MARKED = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -82,13 +89,7 @@ def catalogue() -> str:
             for e in CHAIN
         ),
     )
-    return (
-        "# Catalogue of effects\n\nGenerated from `piezo_hysteresis/effects` by `make docs`; `piezo effects` prints it too. "
-        "In the order in which the effects act.\nEvery effect has a value that switches it off exactly.\n\n"
-        + listed
-        + "\n"
-        + "\n".join(section(e) for e in CHAIN)
-    )
+    return HEAD + listed + "\n" + "\n".join(section(e) for e in CHAIN)
 
 
 TABLES: dict[str, Callable[[], str]] = {"parameters": parameters}
