@@ -1,0 +1,33 @@
+"""Write the plant file of a simulated stage in which a physical effect is hidden, and say nothing.
+
+The demo starts this before the driver, gives the driver the path, and reads the file only after the verdict.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import yaml
+
+from piezo_hysteresis.stage.hidden import HIDDEN_EFFECTS, hidden_effect
+
+HIGHEST_VOLTAGE = 10.0
+"""Top of the range that the protocols use [V]."""
+
+
+def main() -> None:
+    """Draw an effect and write the file."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("seed", type=int, help="the same seed hides the same effect")
+    parser.add_argument("file", type=Path, help="plant file to write")
+    parser.add_argument("--name", choices=HIDDEN_EFFECTS, help="hide this effect; only its size is drawn")
+    arguments = parser.parse_args()
+    hidden = hidden_effect(arguments.seed, name=arguments.name, highest_voltage=HIGHEST_VOLTAGE)
+    mapping = {key: list(v) if isinstance(v, tuple) else v for key, v in hidden.parameters.to_mapping().items()}
+    sizes = ", ".join(f"{name} = {value}" for name, value in hidden.changes.items())
+    arguments.file.write_text(f"# hidden: {hidden.name} ({sizes})\n" + yaml.safe_dump(mapping, sort_keys=False))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""Play a waveform on a stage from any lab software: `python send_waveform.py --ros-args -r __ns:=/stage_x`.
+
+No message of this package is needed: a waveform is a standard point cloud with one field, `voltage`.
+"""
+
+import array
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
+from sensor_msgs.msg import PointCloud2, PointField
+
+SAMPLE_PERIOD = 20e-6  # s, that of the driver
+
+time = SAMPLE_PERIOD * np.arange(50_000)
+voltage = 2.5 - 2.5 * np.cos(2 * np.pi * 10.0 * time)  # V: 10 Hz for 1 s, from 0 to 5 V
+
+rclpy.init()
+node = rclpy.create_node("send_waveform")
+publisher = node.create_publisher(PointCloud2, "command", 10)
+while not publisher.get_subscription_count():  # until the driver is found
+    rclpy.spin_once(node, timeout_sec=0.1)
+
+waveform = PointCloud2(height=1, width=voltage.size, point_step=8, row_step=8 * voltage.size, is_dense=True)
+waveform.fields = [PointField(name="voltage", offset=0, datatype=PointField.FLOAT64, count=1)]
+waveform.data = array.array("B", voltage.tobytes())
+waveform.header.frame_id = "my_sine"  # name of the phase
+waveform.header.stamp = node.get_clock().now().to_msg()  # an old command is refused; without a stamp it never is
+
+finished = Future()
+
+
+def told(status: DiagnosticStatus) -> None:
+    """Print what the driver says about our waveform."""
+    state = {value.key: value.value for value in status.values}["state"]
+    if status.name == "my_sine":
+        print(f"{status.name}: {state} {status.message}".rstrip())
+        if state in ("refused", "done", "stopped"):
+            finished.set_result(state)
+
+
+latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+node.create_subscription(DiagnosticStatus, "command_status", told, latched)
+publisher.publish(waveform)
+publisher.wait_for_all_acked(Duration(seconds=5.0))
+rclpy.spin_until_future_complete(node, finished, timeout_sec=30.0)
+raise SystemExit(0 if finished.done() and finished.result() == "done" else 1)
