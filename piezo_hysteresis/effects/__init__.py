@@ -7,15 +7,35 @@ u → [timing] → [amplifier] → v → [backlash] → [input polynomial + h + 
 from __future__ import annotations
 
 from .arx import Arx
+from .asymmetric_hysteresis import AsymmetricHysteresis
+from .axis_coupling import AxisCoupling
 from .bouc_wen import BoucWen
-from .effect import Effect, Place, Setting
+from .creep import Creep
+from .effect import Effect, Place, Setting, Term
+from .gain_drift import GainDrift
+from .hysteresis_exponent import HysteresisExponent
+from .initial_state import InitialState
+from .mains_hum import MainsHum
 from .offset import Offset
 from .published_bouc_wen import PublishedBoucWen
+from .rate_dependent_hysteresis import RateDependentHysteresis
+from .thermal_drift import ThermalDrift
+from .thermal_expansion import ThermalExpansion
 
 CHAIN: tuple[type[Effect], ...] = (
     BoucWen,
     PublishedBoucWen,
+    AsymmetricHysteresis,
+    HysteresisExponent,
+    RateDependentHysteresis,
+    InitialState,
+    Creep,
     Arx,
+    GainDrift,
+    ThermalDrift,
+    ThermalExpansion,
+    AxisCoupling,
+    MainsHum,
     Offset,
 )
 """Every effect, in the order in which it acts."""
@@ -34,10 +54,21 @@ __all__ = [
     "CATALOGUE",
     "CHAIN",
     "Arx",
+    "AsymmetricHysteresis",
+    "AxisCoupling",
     "BoucWen",
+    "Creep",
     "Effect",
+    "GainDrift",
+    "HysteresisExponent",
+    "InitialState",
+    "MainsHum",
     "Offset",
     "Place",
     "PublishedBoucWen",
+    "RateDependentHysteresis",
     "Setting",
+    "Term",
+    "ThermalDrift",
+    "ThermalExpansion",
 ]

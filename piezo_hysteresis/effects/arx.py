@@ -166,9 +166,7 @@ class ArxBlock(LinearBlock):
 
     def gain_slopes(self) -> Array:
         at_a = 1.0 + self.a.sum()
-        return np.concatenate(
-            (np.full(self.a.size, -self.b.sum() / at_a**2), np.full(self.b.size, 1.0 / at_a), [0.0])
-        )
+        return np.concatenate((np.full(self.a.size, -self.b.sum() / at_a**2), np.full(self.b.size, 1.0 / at_a), [0.0]))
 
     def own_rest(self) -> State:
         return np.zeros((2, self.a.size)), np.zeros(self.first + self.b.size + 3), np.zeros(self.a.size)

@@ -23,9 +23,7 @@ class LagBlock(LinearBlock):
         Their derivatives by the parameters.
     """
 
-    def __init__(
-        self, names: tuple[str, ...], gain: float, lag: float, gain_slopes: Array, lag_slopes: Array
-    ) -> None:
+    def __init__(self, names: tuple[str, ...], gain: float, lag: float, gain_slopes: Array, lag_slopes: Array) -> None:
         self.names, self.gain = names, gain
         self.whole = int(lag)
         self.part = lag - self.whole

@@ -4,9 +4,9 @@ Along the path length ℓ = |Δv| with s = sgn Δv and g = sgn h the loop with a
 
     dh/dℓ = s·A_eff − r·h,    r = |h/h_ref|^(n−1)·(β + γ s g) − φ1 s − φ2 g
 
-which for n = 1 has the closed solution h(ℓ) = h0 + (s·A_eff − r·h0)·(1 − e^(−rℓ))/r; where h crosses zero, g and with it
-r flip. For n ≠ 1 the power is frozen at the middle of sub-steps of at most `SUB_STEP`. Loop parameters are an array in
-the order of `LOOP`; a term at its off value leaves every bit of the plain loop as it is.
+which for n = 1 has the closed solution h(ℓ) = h0 + (s·A_eff − r·h0)·(1 − e^(−rℓ))/r; where h crosses zero, g and with
+it r flip. For n ≠ 1 the power is frozen at the middle of sub-steps of at most `SUB_STEP`. Loop parameters are an array
+in the order of `LOOP`; a term at its off value leaves every bit of the plain loop as it is.
 """
 
 from __future__ import annotations
@@ -191,8 +191,12 @@ def linearise_general(v, dv_in, p, own, sample_period, state, tangent, last_in, 
                     drive_by[A] = s * (1.0 + k * factor)
                     drive = drive * (1.0 + k * factor)
             steps = 1
-            if n != 1.0:
+            whole_step = h
+            if powered:
                 steps = max(1, int(ceil(abs(dv) / SUB_STEP)))
+                g = copysign(1.0, drive if h == 0.0 else h)
+                bend, gm, turn = p[PHI1] * s, p[PHI2] * g, p[GAMMA] * s * g
+                whole_step = advance(h, drive, abs(dv), p[BETA] + turn - bend - gm, p[BETA] - turn - bend + gm)
             length = abs(dv) / steps
             for _ in range(steps):
                 g = copysign(1.0, drive if h == 0.0 else h)
@@ -251,6 +255,8 @@ def linearise_general(v, dv_in, p, own, sample_period, state, tangent, last_in, 
                         + by_power * d_power
                     )
                 h = h_next
+            if powered and n == 1.0:
+                h = whole_step
             last = v[i]
             for j in range(m):
                 last_in[j] = dv_in[j, i]

@@ -54,7 +54,7 @@ def run_published(v, p, n, state, h_out):
         for i in range(v.size):
             dv = v[i] - last
             last = v[i]
-            h = h + (a * dv - beta * abs(dv) * h - gamma * dv * abs(h))
+            h = h + (a * dv - (beta * abs(dv) * h + gamma * dv * abs(h)))
             h_out[i] = h
     else:
         for i in range(v.size):

@@ -1,0 +1,59 @@
+"""Thermal expansion of the stage, where its temperature was recorded."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..parameter import Parameter
+from .block import Array, Block
+from .channel_block import ChannelBlock
+from .effect import Effect, Place, Setting
+
+
+class ThermalExpansion(Effect):
+    """Displacement proportional to the recorded temperature.
+
+    Parameters
+    ----------
+    kappa : float
+        Expansion between sensor and stage [m/K].
+    T0 : float
+        Temperature at which it counts as zero [K].
+
+    Notes
+    -----
+    Needs the channel ``temperature``; records without it get nothing added.
+    """
+
+    name = "thermal_expansion"
+    family = "drift"
+    place = Place.ENVIRONMENT
+    channel = "temperature"
+    equation = "y = x + κ (T − T0)"
+    signature = "follows the temperature, whatever the drive does"
+    source = "linear expansion; 0.1–1 µm/K"
+    parameters = (
+        Parameter("kappa", "κ", "m/K", 0.0, -1e-4, 1e-4, "expansion between sensor and stage", "expansion", 0.0, 1e-7),
+        Parameter(
+            "T0", "T0", "K", 293.15, 0.0, 1e3, "reference temperature", "convention, 20 °C", scale=10.0, fixed=True
+        ),
+    )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return ThermalExpansionBlock(self["kappa"], self["T0"])
+
+
+class ThermalExpansionBlock(ChannelBlock):
+    """x + κ (T − T0)."""
+
+    names = ("thermal_expansion.kappa",)
+    channel = "temperature"
+
+    def __init__(self, kappa: float, reference: float) -> None:
+        self.kappa, self.reference = kappa, reference
+
+    def addition(self, c: Array) -> Array:
+        return self.kappa * (c - self.reference)
+
+    def by_parameter(self, c: Array) -> Array:
+        return np.array([c - self.reference])
