@@ -1,0 +1,72 @@
+"""`Drawing`: a figure, what it says in words, and the numbers that it is drawn from."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from .style import SETTINGS
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Drawing:
+    """One figure of a report.
+
+    Parameters
+    ----------
+    name : str
+        File name without ending, e.g. ``"loops"``.
+    title : str
+        Heading.
+    caption : str
+        What is drawn and what to look for.
+    alternative : str
+        What a reader learns who cannot see the figure.
+    figure : Figure
+        The picture.
+    data : mapping of str to (n,) ndarray
+        Columns drawn, named with units; of equal length or not.
+    """
+
+    name: str
+    title: str
+    caption: str
+    alternative: str
+    figure: Figure
+    data: Mapping[str, NDArray]
+
+    def svg(self) -> str:
+        """The figure as SVG text, the same for the same data."""
+        stream = io.StringIO()
+        with mpl.rc_context({**SETTINGS, "svg.hashsalt": self.name}):
+            self.figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+        return stream.getvalue()
+
+    def csv(self) -> str:
+        """The numbers drawn; shorter columns end early."""
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(self.data)
+        columns = [np.asarray(c) for c in self.data.values()]
+        for i in range(max((c.size for c in columns), default=0)):
+            writer.writerow(_cell(c[i]) if i < c.size else "" for c in columns)
+        return stream.getvalue()
+
+    def save(self, folder: Path) -> None:
+        """Write ``name.svg``, ``name.png`` and ``name.csv`` into a folder."""
+        (folder / f"{self.name}.svg").write_text(self.svg(), encoding="utf-8")
+        with mpl.rc_context(SETTINGS):
+            self.figure.savefig(folder / f"{self.name}.png", metadata={"Software": None})
+        (folder / f"{self.name}.csv").write_text(self.csv(), encoding="utf-8")
+
+
+def _cell(value: object) -> str:
+    return f"{value:.9g}" if isinstance(value, float | np.floating) else str(value)

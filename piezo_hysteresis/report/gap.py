@@ -1,0 +1,51 @@
+"""The error of every phase before and after, beside its floor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .comparison import Comparison
+from .drawing import Drawing
+from .style import BLUE, GREY, ORANGE, canvas
+
+
+def gap(comparison: Comparison) -> Drawing | None:
+    """Dots on a logarithmic axis: floor, error of the first model, error of the last one."""
+    now, before = comparison.now, comparison.before
+    if now is None:
+        return None
+    names = list(now.by_phase)
+    place = np.arange(len(names))
+    figure, axes = canvas(1, 1, 0.27 * len(names) + 1.1)
+    axis = axes[0, 0]
+    floors = 100.0 / now.range * np.array(
+        [
+            np.sqrt(np.mean([comparison.floors[r.index] ** 2 for r in now.rows if r.phase == name])) for name in names
+        ]
+    )
+    after = np.array([now.by_phase[n] for n in names])
+    data = {"phase": np.array(names), "floor_percent_of_range": floors, "error_percent_of_range": after}
+    axis.plot(floors, place, linestyle="none", marker="|", markersize=13, markeredgewidth=2, color=GREY, label="floor")
+    told = f"error {now.percent:.3g} % of range over all phases"
+    if before is not None:
+        old = np.array([before.by_phase[n] for n in names])
+        axis.hlines(place, np.minimum(old, after), np.maximum(old, after), color="#cccccc", linewidth=2, zorder=1)
+        axis.plot(old, place, linestyle="none", marker="s", markerfacecolor="none", color=BLUE, label="before")
+        data["error_before_percent_of_range"] = old
+        told = f"error {before.percent:.3g} % of range before and {now.percent:.3g} % after"
+    axis.plot(after, place, linestyle="none", marker="o", color=ORANGE, label="after" if before is not None else "error")
+    axis.set_xscale("log")
+    axis.set_yticks(place, names)
+    axis.invert_yaxis()
+    axis.set_xlabel("rms error [% of range]")
+    figure.legend(*axis.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    worst = names[int(np.argmax(after))]
+    return Drawing(
+        "gap",
+        "Error by phase",
+        "Free-run rms error of every phase. At the floor nothing is left to explain: it is the noise of the sensor or "
+        "0.03 % of the range, whichever is larger.",
+        f"Error by phase: {told}; worst in {worst}.",
+        figure,
+        data,
+    )

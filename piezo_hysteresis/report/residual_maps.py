@@ -1,0 +1,89 @@
+"""The residual against what could explain it: drive, displacement, rate of the drive."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.colors import LogNorm
+from numpy.typing import NDArray
+
+from .comparison import Comparison
+from .drawing import Drawing
+from .style import BLUE, GREY, ORANGE, canvas
+
+Array = NDArray[np.float64]
+
+PER_RECORD = 20_000
+"""Samples of every record that enter, so that no phase drowns the others."""
+BINS = 24
+
+
+def residual_maps(comparison: Comparison) -> Drawing | None:
+    """Maps of residual against u, y and du/dt, with the mean of rising and of falling drive."""
+    now = comparison.now
+    if now is None:
+        return None
+    u, y, rate, e = (np.concatenate(parts) for parts in zip(*_samples(comparison), strict=True))
+    limit = float(np.quantile(np.abs(e), 0.9995)) or 1e-12
+    figure, axes = canvas(1, 3, 3.4, sharey=True)
+    slow = float(np.quantile(np.abs(rate[rate != 0.0]), 0.05)) if rate.any() else 1.0
+    data: dict[str, Array] = {}
+    told = []
+    for axis, (name, values, label) in zip(
+        axes.flat,
+        (("drive_V", u, "drive u [V]"), ("displacement_um", 1e6 * y, "displacement y [µm]"), ("rate_V_per_s", rate, "rate du/dt [V/s]")),
+        strict=True,
+    ):
+        if name == "rate_V_per_s":
+            axis.set_xscale("symlog", linthresh=slow)
+            reach = max(float(np.abs(rate).max()), 2 * slow)
+            positive = np.geomspace(slow, reach, BINS // 2 + 1)
+            edges = np.concatenate((-positive[::-1], positive))
+        else:
+            edges = np.linspace(values.min(), values.max(), BINS + 1)
+        fine = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b in zip(edges, edges[1:], strict=False)]))
+        counts, xs, ys = np.histogram2d(values, e, bins=(fine, np.linspace(-limit, limit, 101)))
+        axis.pcolormesh(
+            xs, 1e9 * ys, np.where(counts > 0, counts, np.nan).T, cmap="Greys", norm=LogNorm(1, counts.max() * 2), rasterized=True
+        )
+        axis.axhline(0.0, color=GREY, linewidth=0.8)
+        for sign, colour, line, word in ((1, ORANGE, "-", "rising"), (-1, BLUE, (0, (4, 2)), "falling")):
+            centre, mean = _means(values, e, edges, np.sign(rate) == sign)
+            axis.plot(centre, 1e9 * mean, color=colour, linestyle=line, linewidth=1.8, label=f"mean, drive {word}")
+            data |= {f"{name}_{word}": centre, f"residual_m_over_{name}_{word}": mean}
+            if mean.size:
+                told.append(f"over {name} {word} the mean residual spans {1e9 * np.ptp(mean):.3g} nm")
+        axis.set_xlabel(label)
+    axes[0, 0].set_ylabel("residual [nm]")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    return Drawing(
+        "residual_maps",
+        "Residual against drive, displacement and rate",
+        "Grey: how often a residual occurs, all phases with equal weight (logarithmic). A mean that bends away from zero "
+        "is something the model lacks: bent over u or y a static nonlinearity, split between rising and falling a "
+        "hysteresis, growing with du/dt a lag or a rate dependence.",
+        "Maps of the residual: " + "; ".join(told) + ".",
+        figure,
+        data,
+    )
+
+
+def _samples(comparison: Comparison) -> list[tuple[Array, Array, Array, Array]]:
+    assert comparison.now is not None
+    parts = []
+    for record, residual in zip(comparison.experiment, comparison.now.residuals, strict=True):
+        if record.size < 2:
+            continue
+        step = max(1, record.size // PER_RECORD)
+        rate = np.gradient(record.voltage, record.sample_period)
+        parts.append((record.voltage[::step], record.displacement[::step], rate[::step], residual[::step]))
+    return parts
+
+
+def _means(values: Array, e: Array, edges: Array, mask: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Mean of e in every bin with at least 30 samples: the centres of the samples, and the means."""
+    place = np.clip(np.digitize(values[mask], edges) - 1, 0, edges.size - 2)
+    count = np.bincount(place, minlength=edges.size - 1)
+    good = count >= 30
+    centre = np.bincount(place, values[mask], edges.size - 1)[good] / count[good]
+    return centre, np.bincount(place, e[mask], edges.size - 1)[good] / count[good]

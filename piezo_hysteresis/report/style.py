@@ -1,0 +1,83 @@
+"""How every figure looks: a palette that colour-blind people can read, line styles that survive a grey print.
+
+Colours are those of Okabe and Ito; what is measured is always the grey solid line, what is predicted the dashed one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY = "#1a1a1a", "#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9"
+GREY = "#8c8c8c"
+
+MEASURED: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.4}
+PREDICTED: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (4, 2)), "linewidth": 1.4}
+BEFORE: dict[str, Any] = {"color": BLUE, "linestyle": (0, (1, 1.2)), "linewidth": 1.4}
+FLOOR: dict[str, Any] = {"color": GREY, "linestyle": (0, (6, 2, 1, 2)), "linewidth": 1.2}
+RESIDUAL: dict[str, Any] = {"color": ORANGE, "linestyle": "-", "linewidth": 0.9}
+
+SETTINGS: dict[str, Any] = {
+    "font.size": 9.5,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.labelsize": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "axes.edgecolor": "#666666",
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "svg.fonttype": "path",
+    "savefig.dpi": 150,
+}
+
+WIDTH = 9.0
+"""Width of every figure [inch]."""
+
+
+def canvas(rows: int, columns: int, height: float, **options: Any) -> tuple[Figure, Any]:
+    """A figure without global state and its axes, shape (rows, columns).
+
+    Parameters
+    ----------
+    rows, columns : int
+        Grid of axes.
+    height : float
+        Height of the whole figure [inch].
+    **options
+        Passed on to `Figure.subplots`.
+    """
+    with mpl.rc_context(SETTINGS):
+        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+        axes = figure.subplots(rows, columns, squeeze=False, **options)
+    return figure, axes
+
+
+def nanometre(metres: float) -> str:
+    """A length for reading: nm below a micrometre, else µm.
+
+    >>> nanometre(1.234e-8), nanometre(2.5e-6)
+    ('12.3 nm', '2.5 µm')
+    """
+    return f"{metres * 1e9:.3g} nm" if abs(metres) < 1e-6 else f"{metres * 1e6:.3g} µm"
+
+
+def duration(seconds: float) -> str:
+    """A time for reading.
+
+    >>> duration(2e-5), duration(0.25), duration(175.0)
+    ('20 µs', '250 ms', '175 s')
+    """
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6)):
+        if seconds * factor >= 1.0:
+            return f"{seconds * factor:.4g} {unit}"
+    return f"{seconds * 1e9:.4g} ns"

@@ -1,0 +1,109 @@
+"""Every kind of phase against time: measured, predicted, and the residual below."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from ..record import Record
+from .comparison import Comparison
+from .drawing import Drawing
+from .style import BEFORE, FLOOR, MEASURED, PREDICTED, RESIDUAL, canvas
+from .thinning import thinned
+
+COLUMNS = 3
+PANELS = 12
+"""Most phases drawn."""
+TURNS = 16
+"""Turning points of the drive that one panel can show."""
+
+
+def window(record: Record, centre: int) -> slice:
+    """The part of a record to draw: all of it, or as many turning points around sample `centre` as can be told apart."""
+    span = float(np.ptp(record.voltage))
+    if span == 0.0:
+        return slice(0, record.size)
+    wave = np.concatenate(([record.voltage.min() - span], record.voltage, [record.voltage.min() - span]))
+    tops = find_peaks(wave, prominence=0.02 * span)[0].size
+    if 2 * tops <= TURNS:
+        return slice(0, record.size)
+    length = min(record.size, max(64, record.size * TURNS // (2 * tops)))
+    start = int(np.clip(centre - length // 2, 0, record.size - length))
+    return slice(start, start + length)
+
+
+def time_series(comparison: Comparison) -> Drawing:
+    """One panel per phase name: displacement above, residual below; fast phases around their largest residual."""
+    first: dict[str, int] = {}
+    for index, record in enumerate(comparison.experiment):
+        if record.phase not in first or _rms(comparison, index) > _rms(comparison, first[record.phase]):
+            first[record.phase] = index
+    shown = sorted(first.values())
+    if len(shown) > PANELS:
+        shown = sorted(sorted(shown, key=lambda i: -_rms(comparison, i))[:PANELS])
+    now, before = comparison.now, comparison.before
+    columns, bands = min(COLUMNS, len(shown)), -(-len(shown) // COLUMNS)
+    heights = [2.0, 1.0] * bands if now is not None else [1.0] * bands
+    figure, axes = canvas(
+        len(heights), columns, (2.9 if now is not None else 1.9) * bands + 0.3, gridspec_kw={"height_ratios": heights}
+    )
+    step = len(heights) // bands
+    data = {}
+    for place, index in enumerate(shown):
+        record = comparison.experiment[index]
+        row, column = step * (place // columns), place % columns
+        centre = int(np.argmax(np.abs(now.residuals[index]))) if now is not None else record.size // 2
+        part = window(record, centre)
+        time = record.sample_period * np.arange(record.size)[part]
+        scale, unit = (1e3, "ms") if time[-1] < 0.5 else (1.0, "s")
+        y = record.displacement[part]
+        at = thinned(y)
+        upper = axes[row, column]
+        upper.plot(scale * time[at], 1e6 * y[at], label="measured", **MEASURED)
+        data |= {f"time_s_{record.phase}": time[at], f"measured_m_{record.phase}": y[at]}
+        upper.set_title(record.phase)
+        bottom = upper
+        if now is not None:
+            predicted = now.predicted[index][part]
+            upper.plot(scale * time[at], 1e6 * predicted[at], label="predicted", **PREDICTED)
+            bottom = axes[row + 1, column]
+            upper.tick_params(labelbottom=False)
+            if before is not None:
+                old = before.residuals[index][part]
+                old_at = thinned(old)
+                bottom.plot(scale * time[old_at], 1e9 * old[old_at], label="residual before", **BEFORE)
+            e = now.residuals[index][part]
+            e_at = thinned(e)
+            bottom.plot(scale * time[e_at], 1e9 * e[e_at], label="residual", **RESIDUAL)
+            for sign in (-2.0, 2.0):
+                bottom.axhline(sign * 1e9 * comparison.floors[index], **FLOOR)
+            data |= {f"predicted_m_{record.phase}": predicted[at], f"residual_time_s_{record.phase}": time[e_at]}
+            data[f"residual_m_{record.phase}"] = e[e_at]
+        bottom.set_xlabel(f"time in phase [{unit}]")
+        if column == 0:
+            upper.set_ylabel("y [µm]")
+            if now is not None:
+                bottom.set_ylabel("residual [nm]")
+    for place in range(len(shown), bands * columns):
+        for extra in range(step):
+            axes[step * (place // columns) + extra, place % columns].set_axis_off()
+    handles = dict(zip(*(axes[0, 0].get_legend_handles_labels())[::-1], strict=True))
+    if now is not None:
+        handles |= dict(zip(*(axes[1, 0].get_legend_handles_labels())[::-1], strict=True))
+        handles["± 2 × floor"] = axes[1, 0].get_lines()[-1]
+    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles))
+    names = ", ".join(comparison.experiment[i].phase for i in shown)
+    words = "no model was given" if now is None else f"largest residual {1e9 * now.largest:.3g} nm"
+    return Drawing(
+        "time_series",
+        "Against time",
+        "Displacement and, below it, measured minus predicted. Fast phases are shown around their largest residual; of "
+        "repeated phases the one with the largest error is drawn.",
+        f"Displacement against time for the phases {names}; {words}.",
+        figure,
+        data,
+    )
+
+
+def _rms(comparison: Comparison, index: int) -> float:
+    return 0.0 if comparison.now is None else comparison.now.rows[index].rms
