@@ -1,0 +1,94 @@
+"""`Continuity`: the running index of a stream of blocks, checked for loss, repetition and new starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LONGEST_SILENCE = 60.0
+"""A jump of the index that the stamps do not explain is a loss up to this time [s], a new start beyond."""
+
+LONGEST_DELAY = 1.0
+"""A block that repeats samples older than this [s] is no late message but a new start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """How a block joins the ones before it.
+
+    Parameters
+    ----------
+    missing : int
+        Samples that were skipped before the block.
+    repeated : int
+        Leading samples of the block that came before; all of them where the block is late or doubled.
+    restarted : bool
+        True for the first block of a stream.
+    """
+
+    missing: int = 0
+    repeated: int = 0
+    restarted: bool = False
+
+
+class Continuity:
+    """Follows the index, which wraps at 2³², and counts what went wrong.
+
+    Parameters
+    ----------
+    sample_period : float
+        Time between samples [s].
+
+    Attributes
+    ----------
+    received, lost, repeated, restarts : int
+        Samples that counted, samples that never came, samples that came again or too late, and new starts.
+    """
+
+    def __init__(self, sample_period: float) -> None:
+        self.sample_period = sample_period
+        self.received = self.lost = self.repeated = self.restarts = 0
+        self._expected: int | None = None
+        self._end = 0
+
+    def join(self, index: int, stamp: int, size: int, follows_gap: bool = False) -> Arrival:
+        """Take the next block.
+
+        Parameters
+        ----------
+        index : int
+            Index of its first sample.
+        stamp : int
+            Time of its first sample [ns].
+        size : int
+            Number of samples.
+        follows_gap : bool
+            True where the samples missing before it were never measured; they are not counted as lost.
+        """
+        if self._expected is None:
+            arrival = Arrival(restarted=True)
+        else:
+            arrival = self._compare(_signed(index - self._expected), (stamp - self._end) * 1e-9, size)
+        self.repeated += arrival.repeated
+        if arrival.repeated == size:
+            return arrival
+        self.restarts += arrival.restarted and self._expected is not None
+        self.lost += 0 if follows_gap else arrival.missing
+        self.received += size - arrival.repeated
+        self._expected = (index + size) % 2**32
+        self._end = stamp + round(size * self.sample_period * 1e9)
+        return arrival
+
+    def _compare(self, step: int, elapsed: float, size: int) -> Arrival:
+        if step == 0:
+            return Arrival()
+        if step > 0:
+            unexplained = step * self.sample_period - 10 * max(elapsed, 0.0)
+            return Arrival(restarted=True) if unexplained > LONGEST_SILENCE else Arrival(missing=step)
+        if elapsed > 0 or -step * self.sample_period > LONGEST_DELAY:
+            return Arrival(restarted=True)
+        return Arrival(repeated=min(-step, size))
+
+
+def _signed(step: int) -> int:
+    """A difference modulo 2³² as the nearest signed one."""
+    return (step + 2**31) % 2**32 - 2**31

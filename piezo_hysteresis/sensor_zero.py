@@ -1,0 +1,49 @@
+"""`SensorZero`: the offset between a sensor, whose zero is arbitrary, and a model."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class SensorZero:
+    """Mean of measured minus modelled displacement over a window of the stream.
+
+    Parameters
+    ----------
+    start : int
+        First sample of the window.
+    wanted : int
+        Samples to average; the offset holds from the first one on and settles with them.
+    at_rest : bool
+        True where the window ends early with the rest of the stage.
+    """
+
+    def __init__(self, start: int, wanted: int, at_rest: bool = False) -> None:
+        self.start, self.stop = start, start
+        self.at_rest = at_rest
+        self._end = start + wanted
+        self._measured = self._modelled = 0.0
+
+    @property
+    def offset(self) -> float:
+        """Sensor minus model [m]; 0 before the first sample."""
+        return (self._measured - self._modelled) / (self.stop - self.start) if self.stop > self.start else 0.0
+
+    def add(self, measured: Array, modelled: Array | None) -> None:
+        """Take the next samples [m], shape (n,), as far as they are wanted; `modelled` is None without a model."""
+        count = min(measured.size, self._end - self.stop)
+        self._measured += float(measured[:count].sum())
+        if modelled is not None:
+            self._modelled += float(modelled[:count].sum())
+        self.stop += count
+
+    def close(self) -> None:
+        """Want no more samples."""
+        self._end = self.stop
+
+    def remodel(self, mean: float) -> None:
+        """Put another model in, whose mean over the window is `mean` [m]."""
+        self._modelled = mean * (self.stop - self.start)

@@ -1,0 +1,131 @@
+"""`VoltageHistory`: the drive voltage since the stage rested, for running another model over it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+REST_TOLERANCE = 5e-3
+"""Voltages that stay within this distance [V] count as held: the noise of a measured drive."""
+
+
+class VoltageHistory:
+    """Every sample of the last `duration`, averages over `slow_period` of what was before.
+
+    A stage that rests at the beginning of the stream needs no samples: the history begins where the drive leaves
+    `rest_voltage`.
+
+    Parameters
+    ----------
+    sample_period : float
+        Time between samples [s].
+    duration : float
+        Time kept in full [s]; up to half as much again before the oldest part is averaged.
+    slow_period : float
+        Averaging time of older samples [s].
+    slow_duration : float
+        Time kept as averages [s]; older ones are forgotten.
+    """
+
+    def __init__(
+        self,
+        sample_period: float,
+        duration: float = 60.0,
+        slow_period: float = 0.01,
+        slow_duration: float = 3600.0,
+    ) -> None:
+        self.sample_period = sample_period
+        self.factor = max(1, round(slow_period / sample_period))
+        """Samples averaged into a slow one."""
+        self.rest_voltage = 0.0
+        """Voltage [V] held before the first sample kept."""
+        self.count = 0
+        """Samples of the stream so far."""
+        self.travel = 0.0
+        """Way of the drive since the beginning of the stream [V]."""
+        self.has_rested = False
+        """True once a block of the drive stood still."""
+        self.began_in_motion = False
+        """True where the first block did not."""
+        self._has_moved = False
+        self._limit = self.factor * max(1, round(duration / sample_period / self.factor))
+        self._slow_limit = max(1, round(slow_duration / sample_period / self.factor))
+        self._full = np.empty(self.factor)
+        self._kept = 0
+        self._slow = np.empty(0)
+
+    @property
+    def start(self) -> int:
+        """Number of the first sample that is kept, averaged or in full."""
+        return self._full_start - self.factor * self._slow.size
+
+    @property
+    def last(self) -> float:
+        """Newest voltage [V]."""
+        return float(self._full[self._kept - 1]) if self._kept else self.rest_voltage
+
+    def append(self, voltage: Array) -> None:
+        """Add the next samples [V], shape (n,)."""
+        held = is_held(voltage)
+        if self.count == 0:
+            self.began_in_motion = not held
+            self.rest_voltage = float(np.median(voltage)) if held else float(voltage[0])
+        self.count += voltage.size
+        self.has_rested |= held
+        if not self._has_moved and held and np.abs(voltage - self.rest_voltage).max() <= REST_TOLERANCE:
+            return
+        self._has_moved = True
+        self.travel += float(np.abs(np.diff(voltage, prepend=self.last)).sum())
+        if self._kept + voltage.size > self._full.size:
+            grown = np.empty(2 * (self._kept + voltage.size))
+            grown[: self._kept] = self._full[: self._kept]
+            self._full = grown
+        self._full[self._kept : self._kept + voltage.size] = voltage
+        self._kept += voltage.size
+        if self._kept > 1.5 * self._limit:
+            self._average()
+
+    def read(self, position: int, values: int) -> tuple[int, Array]:
+        """Voltages from sample `position` of the stream on.
+
+        Parameters
+        ----------
+        position : int
+            Where the last `read` ended, or `start`.
+        values : int
+            Values wanted; of full ones as many more as make up whole averages, fewer at the end.
+
+        Returns
+        -------
+        factor : int
+            Samples of the stream that one value stands for: 1, or `factor` in the averaged part.
+        voltage : (m,) ndarray
+            Averaged or full values [V], never both; empty at the end of the stream.
+        """
+        if position < self._full_start:
+            first = (position - self.start) // self.factor
+            return self.factor, self._slow[first : first + values].copy()
+        first = position - self._full_start
+        whole = -(-values // self.factor) * self.factor
+        return 1, self._full[first : min(first + whole, self._kept)].copy()
+
+    @property
+    def _full_start(self) -> int:
+        return self.count - self._kept
+
+    def _average(self) -> None:
+        old = (self._kept - self._limit) // self.factor * self.factor
+        means = self._full[:old].reshape(-1, self.factor).mean(axis=1)
+        self._slow = np.concatenate((self._slow, means))
+        if self._slow.size > 1.5 * self._slow_limit:
+            self.rest_voltage = float(self._slow[-self._slow_limit - 1])
+            self._slow = self._slow[-self._slow_limit :]
+        self._full[: self._kept - old] = self._full[old : self._kept].copy()
+        self._kept -= old
+
+
+def is_held(voltage: Array) -> bool:
+    """True where a block of voltages [V] stays at one level."""
+    return bool(np.ptp(voltage) <= 2 * REST_TOLERANCE)

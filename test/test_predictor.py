@@ -1,0 +1,293 @@
+"""Online prediction is the batch simulation, whatever the stream does to the blocks and whenever the model changes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from piezo_hysteresis.effects import Arx, BoucWen, Offset
+from piezo_hysteresis.errors import DivergenceError, ModelError, RecordError
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.predictor import Prediction, Predictor
+
+Array = NDArray[np.float64]
+
+PERIOD = 2e-5
+ARX = Arx(a=[-0.8], b=[0.05], delay=3.0)
+MODEL = Model((BoucWen(), ARX), PERIOD, displacement_scale=1e-4)
+OTHER = Model((BoucWen(A=-0.5, beta=3.0, gamma=-1.0, p1=-0.1, p2=1.9), ARX), PERIOD, displacement_scale=1e-4)
+
+
+def sine(count: int, period: float = PERIOD, frequency: float = 50.0, rest: int = 0) -> Array:
+    wave = 3.5 - 3.5 * np.cos(2 * np.pi * frequency * period * np.arange(count))
+    return np.concatenate((np.zeros(rest), wave))
+
+
+def truth(model: Model, voltage: Array) -> Array:
+    return model.run(voltage, model.rest(voltage[0]))[0]
+
+
+def feed(
+    predictor: Predictor, voltage: Array, displacement: Array, size: int = 500, first: int = 0, stamp: int = 0
+) -> list[Prediction]:
+    """Consecutive blocks; `first` is the index of the first sample."""
+    return [
+        predictor.predict(
+            (first + i) % 2**32,
+            stamp + round(i * predictor.sample_period * 1e9),
+            voltage[i : i + size],
+            displacement[i : i + size],
+        )
+        for i in range(0, voltage.size, size)
+    ]
+
+
+def residual(answers: list[Prediction]) -> Array:
+    return np.concatenate([a.residual for a in answers])
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.integers(1, 700), st.integers(0, 900), st.integers(0, 2**32 - 1))
+def test_a_clean_stream_is_the_batch_simulation_bit_for_bit(size: int, rest: int, first: int) -> None:
+    voltage = sine(2000, rest=rest)
+    measured = truth(MODEL, voltage)
+    answers = feed(Predictor(PERIOD, MODEL), voltage, measured, size, first)
+    np.testing.assert_array_equal(np.concatenate([a.prediction for a in answers]), measured)
+    if rest >= size:
+        assert not any(a.warming_up for a in answers)
+
+
+def test_a_model_swapped_in_mid_sine_is_right_at_once() -> None:
+    """At the top of the sine a model that starts from rest there is wrong by percents, and stays so while held."""
+    count = 101_000  # half a period before the top, where the sine stops; longer than one piece of history
+    voltage = np.concatenate((sine(100_500, rest=1000), np.full(5000, 7.0)))
+    measured = truth(OTHER, voltage)
+    predictor = Predictor(PERIOD, MODEL)
+    before = feed(predictor, voltage[:count], measured[:count])
+    predictor.swap(OTHER)
+    assert predictor.is_swapping
+    assert predictor.model is MODEL
+    after = feed(predictor, voltage[count:], measured[count:], first=count, stamp=round(count * PERIOD * 1e9))
+    swapped = [a for a in after if a.model is OTHER]
+    assert 0 < len(after) - len(swapped) < 4
+    np.testing.assert_allclose(residual(swapped), 0.0, atol=1e-18)
+
+    stroke = np.ptp(measured)
+    top = voltage[101_500:]
+    cold, _ = OTHER.run(top, OTHER.rest(top[0]))
+    assert np.abs(cold - measured[101_500:])[100:].min() > 0.05 * stroke
+    assert np.abs(residual(before)[20_000:]).max() > 0.01 * stroke
+
+
+def test_a_swap_near_the_beginning_is_immediate() -> None:
+    voltage = sine(3000, rest=1000)
+    measured = truth(OTHER, voltage) - 7e-6
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage[:2000], measured[:2000])
+    predictor.swap(OTHER)
+    assert predictor.model is OTHER
+    after = feed(predictor, voltage[2000:], measured[2000:], first=2000, stamp=40_000_000)
+    np.testing.assert_allclose(residual(after), 0.0, atol=1e-18)
+
+
+def test_the_first_model_may_come_late() -> None:
+    voltage = sine(5000, rest=1000)
+    measured = truth(MODEL, voltage) + 3e-6
+    predictor = Predictor(PERIOD)
+    assert all(a.model is None and a.residual.size == 0 for a in feed(predictor, voltage[:3000], measured[:3000]))
+    predictor.swap(MODEL)
+    late = feed(predictor, voltage[3000:], measured[3000:], first=3000, stamp=60_000_000)
+    np.testing.assert_allclose(residual(late), 0.0, atol=1e-18)
+    assert predictor.offset == pytest.approx(3e-6, rel=1e-9)
+
+
+def test_history_older_than_a_minute_is_averaged_and_still_good() -> None:
+    period = 1e-3
+    slow = [Model((m["bouc_wen"], Arx(a=[-0.5], b=[0.5])), period) for m in (MODEL, OTHER)]
+    voltage = np.concatenate((sine(150_000, period, 0.3, rest=100), np.full(30_000, 4.0)))
+    measured = truth(slow[1], voltage)
+    predictor = Predictor(period, slow[0])
+    feed(predictor, voltage, measured, 2000)
+    predictor.swap(slow[1])
+    tail = np.full(200_000, 4.0) + 0.01 * np.sin(np.arange(200_000) / 50)
+    final = truth(slow[1], np.concatenate((voltage, tail)))[voltage.size :]
+    after = feed(predictor, tail, final, 2000, voltage.size, round(voltage.size * period * 1e9))
+    assert after[-1].model is slow[1]
+    errors = residual([a for a in after if a.model is slow[1]])
+    assert np.abs(errors).max() < 1e-3 * np.ptp(measured)
+
+
+def test_lost_blocks_are_bridged_by_holding_the_voltage() -> None:
+    voltage, first = sine(6000), 2**32 - 2000
+    held = voltage.copy()
+    held[2500:4000] = voltage[2499]
+    measured = truth(MODEL, held)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage[:2500], measured[:2500], first=first)
+    after = feed(predictor, voltage[4000:], measured[4000:], first=first + 4000, stamp=80_000_000)
+    np.testing.assert_allclose(residual(after), 0.0, atol=1e-18)
+    counts = predictor.continuity
+    assert (counts.received, counts.lost, counts.repeated, counts.restarts) == (4500, 1500, 0, 0)
+
+
+def test_samples_that_were_never_measured_are_not_lost() -> None:
+    voltage = sine(2000)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage[:500], voltage[:500])
+    predictor.predict(1500, 30_000_000, voltage[1500:], voltage[1500:], follows_gap=True)
+    assert predictor.continuity.lost == 0
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.lists(st.sampled_from(["pass", "lose", "double", "late"]), min_size=3, max_size=25), st.integers(0, 2**32 - 1)
+)
+def test_sent_is_received_plus_lost(fates: list[str], first: int) -> None:
+    """Whatever happens to the blocks, every sample counts once, and the prediction is that of the held voltage."""
+    size = 100
+    voltage = sine(size * len(fates))
+    predictor = Predictor(PERIOD, MODEL)
+    given_voltage, waiting, expected = voltage.copy(), None, 0
+
+    def send(block: int) -> Prediction:
+        cut = slice(block * size, (block + 1) * size)
+        return predictor.predict((first + block * size) % 2**32, block * 2_000_000, voltage[cut], voltage[cut])
+
+    for block, fate in enumerate(fates):
+        if fate == "lose" and 0 < block < len(fates) - 1:
+            held = given_voltage[block * size - 1]
+            given_voltage[block * size : (block + 1) * size] = held
+            waiting = block
+            continue
+        answer = send(block)
+        assert answer.prediction.size == size
+        expected += size
+        if fate == "double":
+            assert send(block).prediction.size == 0
+        if fate == "late" and waiting is not None:
+            again = send(waiting)
+            assert again.first == size
+            waiting = None
+    counts = predictor.continuity
+    assert counts.received == expected
+    assert counts.received + counts.lost == voltage.size
+    whole = truth(MODEL, given_voltage)
+    np.testing.assert_allclose(answer.prediction, whole[-size:] + predictor.offset, atol=1e-18)
+
+
+def test_a_block_that_overlaps_counts_from_its_first_new_sample() -> None:
+    voltage = sine(1000)
+    measured = truth(MODEL, voltage)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage[:600], measured[:600])
+    answer = predictor.predict(400, 8_000_000, voltage[400:], measured[400:])
+    assert answer.first == 200
+    np.testing.assert_array_equal(answer.prediction, measured[600:])
+
+
+@pytest.mark.parametrize("stamp", [90_000_000_000, -90_000_000_000])
+def test_a_driver_started_again_begins_a_new_stream(stamp: int) -> None:
+    """Also a bag that is played in a loop: index and stamps go back together."""
+    voltage = sine(60_000)
+    measured = truth(MODEL, voltage)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage, measured, first=70_000)
+    again = feed(predictor, voltage[:5000], measured[:5000] + 1e-6, first=10, stamp=stamp)
+    np.testing.assert_allclose(residual(again), 0.0, atol=1e-18)
+    assert predictor.continuity.restarts == 1
+
+
+def test_a_stream_joined_in_motion_is_flagged_until_the_loops_have_forgotten() -> None:
+    voltage = sine(20_000)
+    measured = truth(MODEL, voltage)
+    joined = 700
+    predictor = Predictor(PERIOD, MODEL)
+    answers = feed(predictor, voltage[joined:], measured[joined:], first=joined)
+    flags = [a.warming_up for a in answers]
+    assert flags[0]
+    assert flags == sorted(flags, reverse=True)
+    known = [a for a in answers if not a.warming_up]
+    assert len(known) > len(answers) / 2
+    assert np.abs(residual(known)).max() < 1e-3 * np.ptp(measured)
+    assert np.abs(residual(answers[:3])).max() > 1e-2 * np.ptp(measured)
+
+
+def test_the_offset_comes_from_the_first_rest_only() -> None:
+    """Ten noisy milliseconds per block average out; what moves later cannot shift the zero."""
+    random = np.random.default_rng(1)
+    voltage = sine(20_000, rest=4000)
+    measured = truth(MODEL, voltage) + 5e-6 + 1e-8 * random.standard_normal(voltage.size)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage[:4000], measured[:4000])
+    offset = predictor.offset
+    assert offset == pytest.approx(5e-6, abs=5 * 1e-8 / np.sqrt(4000))
+    drifted = measured + 1e-6
+    feed(predictor, voltage[4000:], drifted[4000:], first=4000, stamp=80_000_000)
+    assert predictor.offset == offset
+    assert predictor.residual_rms == pytest.approx(1e-6 * np.sqrt(20_000 / 24_000), rel=0.01)
+    predictor.zero()
+    assert predictor.residual_rms is None
+    end = voltage.size
+    feed(predictor, np.full(10_000, voltage[-1]), np.full(10_000, 2.0), first=end, stamp=round(end * PERIOD * 1e9))
+    assert predictor.residual_rms == pytest.approx(0.0, abs=1e-7)
+
+
+def test_residual_rms_is_that_of_the_last_second() -> None:
+    voltage = np.zeros(200_000)
+    measured = np.zeros(200_000)
+    measured[50_000:120_000:2] = 2e-8
+    measured[120_000::2], measured[120_001::2] = 1e-8, -1e-8
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage, measured)
+    assert predictor.residual_rms == pytest.approx(1e-8, rel=1e-6)
+
+
+def test_a_slower_stream_takes_the_slow_chain_and_a_faster_one_is_refused() -> None:
+    voltage = sine(2000, 5e-3, 1.0, rest=10)
+    expected, _ = MODEL.at(5e-3).run(voltage, MODEL.at(5e-3).rest(0.0))
+    answers = feed(Predictor(5e-3, MODEL), voltage, expected, 2)
+    np.testing.assert_allclose(residual(answers), 0.0, atol=1e-18)
+    fast = Predictor(1e-5)
+    with pytest.raises(ModelError, match="sample period"):
+        fast.swap(MODEL)
+
+
+def test_bad_blocks_are_told_and_count_as_lost() -> None:
+    voltage = sine(1500)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage[:500], voltage[:500])
+    broken = voltage[500:1000].copy()
+    broken[7] = np.nan
+    with pytest.raises(ModelError, match="sample 7 is not finite"):
+        predictor.predict(500, 10_000_000, broken, voltage[500:1000])
+    with pytest.raises(RecordError, match="got 3 samples, expected 500"):
+        predictor.predict(500, 10_000_000, voltage[500:1000], voltage[:3])
+    predictor.predict(1000, 20_000_000, voltage[1000:], voltage[1000:])
+    assert predictor.continuity.lost == 500
+
+
+def test_a_model_that_runs_away_is_dropped_and_the_next_one_works() -> None:
+    wild = Model((BoucWen(p2=1000.0), Arx(b=[1e6, 1e6, 1e6, 1e6])), PERIOD)
+    voltage = sine(1500, rest=500)
+    measured = truth(MODEL, voltage)
+    predictor = Predictor(PERIOD, wild)
+    feed(predictor, voltage[:500], measured[:500])
+    with pytest.raises(DivergenceError):
+        feed(predictor, voltage[500:1000], measured[500:1000], first=500, stamp=10_000_000)
+    assert predictor.model is None
+    predictor.swap(MODEL)
+    with pytest.raises(DivergenceError):
+        predictor.swap(wild)
+    assert predictor.model is MODEL
+    after = feed(predictor, voltage[1000:], measured[1000:], first=1000, stamp=20_000_000)
+    np.testing.assert_allclose(residual(after), 0.0, atol=1e-18)
+
+
+def test_a_constant_sensor_offset_in_the_model_changes_nothing() -> None:
+    voltage = sine(1000, rest=500)
+    measured = truth(MODEL, voltage)
+    answers = feed(Predictor(PERIOD, MODEL.with_effect(Offset(y0=1e-3))), voltage, measured)
+    np.testing.assert_allclose(residual(answers), 0.0, atol=1e-15)
