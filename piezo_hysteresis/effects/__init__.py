@@ -6,32 +6,52 @@ u → [timing] → [amplifier] → v → [backlash] → [input polynomial + h + 
 
 from __future__ import annotations
 
+from .amplifier_bandwidth import AmplifierBandwidth
+from .amplifier_saturation import AmplifierSaturation
+from .amplifier_slew_limit import AmplifierSlewLimit
 from .arx import Arx
 from .asymmetric_hysteresis import AsymmetricHysteresis
 from .axis_coupling import AxisCoupling
+from .backlash import Backlash
 from .bouc_wen import BoucWen
 from .creep import Creep
+from .creep_exponential import CreepExponential
 from .effect import Effect, Place, Setting, Term
+from .even_input_polynomial import EvenInputPolynomial
+from .extra_delay import ExtraDelay
 from .gain_drift import GainDrift
 from .hysteresis_exponent import HysteresisExponent
+from .hysteresis_memory import HysteresisMemory
 from .initial_state import InitialState
 from .mains_hum import MainsHum
 from .offset import Offset
 from .published_bouc_wen import PublishedBoucWen
 from .rate_dependent_hysteresis import RateDependentHysteresis
+from .sensor_bandwidth import SensorBandwidth
+from .sensor_nonlinearity import SensorNonlinearity
 from .thermal_drift import ThermalDrift
 from .thermal_expansion import ThermalExpansion
 
 CHAIN: tuple[type[Effect], ...] = (
+    AmplifierSaturation,
+    AmplifierSlewLimit,
+    AmplifierBandwidth,
+    Backlash,
     BoucWen,
     PublishedBoucWen,
     AsymmetricHysteresis,
     HysteresisExponent,
     RateDependentHysteresis,
     InitialState,
+    HysteresisMemory,
+    EvenInputPolynomial,
     Creep,
+    CreepExponential,
+    ExtraDelay,
     Arx,
+    SensorNonlinearity,
     GainDrift,
+    SensorBandwidth,
     ThermalDrift,
     ThermalExpansion,
     AxisCoupling,
@@ -53,20 +73,30 @@ __all__ = [
     "BY_NAME",
     "CATALOGUE",
     "CHAIN",
+    "AmplifierBandwidth",
+    "AmplifierSaturation",
+    "AmplifierSlewLimit",
     "Arx",
     "AsymmetricHysteresis",
     "AxisCoupling",
+    "Backlash",
     "BoucWen",
     "Creep",
+    "CreepExponential",
     "Effect",
+    "EvenInputPolynomial",
+    "ExtraDelay",
     "GainDrift",
     "HysteresisExponent",
+    "HysteresisMemory",
     "InitialState",
     "MainsHum",
     "Offset",
     "Place",
     "PublishedBoucWen",
     "RateDependentHysteresis",
+    "SensorBandwidth",
+    "SensorNonlinearity",
     "Setting",
     "Term",
     "ThermalDrift",

@@ -151,11 +151,25 @@ def advance_slopes(h, drive, length, r_same, r_flipped, out):
 
 
 @kernel
+def slope_at(h, p, s):
+    """∂h/∂v at the beginning of a motion in direction s."""
+    g = copysign(1.0, s if h == 0.0 else h)
+    loss = p[BETA] + p[GAMMA] * s * g
+    if p[EXPONENT] != 1.0:
+        loss *= abs(h / H_REFERENCE) ** (p[EXPONENT] - 1.0)
+    drive = p[A]
+    if p[RATE] != 0.0:
+        drive *= 1.0 + p[RATE] * rate_factor(0.0, p[RATE_EXPONENT])
+    return drive - s * (loss - p[PHI1] * s - p[PHI2] * g) * h
+
+
+@kernel
 def linearise_general(v, dv_in, p, own, sample_period, state, tangent, last_in, h_out, dh_out):
     """`run_general` with sensitivities.
 
     dv_in (m, n) are incoming rows; own (q,) the indices into `LOOP` of the wanted own rows; tangent (m + q,) holds ∂h,
-    last_in (m,) the incoming slopes of v_last; dh_out (m + q, n) is filled.
+    last_in (m,) the incoming slopes of v_last; dh_out (m + q, n) is filled. While v is held, a row that moves counts as
+    a motion in its own direction: the slope for a growing parameter.
     """
     m, q = dv_in.shape[0], own.size
     n, k = p[EXPONENT], p[RATE]
@@ -258,8 +272,13 @@ def linearise_general(v, dv_in, p, own, sample_period, state, tangent, last_in, 
             if powered and n == 1.0:
                 h = whole_step
             last = v[i]
+        else:
             for j in range(m):
-                last_in[j] = dv_in[j, i]
+                move = dv_in[j, i] - last_in[j]
+                if move != 0.0:
+                    tangent[j] += slope_at(h, p, copysign(1.0, move)) * move
+        for j in range(m):
+            last_in[j] = dv_in[j, i]
         h_out[i] = h
         for j in range(m + q):
             dh_out[j, i] = tangent[j]

@@ -80,9 +80,10 @@ def linearise_published(v, dv_in, p, n, state, tangent, last_in, h_out, dh_out):
         loss = beta * abs(dv) * h + gamma * dv * size
         sign = np.sign(h)
         keep = 1.0 - power * (beta * abs(dv) + gamma * dv * sign) * n
-        by_dv = a - power * (beta * np.sign(dv) * h + gamma * size)
         for j in range(m):
-            tangent[j] = keep * tangent[j] + by_dv * (dv_in[j, i] - last_in[j])
+            move = dv_in[j, i] - last_in[j]
+            direction = np.sign(dv if dv != 0.0 else move)
+            tangent[j] = keep * tangent[j] + (a - power * (beta * direction * h + gamma * size)) * move
             last_in[j] = dv_in[j, i]
         tangent[m] = keep * tangent[m] + dv
         tangent[m + 1] = keep * tangent[m + 1] - power * abs(dv) * h

@@ -1,0 +1,29 @@
+"""Bandwidth of the amplifier into the capacitance of the actuator."""
+
+from __future__ import annotations
+
+from ..parameter import Parameter
+from .block import Block
+from .effect import Effect, Place, Setting
+from .pole import PoleBlock
+
+
+class AmplifierBandwidth(Effect):
+    """One pole before the hysteresis.
+
+    Parameters
+    ----------
+    tau : float
+        Time constant R·C of output resistance and actuator capacitance [s].
+    """
+
+    name = "amplifier_bandwidth"
+    family = "lag"
+    place = Place.DRIVE
+    equation = "τ ẏ + y = x"
+    signature = "lag growing with frequency at every amplitude; below one sample not separable from the other lags"
+    source = "R·C of amplifier and actuator, 15–60 µs"
+    parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-2, "time constant R·C", "R·C", 0.0, 2e-5),)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return PoleBlock("amplifier_bandwidth.tau", self["tau"], 1, setting.sample_period)

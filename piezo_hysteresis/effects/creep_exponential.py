@@ -1,0 +1,86 @@
+"""Creep of a few definite time constants."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..parameter import Parameter
+from .block import Array, Block, State
+from .effect import Effect, Place, Setting
+from .linear_block import AddedBlock
+from .pole import PoleBlock
+
+
+class CreepExponential(Effect):
+    """Relaxations added to the response: the classical creep model of spring and damper pairs.
+
+    Parameters
+    ----------
+    c : sequence of float
+        Final share of each relaxation [1].
+    tau : sequence of float
+        Time constant of each [s]; as many as `c`.
+    """
+
+    name = "creep_exponential"
+    family = "creep"
+    place = Place.MATERIAL
+    equation = "Y/W = 1 + Σ_k c_k/(1 + τ_k s)"
+    signature = "grows after each change of level and ends after some τ, unlike logarithmic creep"
+    source = "Croft, Shed, Devasia 2001, Kelvin-Voigt creep"
+    parameters = (
+        Parameter("c", "c_k", "1", (0.0, 0.0), -0.2, 0.2, "final share of each relaxation", "Croft 2001", 0.0, 0.01),
+        Parameter("tau", "τ_k", "s", (0.3, 10.0), 1e-4, 1e5, "time constants", "Croft 2001", scale=1.0),
+    )
+
+    def check(self) -> None:
+        if self.array("c").size != self.array("tau").size:
+            raise ParameterError(
+                f"creep_exponential: got {self.array('c').size} shares c and {self.array('tau').size} time constants "
+                "tau, expected equally many"
+            )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        names = tuple(f"creep_exponential.{n}" for n in self.free_names())
+        return CreepExponentialBlock(names, self.array("c"), self.array("tau"), setting.sample_period)
+
+
+class CreepExponentialBlock(AddedBlock):
+    """x + Σ_k c_k x_k; the state holds last input and x_k for every k."""
+
+    keeps_state = True
+
+    def __init__(self, names: tuple[str, ...], c: Array, tau: Array, sample_period: float) -> None:
+        self.names, self.c = names, c
+        self.poles = tuple(PoleBlock("", float(t), 1, sample_period) for t in tau)
+        self.gain = float(c.sum())
+
+    def zeros(self, rows: int) -> Array:
+        return np.zeros((rows, 2 * self.c.size))
+
+    def _relaxed(self, x: Array, z: Array) -> tuple[list[Array], Array]:
+        parts = [p.filter(x, z[:, 2 * k : 2 * k + 2]) for k, p in enumerate(self.poles)]
+        return [x + y for y, _ in parts], np.hstack([s for _, s in parts]) if parts else z
+
+    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
+        relaxed, z = self._relaxed(x, z)
+        y = np.zeros(x.shape)
+        for c, part in zip(self.c, relaxed, strict=True):
+            y += c * part
+        return y, z
+
+    def gain_slopes(self) -> Array:
+        return np.repeat([1.0, 0.0], self.c.size)
+
+    def own_rest(self) -> State:
+        return np.zeros((self.c.size, 2))
+
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
+        relaxed, _ = self._relaxed(x[None, :], z[None, :])
+        by_tau, states = [], []
+        for k, pole in enumerate(self.poles):
+            row, state = pole.by_parameter(x, y, z[2 * k : 2 * k + 2], own[k])
+            by_tau.append(self.c[k] * row)
+            states.append(state)
+        return np.vstack((*relaxed, *by_tau)), np.array(states)

@@ -1,0 +1,122 @@
+"""Memory of turning points that one Bouc-Wen state cannot hold: plays beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..kernel import kernel
+from ..parameter import Parameter
+from .block import Array, Block, State
+from .effect import Effect, Place, Setting
+
+SPAN = 32.0
+"""Largest radius over the smallest."""
+
+
+class HysteresisMemory(Effect):
+    """Plays of several half widths added to the hysteresis output: a Prandtl-Ishlinskii operator.
+
+    Parameters
+    ----------
+    c : sequence of float
+        Weights of the plays, from the narrowest to the widest, any number of at least 2 [1].
+    reach : float
+        Half width of the widest play [normalised, 1]; half the range of the drive uses them all.
+
+    Notes
+    -----
+    The half widths are a geometric grid from ``reach``/32 to ``reach``. At rest every play is centred.
+    """
+
+    name = "hysteresis_memory"
+    family = "hysteresis"
+    place = Place.HYSTERESIS
+    equation = "w + Σ_j c_j p_j,  p_j = max(v − r_j, min(v + r_j, p_j before))"
+    signature = "errors in nested and decaying minor loops: return to the point where a loop was left"
+    source = "Prandtl-Ishlinskii operator; Gu et al. 2016"
+    parameters = (
+        Parameter("c", "c_j", "1", (0.0,) * 8, -10.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
+        Parameter("reach", "r_max", "1", 0.5, 1e-3, 10.0, "half width of the widest play", "Gu 2016", fixed=True),
+    )
+
+    def check(self) -> None:
+        if self.array("c").size < 2:
+            raise ParameterError(f"hysteresis_memory.c: got {self.array('c').size} plays, expected at least 2")
+
+    @property
+    def radii(self) -> Array:
+        """Half widths of the plays [normalised], shape (any,)."""
+        return self["reach"] * SPAN ** np.linspace(-1.0, 0.0, self.array("c").size)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        names = tuple(f"hysteresis_memory.c[{j}]" for j in range(self.array("c").size))
+        return HysteresisMemoryBlock(names, self.array("c"), self.radii)
+
+
+@kernel
+def run_plays(v, c, radii, plays, y):
+    """Σ c_j p_j to y (n,); plays (s,) is updated."""
+    for i in range(v.size):
+        total = 0.0
+        for j in range(radii.size):
+            plays[j] = max(v[i] - radii[j], min(v[i] + radii[j], plays[j]))
+            total += c[j] * plays[j]
+        y[i] = total
+
+
+@kernel
+def linearise_plays(v, dv, c, radii, plays, dplays, y, dy, own):
+    """`run_plays` with rows dv (m, n) to dy (m, n) and own (s, n) = p_j; plays (s,) and dplays (m, s) are updated."""
+    for i in range(v.size):
+        total = 0.0
+        for j in range(radii.size):
+            held, low, high = plays[j], v[i] - radii[j], v[i] + radii[j]
+            plays[j] = max(low, min(high, held))
+            if held <= low:
+                for r in range(dv.shape[0]):
+                    dplays[r, j] = dv[r, i] if held < low else max(dplays[r, j], dv[r, i])
+            elif held >= high:
+                for r in range(dv.shape[0]):
+                    dplays[r, j] = dv[r, i] if held > high else min(dplays[r, j], dv[r, i])
+            own[j, i] = plays[j]
+            total += c[j] * plays[j]
+        y[i] = total
+        for r in range(dv.shape[0]):
+            slope = 0.0
+            for j in range(radii.size):
+                slope += c[j] * dplays[r, j]
+            dy[r, i] = slope
+
+
+class HysteresisMemoryBlock(Block):
+    """Σ c_j play(v, r_j); state p (s,)."""
+
+    keeps_state = True
+
+    def __init__(self, names: tuple[str, ...], c: Array, radii: Array) -> None:
+        self.names, self.c, self.radii = names, c, radii
+
+    def static(self, x0: float) -> float:
+        return float(self.c.sum() * x0)
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return float(self.c.sum()), np.full(self.c.size, x0)
+
+    def rest(self, x0: float, time: float) -> State:
+        return np.full(self.c.size, x0)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        y, state = np.empty_like(x), state.copy()
+        run_plays(x, self.c, self.radii, state, y)
+        return y, state
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return np.repeat(dx0[:, None], self.c.size, axis=1)
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
+        rows = np.empty((len(dx) + self.c.size, x.size))
+        mapped, own = rows[: len(dx)], rows[len(dx) :]
+        linearise_plays(x, np.ascontiguousarray(dx), self.c, self.radii, state, tangent, y, mapped, own)
+        return y, rows, state, tangent

@@ -1,0 +1,50 @@
+"""`TapsBlock`: a delay as a few taps beside the direct path."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .block import Array, State
+from .linear_block import AddedBlock
+
+
+class TapsBlock(AddedBlock):
+    """y_i = Σ_k taps_k x_(i − first − k), with Σ taps = 1.
+
+    Parameters
+    ----------
+    name : str
+        Parameter that the taps depend on.
+    first : int
+        Whole samples before the first tap.
+    taps : (k,) ndarray
+        Weights.
+    slopes : (k,) ndarray
+        Their derivatives by the parameter.
+    """
+
+    def __init__(self, name: str, first: int, taps: Array, slopes: Array) -> None:
+        self.names = (name,)
+        self.added = np.concatenate((np.zeros(first), taps))
+        self.added[0] -= 1.0
+        self.slopes = np.concatenate((np.zeros(first), slopes))
+
+    def zeros(self, rows: int) -> Array:
+        return np.zeros((rows, self.added.size - 1))
+
+    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
+        return self._weighted(x, z, self.added)
+
+    def own_rest(self) -> State:
+        return None
+
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
+        return self._weighted(x[None, :], z[None, :], self.slopes)[0], None
+
+    def _weighted(self, x: Array, z: Array, weights: Array) -> tuple[Array, Array]:
+        past, n = np.concatenate((z, x), axis=1), x.shape[1]
+        y = np.zeros(x.shape)
+        for k in np.flatnonzero(weights):
+            start = z.shape[1] - k
+            y += weights[k] * past[:, start : start + n]
+        return y, past[:, n:].copy()
