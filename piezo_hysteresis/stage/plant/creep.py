@@ -33,7 +33,7 @@ class Creep(Group):
     gamma: float = quantity(0.0, "1/decade", -0.1, 0.1, "growth of the step response per decade at 0.1 s")
     slope: float = quantity(0.0, "1", -0.5, 0.5, "λ of the weights τ^λ; 0 for logarithmic creep")
     shortest_time: float = quantity(20e-6, "s", 1e-7, 0.01, "fastest element of the bank")
-    longest_time: float = quantity(1e4, "s", 1.0, 1e8, "slowest element of the bank")
+    longest_time: float = quantity(1e5, "s", 1.0, 1e8, "slowest element of the bank")
     times: tuple[float, ...] = quantity((), "s", 1e-6, 1e8, "exponential creep: relaxation times")
     weights: tuple[float, ...] = quantity((), "1", -1.0, 1.0, "exponential creep: final growth by each element")
 

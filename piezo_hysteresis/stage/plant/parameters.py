@@ -12,7 +12,7 @@ from .creep import Creep
 from .electronics import Electronics
 from .environment import Environment
 from .hysteresis import Hysteresis
-from .quantity import Group
+from .quantity import SOURCE, Group
 from .sensor import Sensor
 from .structure import Structure
 
@@ -24,6 +24,8 @@ _GROUPS: dict[str, type[Group]] = {
     "sensor": Sensor,
     "environment": Environment,
 }
+
+_SUB_STEP = Parameter("sub_step", "δ", "s", 5e-6, 1e-8, 1e-3, "longest internal step of the simulation", SOURCE)
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ class PlantParameters:
     sub_step: float = 5e-6
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sub_step", _SUB_STEP.check(self.sub_step))
         e = self.electronics
         if not -e.dac_range <= e.voltage_min < e.voltage_max <= e.dac_range:
             raise ParameterError(
@@ -83,7 +86,7 @@ class PlantParameters:
     def table(cls) -> tuple[Parameter, ...]:
         """Every quantity with its default, named ``part.quantity``, for ROS descriptors and documentation."""
         rows = (replace(row, name=f"{part}.{row.name}") for part, group in _GROUPS.items() for row in group.table())
-        return tuple(rows)
+        return (*rows, _SUB_STEP)
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> PlantParameters:
@@ -101,11 +104,8 @@ class PlantParameters:
         operator = flat.pop("hysteresis.operator", "bouc_wen")
         if operator not in ("bouc_wen", "prandtl_ishlinskii"):
             raise ParameterError(f"hysteresis.operator: got {operator!r}, expected bouc_wen or prandtl_ishlinskii")
-        sub_step = float(flat.pop("sub_step", cls.sub_step))
-        if not 1e-8 <= sub_step <= 1e-3:
-            raise ParameterError(f"sub_step: got {sub_step:g} s, expected 1e-08 to 0.001 s")
         hysteresis = Hysteresis() if operator == "bouc_wen" else Hysteresis.prandtl_ishlinskii()
-        return cls(hysteresis=hysteresis, sub_step=sub_step).with_values(flat)
+        return cls(hysteresis=hysteresis).with_values(flat)
 
     def with_values(self, values: Mapping[str, Any]) -> PlantParameters:
         """The same stage with some quantities changed, named ``part.quantity``.
@@ -116,22 +116,25 @@ class PlantParameters:
             On an unknown name or a value that is not acceptable.
         """
         changes: dict[str, dict[str, Any]] = {}
-        for name, value in _flatten(values).items():
+        flat = _flatten(values)
+        sub_step = flat.pop("sub_step", self.sub_step)
+        for name, value in flat.items():
             part, _, quantity = name.partition(".")
             known = {row.name for row in _GROUPS[part].table()} if part in _GROUPS else set()
             if quantity not in known:
                 expected = f"one of {', '.join(sorted(known))}" if known else f"a part of {', '.join(_GROUPS)}"
                 raise ParameterError(f"{name}: unknown quantity of the simulated stage, expected {expected}")
             changes.setdefault(part, {})[quantity] = value
-        return replace(self, **{part: replace(getattr(self, part), **new) for part, new in changes.items()})
+        parts = {part: replace(getattr(self, part), **new) for part, new in changes.items()}
+        return replace(self, sub_step=sub_step, **parts)
 
     def to_mapping(self) -> dict[str, Value]:
         """Every quantity by its dotted name; `from_mapping` gives back an equal stage."""
-        values: dict[str, Value] = {"sub_step": self.sub_step}
+        values: dict[str, Value] = {}
         for part, group in _GROUPS.items():
             for row in group.table():
                 values[f"{part}.{row.name}"] = getattr(getattr(self, part), row.name)
-        return values
+        return {**values, "sub_step": self.sub_step}
 
 
 def _flatten(mapping: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
