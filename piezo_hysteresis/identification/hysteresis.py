@@ -9,21 +9,27 @@ is linear in p1, p2, A and the offsets. So only (β, γ/β) are searched, on a g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ..effects import BoucWen, Setting
+from ..effects import Arx, BoucWen, PublishedBoucWen, Setting
 from ..errors import IdentificationError
+from ..model import Model
 from ..record import Record, Samples
+from .carried import select
+from .fit import Fit, fit
+from .normal_equations import Nuisance
 
 LOSSES = np.geomspace(0.3, 100.0, 14)
 """Grid of β times the range of v."""
 RATIOS = np.linspace(-0.9, 0.9, 7)
 """Grid of γ·sgn(A)/β; |γ| ≤ β keeps the loop bounded."""
+LOOP = ("A", "beta", "gamma", "p1", "p2")
+"""Numbers of the modified Bouc-Wen operator."""
 POINTS = 6000
 """About how many points of the data the search uses."""
 
@@ -53,27 +59,30 @@ class Loop:
     weight: float = 1.0
 
 
-def loop_of(
-    record: Record, gain: float, lag: float, voltage_scale: float, displacement_scale: float, weight: float = 1.0
-) -> Loop:
+def loop_of(record: Record, model: Model, weight: float = 1.0) -> Loop:
     """What the hysteresis did in a slow record: v = u/voltage_scale, w(t) = y(t + lag)/gain.
 
     Parameters
     ----------
     record : Record
         So slow that the dynamics are a gain and a lag, e.g. the 1 Hz triangle.
-    gain : float
-        Dc gain of G.
-    lag : float
-        Group delay of G, delay included [s]; the paper takes the delay d alone.
-    voltage_scale, displacement_scale : float
-        Scales of the model [V], [m].
+    model : Model
+        Its scales and its `Arx`, whose dc gain and group delay count; the paper takes K and d alone.
     weight : float
         Weight in the search.
     """
+    arx = model["arx"]
+    assert isinstance(arx, Arx)
     time = record.sample_period * np.arange(record.size)
-    y = np.interp(time + lag, time, record.displacement) / (displacement_scale * gain)
-    return Loop(record.voltage / voltage_scale, y, record.continues, record.settled_voltage / voltage_scale, weight)
+    y = np.interp(time + arx.group_delay * model.sample_period, time, record.displacement)
+    scale = model.voltage_scale
+    return Loop(
+        record.voltage / scale,
+        y / (model.displacement_scale * arx.dc_gain),
+        record.continues,
+        record.settled_voltage / scale,
+        weight,
+    )
 
 
 def _thinned(loop: Loop, points: int) -> Loop:
@@ -163,3 +172,32 @@ def start_hysteresis(loops: Sequence[Loop]) -> BoucWen:
     beta, ratio = float(np.exp(found.x[0])), float(found.x[1])
     p1, p2, a = (float(c) for c in search.solve(beta, ratio)[0])
     return BoucWen(A=a, beta=beta, gamma=beta * ratio * (-1.0 if a < 0.0 else 1.0), p1=p1, p2=p2)
+
+
+def fit_hysteresis(model: Model, records: Sequence[Record], loops: Collection[int]) -> Fit:
+    """Step 3: the numbers of the hysteresis, with the dynamics as they are and a free offset per record.
+
+    Parameters
+    ----------
+    model : Model
+        Scales, dynamics, and the form of the hysteresis; its values do not matter.
+    records : sequence of Record
+        The experiment, in order.
+    loops : collection of int
+        Indices of the slow records to fit; those they continue carry the state.
+
+    Returns
+    -------
+    Fit
+        Of A, β, γ, p1, p2, from all samples.
+    """
+    kept, floors = select(records, [1.0] * len(records), loops)
+    start = start_hysteresis([loop_of(r, model, float(np.isfinite(f))) for r, f in zip(kept, floors, strict=True)])
+    name = hysteresis_name(model)
+    model = model.with_values({f"{name}.{n}": float(v) for n, v in start.values.items()})  # type: ignore[arg-type]
+    return fit(model, kept, [f"{name}.{n}" for n in LOOP], floors=floors, nuisance=Nuisance(offset=True))
+
+
+def hysteresis_name(model: Model) -> str:
+    """Name of the Bouc-Wen operator in the chain: `bouc_wen`, or `published_bouc_wen` for the form of Eq. (7)."""
+    return PublishedBoucWen.name if PublishedBoucWen.name in model else BoucWen.name

@@ -1,0 +1,147 @@
+"""`Identification`: the model found, how sure it is, how well it does, and what was noticed on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects import Arx
+from ..model import Model
+from ..record import Notice, Samples
+from .comparison import Comparison
+from .delay import Delay
+from .dynamics import Dynamics, OrderError
+from .fit import Fit
+from .three_steps import ThreeSteps
+
+CORRELATED = 0.95
+"""Correlation from which two numbers are told to be hard to separate."""
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseError:
+    """Free-run error of one record, its own offset removed.
+
+    Parameters
+    ----------
+    phase : str
+        Phase name.
+    rms : float
+        RMS of measured minus simulated displacement [m].
+    percent : float
+        `rms` in per cent of the range of the experiment.
+    is_fitted : bool
+        False for data that were held out.
+    """
+
+    phase: str
+    rms: float
+    percent: float
+    is_fitted: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Identification:
+    """Outcome of `identify`.
+
+    Parameters
+    ----------
+    model : Model
+        The identified chain, sensor offset included.
+    fit : Fit
+        The joint fit, with covariance and bounds hit.
+    delay : Delay or None
+        Step 1; None where no step was recorded.
+    dynamics : Dynamics or None
+        ARX from w, the start of the joint fit; None where the data show a lag only.
+    published : ThreeSteps or None
+        What the three published steps alone reach; None where their phases are missing.
+    orders : tuple of OrderError
+        Error against order.
+    comparisons : tuple of Comparison
+        G from v and from w at each noise amplitude.
+    phases : tuple of PhaseError
+        Free-run error of every record.
+    notices : tuple of Notice
+        Warnings as data.
+    """
+
+    model: Model
+    fit: Fit
+    delay: Delay | None
+    dynamics: Dynamics | None
+    published: ThreeSteps | None
+    orders: tuple[OrderError, ...]
+    comparisons: tuple[Comparison, ...]
+    phases: tuple[PhaseError, ...]
+    notices: tuple[Notice, ...]
+
+    @property
+    def judged(self) -> tuple[PhaseError, ...]:
+        """Errors of the records held out, or of the fitted ones where none is."""
+        return tuple(p for p in self.phases if not p.is_fitted) or self.phases
+
+    @property
+    def free_run_error(self) -> float:
+        """RMS over the judged records, each counting the same [m]."""
+        return float(np.sqrt(np.mean([p.rms**2 for p in self.judged])))
+
+    @property
+    def free_run_percent(self) -> float:
+        """`free_run_error` in per cent of the range."""
+        return float(np.sqrt(np.mean([p.percent**2 for p in self.judged])))
+
+    @property
+    def correlated(self) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of hysteresis numbers whose estimates move together: names and correlation."""
+        names = [n for n in self.fit.names if not n.startswith("arx.")]
+        pairs = [(a, b, self.fit.correlation(a, b)) for i, a in enumerate(names) for b in names[:i]]
+        return tuple(pair for pair in pairs if abs(pair[2]) > CORRELATED)
+
+    def response(self, frequency: Samples) -> tuple[np.ndarray, Samples]:
+        """G at `frequency` [Hz] and its relative standard error, both of shape (k,).
+
+        The error is that of the complex value, carried over from the covariance of the coefficients; these alone mean
+        nothing, poles and zeros of a high order nearly cancel.
+        """
+        arx = self.model["arx"]
+        assert isinstance(arx, Arx)
+        period = self.model.sample_period
+        value = arx.response(frequency, period)
+        names = [n for n in self.fit.names if n.startswith("arx.")]
+        rows = [self.fit.names.index(n) for n in names]
+        z = np.exp(-2j * np.pi * np.asarray(frequency) * period)
+        a, b = np.concatenate(([1.0], arx.array("a"))), arx.array("b")
+        at_a, at_b = np.polyval(a[::-1], z), np.polyval(b[::-1], z)
+        slopes = []
+        for name in names:
+            if name == "arx.delay":
+                slopes.append(np.log(z))
+                continue
+            power = int(name[6:-1])
+            slopes.append(z**power / at_b if name[4] == "b" else -(z ** (power + 1)) / at_a)
+        relative = np.array(slopes).reshape(len(names), z.size)
+        covariance = self.fit.covariance[np.ix_(rows, rows)]
+        variance = np.einsum("ik,ij,jk->k", relative.conj(), covariance, relative).real
+        return value, np.sqrt(np.maximum(variance, 0.0))
+
+    def __str__(self) -> str:
+        arx = self.model["arx"]
+        assert isinstance(arx, Arx)
+        lines = []
+        if self.delay is not None:
+            lines.append(str(self.delay))
+        orders = f"na = {arx.array('a').size}, nb = {arx.array('b').size}, d = {arx['delay']:g}"
+        lag = arx.group_delay * self.model.sample_period
+        lines.append(f"G: {orders}, dc gain {arx.dc_gain:.5g} (fixed), lag {lag * 1e6:.4g} µs")
+        for name, value in self.fit.values.items():
+            if not name.startswith("arx.") or name == "arx.delay":
+                lines.append(f"{name:28s} {value:12.6g} ± {1.96 * self.fit.standard_errors[name]:.2g} (95 %)")
+        for phase in self.phases:
+            told = "" if phase.is_fitted else "  held out"
+            lines.append(f"{phase.phase:28s} {phase.percent:9.4f} % of range {phase.rms * 1e9:10.4g} nm{told}")
+        lines += [str(c) for c in self.comparisons]
+        lines += [f"{a} and {b} correlate by {c:.3f}" for a, b, c in self.correlated]
+        lines += [f"{n.kind}: {n.message}" for n in self.notices]
+        return "\n".join(lines)

@@ -1,0 +1,203 @@
+"""`identify`: from an experiment to a model, whatever was recorded.
+
+The published three steps give the start; then everything is fitted jointly in free run, the dynamics inside, with G(1)
+held as the gauge between hysteresis and dynamics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects import Arx, BoucWen, Effect, Offset
+from ..errors import IdentificationError
+from ..model import Model
+from ..record import Experiment, Notice
+from .carried import select
+from .comparison import Comparison, compare_inputs
+from .delay import Delay, identify_delay
+from .dynamics import Dynamics, OrderError, choose_order, compare_orders
+from .fit import Fit, fit
+from .hysteresis import LOOP, fit_hysteresis, hysteresis_name
+from .identification import Identification, PhaseError
+from .linear_start import delay_by_cost, dynamics_behind, fit_lag, hysteresis_signals, with_dynamics
+from .normal_equations import Nuisance, residuals
+from .roles import HELD_OUT, Roles, roles_of
+from .three_steps import ThreeSteps, three_steps
+
+Progress = Callable[[str, float], None]
+
+ADEQUATE = 3e-4
+"""Share of the range below which a residual does not decide: no lab needs better."""
+HIGHEST_ORDER = 10
+"""Highest order of the comparison."""
+
+
+def identify(
+    experiment: Experiment,
+    *,
+    voltage_scale: float | None = None,
+    displacement_scale: float | None = None,
+    gain: float = 1.0,
+    orders: tuple[int, int] | None = (8, 8),
+    hysteresis: type[Effect] = BoucWen,
+    held_out: Collection[str] = HELD_OUT,
+    progress: Progress | None = None,
+) -> Identification:
+    """Identify delay, linear dynamics and modified Bouc-Wen hysteresis from any mix of records.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Records of any kind and sample period; records that continue carry the state of the stage.
+    voltage_scale : float, optional
+        v = u / voltage_scale [V]; default the largest |u|.
+    displacement_scale : float, optional
+        Displacement at normalised output 1 [m]; default the range of the displacement.
+    gain : float
+        G(1), the gauge: w times this is the settled output.
+    orders : (int, int) or None
+        na and nb of the ARX; None chooses the lowest order that is as good as any.
+    hysteresis : type of Effect
+        `BoucWen`, or `PublishedBoucWen` for data that Eq. (7) made.
+    held_out : collection of str
+        Names of phases that are not fitted but judge the result.
+    progress : callable, optional
+        Called with a word and the fraction done.
+
+    Returns
+    -------
+    Identification
+        Model, uncertainties, errors per phase and notices.
+
+    Raises
+    ------
+    IdentificationError
+        If nothing in the experiment moves, or a fit cannot be started.
+
+    Notes
+    -----
+    Every record counts the same in the joint fit, its residual measured against the larger of its sensor noise and
+    0.03 % of the range.
+    """
+    tell = progress or (lambda word, fraction: None)
+    records = experiment.records
+    roles = roles_of(experiment, held_out)
+    if not any(roles.contents[i].span > 0.0 for i in roles.fitted):
+        raise IdentificationError("identify: the drive does not move in any record; expected loops, steps or noise")
+    reach = max(float(np.max(r.displacement)) for r in records) - min(float(np.min(r.displacement)) for r in records)
+    scale_v = voltage_scale or max(float(np.max(np.abs(r.voltage))) for r in records)
+    scale_y = displacement_scale or reach
+    floors = [max(c.noise, ADEQUATE * reach) for c in roles.contents]
+    period = experiment.fastest_period
+    notices: list[Notice] = list(experiment.notices)
+
+    tell("step 1: delay", 0.0)
+    delay = _delay(experiment, roles, notices)
+    dead = 1.0 if delay is None else max(1.0, delay.time / period)
+    published = _published(experiment, scale_v, scale_y, orders or (8, 8), hysteresis, notices)
+
+    tell("step 3: hysteresis", 0.1)
+    frame = Model((hysteresis(), Arx(a=(), b=(gain,), delay=dead)), period, scale_v, scale_y)
+    start = fit_hysteresis(frame, records, roles.loops).model
+    dynamics: Dynamics | None = None
+    table: tuple[OrderError, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
+    if roles.broadband:
+        tell("step 2: dynamics", 0.2)
+        signals = hysteresis_signals(start, records, roles.broadband)
+        if delay is None:
+            dead = delay_by_cost(signals, period, orders or (4, 4))
+            notices.append(Notice("delay_from_fit", f"no step recorded: delay of {dead} samples from the fit"))
+        table = compare_orders(signals, round(dead), period, HIGHEST_ORDER, iterations=0)
+        chosen = orders or (choose_order(table),) * 2
+        dynamics = dynamics_behind(start, records, roles.broadband, round(dead), chosen)
+        # The loops again, now behind the lag that the dynamics show.
+        start = fit_hysteresis(with_dynamics(start, dynamics.arx), records, roles.loops).model
+        dynamics = dynamics_behind(start, records, roles.broadband, round(dead), chosen)
+        start = with_dynamics(start, dynamics.arx)
+        notices += dynamics.notices
+        noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
+        comparisons, told = compare_inputs(start, records, noise, round(dead), chosen)
+        notices += told
+        tell("joint fit", 0.4)
+        joint = _joint(start, experiment, floors, roles, lambda word, part: tell(word, 0.4 + 0.5 * part))
+    else:
+        tell("joint fit", 0.4)
+        notices.append(
+            Notice(
+                "lag_only", "no record excites the dynamics: they are reported as a lag, dead time and at most a pole"
+            )
+        )
+        joint = fit_lag(start, records, floors, roles.fitted)
+    tell("free run", 0.95)
+    phases = _free_run(joint.model, experiment, roles, reach)
+    model = _with_offset(joint, experiment, phases)
+    if not joint.converged:
+        notices.append(Notice("not_converged", f"the joint fit stopped after {joint.iterations} linearisations"))
+    notices += [Notice("at_bound", f"{name} stopped at a bound of its table") for name in joint.at_bounds]
+    if not any(not p.is_fitted for p in phases):
+        notices.append(Notice("nothing_held_out", "all records were fitted: the errors are not those of a prediction"))
+    return Identification(
+        model, replace(joint, model=model), delay, dynamics, published, table, comparisons, phases, tuple(notices)
+    )
+
+
+def _delay(experiment: Experiment, roles: Roles, notices: list[Notice]) -> Delay | None:
+    fast = [experiment[i] for i in roles.fitted if experiment[i].sample_period < 1.001 * experiment.fastest_period]
+    steps = [r for r in fast if r.phase.split("_")[0] == "step"] or fast
+    try:
+        delay = identify_delay(steps)
+    except IdentificationError as error:
+        notices.append(Notice("no_step", str(error), "step"))
+        return None
+    notices += delay.notices
+    return delay
+
+
+def _published(
+    experiment: Experiment,
+    voltage_scale: float,
+    displacement_scale: float,
+    orders: tuple[int, int],
+    hysteresis: type[Effect],
+    notices: list[Notice],
+) -> ThreeSteps | None:
+    try:
+        return three_steps(
+            experiment.records,
+            voltage_scale=voltage_scale,
+            displacement_scale=displacement_scale,
+            orders=orders,
+            hysteresis=hysteresis,
+        )
+    except IdentificationError as error:
+        notices.append(Notice("no_three_steps", str(error)))
+        return None
+
+
+def _joint(start: Model, experiment: Experiment, floors: list[float], roles: Roles, progress: Progress) -> Fit:
+    kept, sizes = select(experiment.records, floors, roles.fitted)
+    arx, name = start["arx"], hysteresis_name(start)
+    free = [f"{name}.{n}" for n in LOOP] + [f"arx.{n}" for n in arx.free_names() if n != "delay"]
+    return fit(start, kept, free, floors=sizes, nuisance=Nuisance(offset=True), progress=progress)
+
+
+def _free_run(model: Model, experiment: Experiment, roles: Roles, reach: float) -> tuple[PhaseError, ...]:
+    errors = residuals(model, experiment.records, Nuisance(offset=True))
+    rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
+    return tuple(
+        PhaseError(experiment[i].phase, rms[i], 100.0 * rms[i] / reach, i in roles.fitted)
+        for i in (*roles.fitted, *roles.held_out)
+    )
+
+
+def _with_offset(joint: Fit, experiment: Experiment, phases: tuple[PhaseError, ...]) -> Model:
+    """The model with the mean sensor zero of its records, and where it comes from."""
+    kept = [n[0] for n, rms in zip(joint.nuisances, joint.rms, strict=True) if np.isfinite(rms)]
+    judged = [p for p in phases if not p.is_fitted] or list(phases)
+    error = float(np.sqrt(np.mean([p.rms**2 for p in judged])))
+    told = {"source": experiment.source, "free_run_error": f"{error:.6g}"}
+    return replace(joint.model.with_effect(Offset(y0=float(np.mean(kept)))), provenance=told)
