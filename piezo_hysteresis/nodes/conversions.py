@@ -165,7 +165,7 @@ def waveform_from_cloud(cloud: PointCloud2, sample_period: float) -> Samples:
         if off.max() > _PERIOD_TOLERANCE * sample_period:
             got = float(time[-1] - time[0]) / (time.size - 1)
             raise RecordError(
-                f"time: got {got:g} s between samples, {off.max():.3g} s off at worst, expected {sample_period:g} s"
+                f"time: got a period of {got:g} s ({off.max():.3g} s off at worst), expected {sample_period:g} s"
             )
     return voltage
 

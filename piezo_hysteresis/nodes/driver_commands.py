@@ -1,0 +1,89 @@
+"""`DriverCommands`: what others ask of the driver: `command`, `set_voltage`, `~/stop`."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from ..errors import PiezoError, StageError
+from .conversions import from_stamp, phase_name
+from .driver_diagnostics import DriverDiagnostics
+from .driver_session import DriverSession
+from .driver_topics import DriverTopics
+from .quality import COMMAND
+
+
+class DriverCommands:
+    """Passes commands to the attached stage, or refuses them whole; every refusal is told with its reason.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The driver.
+    diagnostics : DriverDiagnostics
+        Counts the refusals.
+    """
+
+    def __init__(self, node: Node, diagnostics: DriverDiagnostics) -> None:
+        self._node, self._diagnostics = node, diagnostics
+        self._attached: tuple[DriverSession, DriverTopics] | None = None
+        node.create_subscription(PointCloud2, "command", self._on_command, COMMAND)
+        node.create_subscription(Float64, "set_voltage", self._on_set_voltage, COMMAND)
+        node.create_service(Trigger, "~/stop", self._on_stop)
+
+    def attach(self, session: DriverSession, topics: DriverTopics) -> None:
+        """Pass commands to this stage from now on."""
+        self._attached = (session, topics)
+
+    def detach(self) -> None:
+        """Refuse every command from now on."""
+        self._attached = None
+
+    def _stage(self) -> tuple[DriverSession, DriverTopics]:
+        if self._attached is None:
+            raise StageError("the driver is not configured; configure and activate it")
+        return self._attached
+
+    def _now(self) -> int:
+        return int(self._node.get_clock().now().nanoseconds)
+
+    def _on_command(self, cloud: PointCloud2) -> None:
+        name, stamp = cloud.header.frame_id, from_stamp(cloud.header.stamp)
+        try:
+            session, topics = self._stage()
+            name = phase_name(name)
+            waveform = session.check.waveform(cloud, self._now())
+            phase = session.streaming.play(waveform, name, stamp, session.check.first_step, topics.accepted)
+        except PiezoError as error:
+            self._refuse(name, stamp, error)
+        else:
+            self._node.get_logger().info(f"playing {phase}: {waveform.size * session.sample_period:g} s")
+
+    def _on_set_voltage(self, message: Float64) -> None:
+        try:
+            session, _ = self._stage()
+            session.streaming.ramp_to(session.check.set_point(message.data))
+        except PiezoError as error:
+            self._refuse("set_voltage", 0, error)
+
+    def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = True
+        try:
+            session, topics = self._stage()
+            phase, was_playing = session.streaming.stop()
+        except StageError as error:
+            response.message = f"{error}; it was left at its safe voltage"
+            return response
+        if not was_playing:
+            topics.stopped(phase)
+        response.message = f"on the way to the safe voltage, {session.limits.safe_voltage:g} V"
+        self._node.get_logger().info(f"stopped {phase}: {response.message}")
+        return response
+
+    def _refuse(self, name: str, stamp: int, reason: PiezoError) -> None:
+        self._diagnostics.refused += 1
+        self._node.get_logger().warning(f"refused '{name}': {reason}")
+        if self._attached is not None:
+            self._attached[1].refused(name, stamp, str(reason))

@@ -1,0 +1,242 @@
+"""`Playback`: what the driver applies next, sample by sample: hold, ramp or waveform. No ROS."""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import StageError
+
+Samples = NDArray[np.float64]
+
+_ENDLESS = 1 << 62
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """A numbered stretch of the stream: the label of its samples.
+
+    Parameters
+    ----------
+    number : int
+        Counts up from 0 while the driver is active.
+    name : str
+        Phase name.
+    commanded : bool
+        True where a waveform opened it.
+    stamp : int
+        Stamp of that command [ns].
+    """
+
+    number: int
+    name: str
+    commanded: bool = False
+    stamp: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.number} {self.name}"
+
+
+class Happening(Enum):
+    """What can happen to a phase within a block."""
+
+    BEGAN = "began"
+    DONE = "done"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A phase began, was played to its end, or was stopped, before sample `offset` of the block."""
+
+    offset: int
+    happening: Happening
+    phase: Phase
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Drive:
+    """The next samples to apply.
+
+    Parameters
+    ----------
+    voltage : (n,) ndarray of float64
+        Drive voltage [V].
+    phase : (n,) ndarray of uint32
+        Number of the phase of every sample.
+    events : tuple of Event
+        In order.
+    """
+
+    voltage: Samples
+    phase: NDArray[np.uint32]
+    events: tuple[Event, ...]
+
+
+class Playback:
+    """Present voltage, phase, and the way on.
+
+    Parameters
+    ----------
+    voltage : float
+        Voltage in force [V].
+    safe_voltage : float
+        Where `stop` and the hold time-out lead [V].
+    sample_period : float
+        Time between samples [s].
+    ramp_rate : float
+        Rate of every ramp [V/s].
+    hold_timeout : float
+        Time after which a held voltage gives way to the safe one [s]; 0 holds for ever.
+
+    Notes
+    -----
+    Phase 0 is ``idle``. A waveform opens the next number; everything after it (held voltage, set-points, the way to the
+    safe voltage) is a phase ``hold``. Waveforms are not checked here: see `CommandCheck`.
+    """
+
+    def __init__(
+        self, voltage: float, safe_voltage: float, sample_period: float, ramp_rate: float, hold_timeout: float = 0.0
+    ) -> None:
+        self.voltage = float(voltage)
+        self.phase = Phase(0, "idle")
+        self._safe_voltage = float(safe_voltage)
+        self._step = ramp_rate * sample_period
+        self._hold_limit = math.ceil(hold_timeout / sample_period) if hold_timeout > 0 else _ENDLESS
+        self._held = 0
+        self._waveform: Samples | None = None
+        self._played = 0
+        self._target = self.voltage
+        self._stopping = False
+        self._events: list[tuple[Happening, Phase]] = [(Happening.BEGAN, self.phase)]
+
+    @property
+    def is_playing(self) -> bool:
+        """True while a waveform is played."""
+        return self._waveform is not None
+
+    @property
+    def is_stopping(self) -> bool:
+        """True on the way to the safe voltage after `stop`."""
+        return self._stopping
+
+    @property
+    def is_safe(self) -> bool:
+        """True at rest at the safe voltage."""
+        return not self.is_playing and self.voltage == self._target == self._safe_voltage
+
+    @property
+    def pending(self) -> int:
+        """Samples until the waveform or ramp under way ends; 0 while a voltage is held."""
+        if self._waveform is not None:
+            return self._waveform.size - self._played
+        return math.ceil(abs(self._target - self.voltage) / self._step - 1e-9)
+
+    def play(self, waveform: Samples, name: str, stamp: int = 0) -> Phase:
+        """Open the next phase with a waveform [V], from the next sample on.
+
+        Raises
+        ------
+        StageError
+            While another one is played, or the stage is on its way to the safe voltage.
+        """
+        self.require_free(name)
+        self._waveform, self._played = waveform, 0
+        return self._begin(name, True, stamp)
+
+    def ramp_to(self, voltage: float) -> None:
+        """Go to a voltage [V] at the ramp rate and hold it; StageError as for `play`."""
+        self.require_free("set_voltage")
+        self._hold()
+        self._target = float(voltage)
+
+    def stop(self) -> Phase:
+        """Leave what is played and go to the safe voltage; harmless when repeated. Returns the phase that ended."""
+        stopped = self.phase
+        if self.is_playing:
+            self._waveform = None
+            self._events.append((Happening.STOPPED, stopped))
+        self._hold()
+        self._target, self._stopping = self._safe_voltage, True
+        return stopped
+
+    def jump(self, voltage: float) -> None:
+        """Take over the voltage [V] to which a device went by itself; it is held."""
+        if self.is_playing:
+            self._events.append((Happening.STOPPED, self.phase))
+        self._waveform, self._stopping = None, False
+        self.voltage = self._target = float(voltage)
+        self._hold()
+
+    def pass_unseen(self, count: int) -> None:
+        """Let `count` samples of a held voltage pass without being taken: they count for the hold time-out only."""
+        self._held = min(self._held + count, self._hold_limit - 1)
+
+    def preview(self, count: int) -> Drive:
+        """The next `count` samples without taking them: for a device that is given them ahead."""
+        twin = copy.copy(self)
+        twin._events = list(self._events)
+        return twin.take(count)
+
+    def take(self, count: int) -> Drive:
+        """The next `count` samples; they count as applied."""
+        voltage, phase = np.empty(count), np.empty(count, np.uint32)
+        events: list[Event] = []
+        at = 0
+        while at < count:
+            events += [Event(at, *event) for event in self._events]
+            self._events.clear()
+            number = self.phase.number
+            stretch = self._advance(count - at)
+            voltage[at : at + stretch.size] = stretch
+            phase[at : at + stretch.size] = number
+            at += stretch.size
+        events += [Event(count, *event) for event in self._events if event[0] is not Happening.BEGAN]
+        self._events = [event for event in self._events if event[0] is Happening.BEGAN]
+        return Drive(voltage, phase, tuple(events))
+
+    def _advance(self, count: int) -> Samples:
+        """Samples of what is under way, at least one and at most `count`, and what comes after them."""
+        if self._waveform is not None:
+            stretch = self._waveform[self._played : self._played + count]
+            self._played += stretch.size
+            self.voltage = float(stretch[-1])
+            if self._played == self._waveform.size:
+                self._waveform = None
+                self._events.append((Happening.DONE, self.phase))
+                self._hold()
+            return stretch
+        if self.pending:
+            steps = np.arange(1, min(count, self.pending) + 1)
+            ramp = self.voltage + math.copysign(self._step, self._target - self.voltage) * steps
+            stretch = np.clip(ramp, min(self.voltage, self._target), max(self.voltage, self._target))
+            self.voltage, self._held = float(stretch[-1]), 0
+            return stretch
+        self.voltage, self._stopping = self._target, False
+        stretch = np.full(min(count, self._hold_limit - self._held), self.voltage)
+        self._held += stretch.size
+        if self._held == self._hold_limit:
+            self._held, self._target = 0, self._safe_voltage
+        return stretch
+
+    def _hold(self) -> None:
+        self._target, self._held = self.voltage, 0
+        if self.phase.commanded or self.phase.number == 0:
+            self._begin("hold")
+
+    def _begin(self, name: str, commanded: bool = False, stamp: int = 0) -> Phase:
+        self.phase = Phase((self.phase.number + 1) % (1 << 32), name, commanded, stamp)
+        self._events.append((Happening.BEGAN, self.phase))
+        return self.phase
+
+    def require_free(self, name: str) -> None:
+        """StageError while a waveform is played, or on the way to the safe voltage."""
+        if self.is_playing:
+            raise StageError(f"{name}: '{self.phase.name}' is being played; wait for its end or stop it")
+        if self._stopping:
+            raise StageError(f"{name}: the stage is on its way to the safe voltage; wait until it is there")

@@ -1,0 +1,88 @@
+"""`run`: the life of a node process, from command line to exit code."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import rclpy
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+_BAD_START = (InvalidParameterTypeException, InvalidParameterValueException, rclpy_implementation.RCLError)
+
+AnyNode = TypeVar("AnyNode", bound=Node)
+
+
+def run(
+    make: Callable[[], AnyNode],
+    arguments: Sequence[str] | None = None,
+    *,
+    begin: Callable[[AnyNode], None] = lambda node: None,
+    end: Callable[[AnyNode], None] = lambda node: None,
+) -> int:
+    """Make a node and spin it until SIGINT or SIGTERM.
+
+    The handlers of rclpy would invalidate the context before anything can be done about it: here both signals only end
+    the spinning, further ones are ignored, and `end` still publishes and serves.
+
+    Parameters
+    ----------
+    make : callable
+        Makes the node.
+    arguments : sequence of str, optional
+        Command line; default that of the process.
+    begin : callable
+        Called once, before the node spins.
+    end : callable
+        Called once, when it has stopped spinning for whatever reason.
+
+    Returns
+    -------
+    int
+        0, or 2 where the node could not be made from its parameters; the reason is one line on stderr.
+    """
+    stop = _signalled()
+    try:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        node = make()
+    except _BAD_START as error:
+        sys.stderr.write(f"{' '.join(str(error).split())}\n")
+        rclpy.try_shutdown()
+        return 2
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        begin(node)
+        executor.spin_until_future_complete(stop)
+    finally:
+        try:
+            end(node)
+        finally:
+            rclpy.try_shutdown()
+    return 0
+
+
+def _signalled() -> Future:
+    """Done when the process is asked to end, at once even while the executor waits outside Python."""
+    stop = Future()
+    ours, theirs = socket.socketpair()
+    theirs.setblocking(False)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: None)
+    signal.set_wakeup_fd(theirs.fileno())
+
+    def wait() -> None:
+        ours.recv(1)
+        stop.set_result(theirs)
+
+    threading.Thread(target=wait, name="signals", daemon=True).start()
+    return stop

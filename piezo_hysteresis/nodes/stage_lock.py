@@ -1,0 +1,71 @@
+"""`StageLock`: one driver per stage on a machine; the kernel releases it when the process dies. No ROS."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TextIO
+
+from ..errors import StageError
+
+
+class StageLock:
+    """Locks on everything that only one driver may hold.
+
+    Parameters
+    ----------
+    holds : iterable of str
+        What is locked, in words: ``"device E-727 0123"``, ``"namespace /stage_x of domain 0"``.
+
+    Raises
+    ------
+    StageError
+        If another process holds one of them; none is kept then.
+    """
+
+    def __init__(self, holds: Iterable[str]) -> None:
+        self._files: list[TextIO] = []
+        for what in holds:
+            try:
+                self.add(what)
+            except StageError:
+                self.release()
+                raise
+
+    def add(self, what: str) -> None:
+        """Lock one more thing; StageError if another process holds it."""
+        self._files.append(_lock(what))
+
+    def release(self) -> None:
+        """Let others drive; harmless when repeated."""
+        for file in self._files:
+            file.close()
+        self._files.clear()
+
+
+def _lock(what: str) -> TextIO:
+    folder = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir())
+    path = folder / f"piezo_hysteresis_{hashlib.sha256(what.encode()).hexdigest()[:16]}.lock"
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    except OSError as error:
+        raise StageError(
+            f"{what}: cannot make the lock {path} ({error.strerror}); expected a writable folder"
+        ) from None
+    file = os.fdopen(descriptor, "r+", encoding="utf-8")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        holder = file.read(20).strip() or "unknown"
+        file.close()
+        raise StageError(
+            f"{what} is driven by process {holder} already; stop that driver or take another namespace"
+        ) from None
+    file.truncate(0)
+    file.write(f"{os.getpid()}\n")
+    file.flush()
+    return file

@@ -1,0 +1,65 @@
+"""A command is accepted whole or refused whole, with the reason in one line."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.errors import PiezoError, StageError
+from piezo_hysteresis.nodes.command_check import CommandCheck
+from piezo_hysteresis.nodes.conversions import command_to_cloud, to_stamp
+from piezo_hysteresis.stage.stage import Description
+
+NOW = 1_700_000_000_000_000_000
+LIMITS = Description("stage", True, 1e-6, 1.0, 0.0, 10.0, max_slew_rate=1000.0)
+CHECK = CommandCheck(LIMITS, 1e-3, 2.0)
+
+
+def cloud(voltage, period=1e-3, age=0.0):
+    return command_to_cloud(voltage, period, "step", to_stamp(NOW - round(age * 1e9)))
+
+
+def test_a_good_command_passes_unchanged():
+    wave = np.linspace(0, 10, 50)
+    assert np.array_equal(CHECK.waveform(cloud(wave, age=1.9), NOW), wave)
+
+
+@pytest.mark.parametrize(
+    ("voltage", "period", "age", "reason"),
+    [
+        ([0.0, 10.5], 1e-3, 0.0, "10.5 V"),
+        ([0.0, -0.1], 1e-3, 0.0, "-0.1 V"),
+        ([0.0, 1.1], 1e-3, 0.0, "V/s"),
+        ([0.0, np.nan], 1e-3, 0.0, "nan"),
+        ([0.0, np.inf], 1e-3, 0.0, "inf"),
+        ([], 1e-3, 0.0, "no points"),
+        ([0.0] * 9, 2e-3, 0.0, "period of 0.002 s"),
+        ([0.0] * 9, 1e-3, 2.1, "2.1 s old"),
+        ([0.0] * 9, 1e-3, -2.1, "2.1 s in the future"),
+    ],
+)
+def test_refusals(voltage, period, age, reason):
+    with pytest.raises(PiezoError, match=reason) as refusal:
+        CHECK.waveform(cloud(voltage, period, age), NOW)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_command_without_stamp_has_no_age():
+    assert CHECK.waveform(command_to_cloud([1.0], 1e-3, "step"), NOW).tolist() == [1.0]
+
+
+def test_first_step_counts_from_the_voltage_in_force():
+    CHECK.first_step(np.array([1.0, 9.0]), 0.0)
+    with pytest.raises(StageError, match="V/s"):
+        CHECK.first_step(np.array([1.1, 1.1]), 0.0)
+
+
+@pytest.mark.parametrize("voltage", [np.nan, np.inf, -0.01, 10.01])
+def test_set_points_outside_are_refused(voltage):
+    with pytest.raises(StageError, match="expected 0 to 10 V"):
+        CHECK.set_point(voltage)
+
+
+def test_a_replayed_stage_cannot_be_driven():
+    check = CommandCheck(Description("replay", True, 1.0, 1.0, 0.0, 1.0, ignores_drive=True), 1.0, 2.0)
+    for ask in (lambda: check.set_point(0.5), lambda: check.waveform(cloud([0.0], 1.0), NOW)):
+        with pytest.raises(StageError, match="cannot be driven"):
+            ask()

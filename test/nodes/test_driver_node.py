@@ -1,0 +1,251 @@
+"""The driver as a process: nothing is lost untold, nothing leaves the limits, and its end leaves the stage safe."""
+
+import signal
+
+import numpy as np
+import pytest
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from piezo_hysteresis.nodes.conversions import phase_from_text, values_of
+from piezo_hysteresis.record import Experiment, Record
+from piezo_hysteresis.recording import write
+
+pytestmark = pytest.mark.nodes
+
+PERIOD = 2e-5
+RAMP_RATE = 20.0
+IDEAL = {"simulated__electronics__dac_bits": 0.0, "ramp_rate": RAMP_RATE}
+"""Without a converter the voltages published are those applied, bit for bit."""
+
+
+def states(statuses, name):
+    return [values_of(status)["state"] for status in list(statuses) if status.name == name]
+
+
+def steepest(samples):
+    """Steepest change of the voltage between two samples [V/s]."""
+    assert samples.lost == 0
+    return np.abs(np.diff(samples.voltage)).max() / PERIOD
+
+
+def test_every_sample_of_a_command_arrives_or_is_told_lost(lab):
+    lab.driver(**IDEAL)
+    samples, statuses, phases = lab.streaming(), lab.statuses(), lab.phases()
+    wave = np.concatenate(([0.0], np.random.default_rng(1).uniform(0, 10, 50_000), [0.0]))
+    lab.send(wave, "noise")
+    lab.wait(lambda: states(statuses, "noise") == ["accepted", "playing", "done"], "the end of the command")
+    values = values_of(next(s for s in statuses if values_of(s)["state"] == "done"))
+    number, first = int(values["phase"]), int(values["first_index"])
+    lab.wait(lambda: samples.index[-1] > first + wave.size, "the samples after it")
+    assert samples.index[0] + samples.index.size + samples.lost == samples.index[-1] + 1
+    inside = samples.phase == number
+    assert np.array_equal(samples.voltage[inside], wave[samples.index[inside].astype(int) - first])
+    assert inside.sum() + samples.lost >= wave.size
+    assert [phase_from_text(p.data)[1] for p in phases][-2:] == ["noise", "hold"]
+
+
+def test_stamps_and_times_are_one_clock(lab):
+    lab.driver(**IDEAL)
+    samples = lab.streaming()
+    lab.wait(lambda: len(samples.blocks) > 100, "a second of blocks")
+    blocks = samples.blocks[:100]
+    start = np.array([b.stamp + round(b.time[0] * 1e9) for b in blocks])
+    expected = np.array([int(b.index[0]) for b in blocks]) * round(PERIOD * 1e9)
+    assert np.abs((start - start[0]) - (expected - expected[0])).max() <= 1
+    assert all(b.sample_period == pytest.approx(PERIOD, rel=1e-9) for b in blocks)
+
+
+def test_a_refused_command_plays_nothing(lab):
+    lab.driver(**IDEAL, max_slew_rate=1e5)
+    samples, statuses = lab.streaming(), lab.statuses()
+    refused = {
+        "too_high": ([0.0, 1.0, 10.1], PERIOD, 0.0, "expected 0 to 10 V"),
+        "too_low": ([0.0, -0.1], PERIOD, 0.0, "expected 0 to 10 V"),
+        "too_steep": ([0.0, 3.0, 0.0], PERIOD, 0.0, "V/s"),
+        "far_start": ([5.0, 5.0], PERIOD, 0.0, "V/s"),
+        "not_finite": ([0.0, np.nan, 0.0], PERIOD, 0.0, "finite"),
+        "other_period": ([0.0, 0.1, 0.0], 2 * PERIOD, 0.0, "period"),
+        "old": ([0.0, 0.1, 0.0], PERIOD, 3.0, "old"),
+        "empty": ([], PERIOD, 0.0, "no points"),
+    }
+    for name, (wave, period, age, _) in refused.items():
+        lab.send(wave, name, period, age=age)
+    lab.wait(lambda: {s.name for s in statuses} >= set(refused), "all refusals")
+    reasons = {s.name: s.message for s in statuses}
+    for name, (_, _, _, reason) in refused.items():
+        assert states(statuses, name) == ["refused"]
+        assert reason in reasons[name], reasons[name]
+    blocks = len(samples.blocks)
+    lab.wait(lambda: len(samples.blocks) > blocks + 10, "later blocks")
+    assert not samples.voltage.any()
+    assert not samples.phase.any()
+
+
+def test_a_second_command_is_refused_and_the_first_played_whole(lab):
+    lab.driver(**IDEAL)
+    samples, statuses = lab.streaming(), lab.statuses()
+    wave = np.linspace(0, 2, 20_000)
+    lab.send(wave, "first")
+    lab.send(np.zeros(10), "second")
+    lab.wait(lambda: "done" in states(statuses, "first"), "the first command")
+    assert states(statuses, "second") == ["refused"]
+    lab.wait(lambda: samples.phase[-1] == 2, "the hold after it")
+    assert np.array_equal(samples.of_phase(1), wave)
+
+
+def test_set_voltage_ramps_and_holds(lab):
+    lab.driver(**IDEAL)
+    samples, statuses, live = lab.streaming(), lab.statuses(), lab.listen(JointState, "live")
+    ask = lab.publisher(Float64, "set_voltage")
+    ask.publish(Float64(data=4.0))
+    lab.wait(lambda: samples.voltage[-1] == 4.0, "the set-point")
+    assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
+    for wrong in (10.5, -0.5, float("nan")):
+        ask.publish(Float64(data=wrong))
+    lab.wait(lambda: states(statuses, "set_voltage") == ["refused"] * 3, "three refusals")
+    assert samples.voltage.max() == 4.0
+    lab.wait(lambda: live and live[-1].position[0] == 4.0, "live values")
+    assert list(live[-1].name) == ["voltage", "displacement"]
+
+
+def test_hold_timeout_leads_to_the_safe_voltage(lab):
+    lab.driver(**IDEAL, hold_timeout=0.3)
+    samples = lab.streaming()
+    lab.send(np.linspace(0, 1, 1000), "step")
+    lab.wait(lambda: samples.phase[-1] == 2 and samples.voltage[-1] == 0.0, "the way back")
+    held = samples.of_phase(2)
+    assert (held == 1.0).sum() + 1 == pytest.approx(0.3 / PERIOD, abs=2)
+    assert steepest(samples) <= 1 / (999 * PERIOD) * (1 + 1e-6)
+
+
+def test_stop_ramps_a_playing_waveform_down(lab):
+    lab.driver(**IDEAL)
+    samples, statuses = lab.streaming(), lab.statuses()
+    lab.send(np.concatenate((np.linspace(0, 3, 10_000), np.full(500_000, 3.0))), "long")
+    lab.wait(lambda: samples.voltage[-1] == 3.0, "the top")
+    assert lab.call(Trigger, "driver_node/stop").success
+    lab.wait(lambda: samples.voltage[-1] == 0.0, "the safe voltage")
+    assert states(statuses, "long") == ["accepted", "playing", "stopped"]
+    assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
+    lab.send(np.zeros(10), "next")
+    lab.wait(lambda: "done" in states(statuses, "next"), "a later command")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_a_signal_ramps_to_the_safe_voltage(lab, number):
+    driver = lab.driver(**IDEAL)
+    samples = lab.streaming()
+    lab.send(np.concatenate((np.linspace(0, 4, 20_000), np.full(500_000, 4.0))), "long")
+    lab.wait(lambda: samples.voltage[-1] == 4.0, "the top")
+    driver.signal(number)
+    assert driver.wait() == 0, driver.output
+    lab.wait(lambda: samples.voltage[-1] == 0.0, "the safe voltage")
+    assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
+
+
+def test_deactivate_ramps_down_and_activate_streams_again(lab):
+    lab.driver(**IDEAL)
+    samples = lab.streaming()
+    lab.publisher(Float64, "set_voltage").publish(Float64(data=2.0))
+    lab.wait(lambda: samples.voltage[-1] == 2.0, "the set-point")
+    assert lab.transition("deactivate")
+    assert lab.state() == "inactive"
+    lab.wait(lambda: samples.voltage[-1] == 0.0, "the safe voltage")
+    assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
+    blocks = len(samples.blocks)
+    assert lab.transition("activate")
+    lab.wait(lambda: len(samples.blocks) > blocks + 5, "blocks again")
+
+
+@pytest.mark.parametrize("same_machine", [True, False])
+def test_a_second_driver_refuses_until_the_first_is_gone(lab, same_machine, tmp_path):
+    first = lab.driver(**IDEAL)
+    samples, told = lab.streaming(), lab.diagnostics()
+    other = tmp_path / "other_machine"
+    other.mkdir()
+    environment = {} if same_machine else {"XDG_RUNTIME_DIR": str(other)}
+    second = lab.driver("-r", "__node:=second", environment=environment, discovery_time=10.0, **IDEAL)
+    lab.wait(lambda: any(s.name == "second: stage" and s.level == b"\x02" for a in told for s in a.status), "an error")
+    assert ("is driven by process" if same_machine else "published by another driver") in second.output
+    assert lab.state("second") == "unconfigured"
+    assert samples.lost == 0
+    first.signal(signal.SIGINT)
+    assert first.wait() == 0
+    lab.wait(lambda: lab.node.count_publishers("samples") == 0, "the end of the first")
+    blocks = len(samples.blocks)
+    assert lab.call(
+        SetParametersAtomically, "second/set_parameters_atomically", _set(discovery_time=0.1)
+    ).result.successful
+    assert lab.transition("configure", "second")
+    assert lab.transition("activate", "second")
+    lab.wait(lambda: len(samples.blocks) > blocks, "blocks of the second")
+
+
+def _set(**values):
+    request = SetParametersAtomically.Request()
+    request.parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+    return request
+
+
+def test_a_failed_configure_tells_why_and_can_be_tried_again(lab):
+    driver = lab.driver(stage="replay")
+    told = lab.diagnostics()
+    lab.wait(lambda: any(s.level == b"\x02" for a in told for s in a.status), "an error")
+    assert "replay.experiment" in driver.output
+    assert lab.state() == "unconfigured"
+    assert lab.call(
+        SetParametersAtomically, "driver_node/set_parameters_atomically", _set(stage="simulated")
+    ).result.successful
+    assert lab.transition("configure")
+    answer = lab.call(SetParametersAtomically, "driver_node/set_parameters_atomically", _set(ramp_rate=1.0)).result
+    assert not answer.successful
+    assert "read at configure" in answer.reason
+    assert lab.transition("activate")
+    lab.streaming()
+
+
+def test_two_axes_do_not_meet(lab):
+    for axis in ("/stage_x", "/stage_y"):
+        lab.driver(namespace=axis, **IDEAL)
+    x, y = lab.streaming("/stage_x/samples"), lab.streaming("/stage_y/samples")
+    lab.publisher(Float64, "/stage_y/set_voltage").publish(Float64(data=1.0))
+    lab.wait(lambda: y.voltage[-1] == 1.0, "the set-point of y")
+    assert not x.voltage.any()
+
+
+def test_a_recording_is_replayed_sample_by_sample(lab, tmp_path):
+    rng = np.random.default_rng(2)
+    records = [
+        Record(rng.random(37), rng.random(37) * 1e-5, 5e-3, "rest"),
+        Record(rng.random(64), rng.random(64) * 1e-5, 5e-3, "triangle", start_time=37 * 5e-3),
+    ]
+    write(Experiment(tuple(records)), tmp_path / "experiment")
+    samples, phases = lab.samples(), lab.phases()
+    lab.driver(stage="replay", replay__experiment=str(tmp_path / "experiment"), replay__subscribers=1)
+    lab.wait(lambda: samples.blocks and samples.phase[-1] == 3, "the end of the recording")
+    assert samples.index[0] == 0
+    assert samples.lost == 0
+    for number, record in enumerate(records, 1):
+        inside = samples.phase == number
+        assert np.array_equal(samples.voltage[inside], record.voltage)
+        assert np.array_equal(samples.displacement[inside], record.displacement)
+    assert [p.data for p in phases][-3:] == ["1 rest", "2 triangle", "3 hold"]
+
+
+def test_a_stage_with_memory_plays_blocks_and_tells_the_dead_time(lab):
+    lab.driver(**IDEAL, simulated__memory=True, simulated__longest_block=10_000, simulated__dead_time=0.02)
+    samples, statuses = lab.streaming(), lab.statuses()
+    wave = np.sin(np.linspace(0, np.pi, 25_000)) * 5
+    lab.send(wave, "sine")
+    lab.wait(lambda: "done" in states(statuses, "sine"), "the end of the command")
+    lab.wait(lambda: samples.phase[-1] == 2, "the hold after it")
+    assert np.array_equal(samples.of_phase(1), wave)
+    played = [b for b in samples.blocks if b.phase[0] == 1]
+    assert [b.size for b in played] == [10_000, 10_000, 5_000]
+    assert all(b.follows_gap for b in played)
+    gaps = [int(b.index[0]) - int(a.index[-1]) - 1 for a, b in zip(samples.blocks, samples.blocks[1:], strict=False)]
+    assert all((gap > 0) == block.follows_gap for gap, block in zip(gaps, samples.blocks[1:], strict=True))

@@ -1,0 +1,43 @@
+"""One driver per stage; a lock ends with its process."""
+
+import subprocess
+import sys
+
+import pytest
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.nodes.stage_lock import StageLock
+
+HOLDER = """
+import sys
+from piezo_hysteresis.nodes.stage_lock import StageLock
+lock = StageLock(["device A"])
+print("held", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+
+def test_the_second_is_refused_until_the_first_releases():
+    first = StageLock(["device A", "namespace /x"])
+    with pytest.raises(StageError, match="namespace /x is driven by process"):
+        StageLock(["device B", "namespace /x"])
+    StageLock(["device B"]).release()
+    first.release()
+    first.release()
+    StageLock(["device A", "namespace /x"]).release()
+
+
+def test_a_killed_holder_holds_nothing():
+    holder = subprocess.Popen([sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    with holder:
+        assert holder.stdout.readline() == b"held\n"
+        with pytest.raises(StageError, match=f"process {holder.pid}"):
+            StageLock(["device A"])
+        holder.kill()
+        holder.wait()
+        StageLock(["device A"]).release()

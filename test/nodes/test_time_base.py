@@ -1,0 +1,53 @@
+"""Index, steady clock and stamp agree; only a jump of the node's clock moves the stamps."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from piezo_hysteresis.nodes.time_base import TimeBase
+
+START = 1_700_000_000_000_000_000
+
+
+def base(rate=1.0, period=2e-5):
+    time = TimeBase(period, rate)
+    time.anchor(100, 50.0, START)
+    return time
+
+
+@given(st.integers(0, 2**40))
+def test_stamps_count_samples_without_drift(n):
+    assert base().stamp(100 + n) - START == pytest.approx(n * 20_000, abs=1 + n * 20_000 * 1e-15)
+
+
+@given(st.integers(0, 10**9), st.floats(0.01, 100))
+def test_index_at_inverts_due(n, rate):
+    time = base(rate)
+    assert abs(time.index_at(time.due(100 + n)) - (100 + n)) <= 1
+
+
+def test_lateness_and_small_drift_move_nothing():
+    time = base()
+    assert time.follow(600, 50.0 + 0.3, START + 300_000_000) == 0.0
+    assert time.follow(600, 50.3, START + 300_000_000 + 900_000) == 0.0
+    assert time.stamp(600) == START + 500 * 20_000
+
+
+@pytest.mark.parametrize("jump", [0.002, -3600.0, 86400.0])
+def test_a_jump_of_the_clock_anchors_anew_once(jump):
+    time = base()
+    moved = round(jump * 1e9)
+    assert time.follow(600, 50.01, START + 10_000_000 + moved) == pytest.approx(jump)
+    assert time.stamp(600) == START + 500 * 20_000 + moved
+    assert time.follow(1100, 50.02, START + 20_000_000 + moved) == 0.0
+    assert time.due(1100) == pytest.approx(50.02)
+
+
+def test_postponing_moves_stamps_in_real_time_only():
+    time, fast = base(), base(rate=10.0)
+    for clock in (time, fast):
+        late = clock.due(600) + 2.0
+        assert clock.postpone(600, late) == pytest.approx(2.0)
+        assert clock.due(600) == pytest.approx(late)
+    assert time.stamp(600) == START + 10_000_000 + 2_000_000_000
+    assert fast.stamp(600) == START + 10_000_000
