@@ -19,6 +19,7 @@ from .creep_exponential import CreepExponential
 from .effect import Effect, Place, Setting, Term
 from .even_input_polynomial import EvenInputPolynomial
 from .extra_delay import ExtraDelay
+from .extra_resonance import ExtraResonance
 from .gain_drift import GainDrift
 from .hysteresis_exponent import HysteresisExponent
 from .hysteresis_memory import HysteresisMemory
@@ -49,6 +50,7 @@ CHAIN: tuple[type[Effect], ...] = (
     CreepExponential,
     ExtraDelay,
     Arx,
+    ExtraResonance,
     SensorNonlinearity,
     GainDrift,
     SensorBandwidth,
@@ -86,6 +88,7 @@ __all__ = [
     "Effect",
     "EvenInputPolynomial",
     "ExtraDelay",
+    "ExtraResonance",
     "GainDrift",
     "HysteresisExponent",
     "HysteresisMemory",

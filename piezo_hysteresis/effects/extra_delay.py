@@ -43,4 +43,4 @@ class ExtraDelay(Effect):
         else:
             first = max(0, int(samples) - 1)
             taps, slopes = lagrange(samples - first - 1.0)
-        return TapsBlock("extra_delay.tau", first, taps, slopes / setting.sample_period)
+        return TapsBlock(("extra_delay.tau",), first, taps, slopes[None, :] / setting.sample_period)

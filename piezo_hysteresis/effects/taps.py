@@ -13,21 +13,21 @@ class TapsBlock(AddedBlock):
 
     Parameters
     ----------
-    name : str
-        Parameter that the taps depend on.
+    names : tuple of str
+        Parameters that the taps depend on.
     first : int
         Whole samples before the first tap.
     taps : (k,) ndarray
         Weights.
-    slopes : (k,) ndarray
-        Their derivatives by the parameter.
+    slopes : (p, k) ndarray
+        Their derivatives by the parameters.
     """
 
-    def __init__(self, name: str, first: int, taps: Array, slopes: Array) -> None:
-        self.names = (name,)
+    def __init__(self, names: tuple[str, ...], first: int, taps: Array, slopes: Array) -> None:
+        self.names = names
         self.added = np.concatenate((np.zeros(first), taps))
         self.added[0] -= 1.0
-        self.slopes = np.concatenate((np.zeros(first), slopes))
+        self.slopes = np.pad(slopes, ((0, 0), (first, 0)))
 
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.added.size - 1))
@@ -39,7 +39,7 @@ class TapsBlock(AddedBlock):
         return None
 
     def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
-        return self._weighted(x[None, :], z[None, :], self.slopes)[0], None
+        return np.vstack([self._weighted(x[None, :], z[None, :], row)[0] for row in self.slopes]), None
 
     def _weighted(self, x: Array, z: Array, weights: Array) -> tuple[Array, Array]:
         past, n = np.concatenate((z, x), axis=1), x.shape[1]
