@@ -43,6 +43,7 @@ class Simulation:
             displacement_max=sensor.range - sensor.lsb,
         )
         self._sample_period = self._description.check_sample_period(sample_period)
+        Plant(self.parameters, self._sample_period).run(np.zeros(1))  # compiles the kernels before a clock runs
         self._plant = Plant(self.parameters, self._sample_period, seed, rest)
         self._closed = False
 

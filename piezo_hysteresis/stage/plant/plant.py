@@ -34,8 +34,8 @@ class Plant:
     """A simulated stage: parameters, and the physical state it is in.
 
     The chain is converter with hold → dead time → amplifier → backlash → hysteresis → creep → modes, softening → other
-    axis → sensor → drift, hum, noise → converter. Every part is advanced by its exact solution over sub-steps of at most
-    `PlantParameters.sub_step`, so results do not depend on how the drive is cut into blocks, bit for bit. What is
+    axis → sensor → drift, hum, noise → converter. Every part is advanced by its exact solution over sub-steps of at
+    most `PlantParameters.sub_step`, so results do not depend on how the drive is cut into blocks, bit for bit. What is
     neglected, the curvature of the hysteresis within a sub-step, is 5e-7 of the full stroke rms for a 2.5 V sine of
     400 Hz and at most 4e-4 during the first microseconds of a 5 V step; it falls with the square of the sub-step.
 

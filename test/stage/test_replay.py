@@ -1,0 +1,83 @@
+"""A replayed recording gives back its samples, whatever drive is asked for, and says so."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.record import Experiment, Record
+from piezo_hysteresis.stage.replay import ReplayStage
+from piezo_hysteresis.stage.stage import Stage, StreamingStage
+
+VOLTAGE = np.linspace(1.0, 6.0, 50)
+DISPLACEMENT = 5e-6 * VOLTAGE
+RECORDS = Record(VOLTAGE, DISPLACEMENT, 1e-3, "triangle").split(20)
+
+
+@given(st.lists(st.integers(1, 20), min_size=1, max_size=5))
+def test_blocks_of_any_size_give_the_recording_then_hold_its_last_sample(sizes):
+    stage = ReplayStage(RECORDS)
+    got = [stage.exchange(np.full(n, 99.0)) for n in sizes]
+    index = np.minimum(np.arange(sum(sizes)), 49)
+    np.testing.assert_array_equal(np.concatenate([g.voltage for g in got]), VOLTAGE[index])
+    np.testing.assert_array_equal(np.concatenate([g.displacement for g in got]), DISPLACEMENT[index])
+    assert stage.finished is (sum(sizes) >= 50)
+    assert stage.voltage == VOLTAGE[index[-1]]
+    assert stage.read_displacement() == DISPLACEMENT[index[-1]]
+
+
+def test_repetition_begins_again_after_the_last_sample():
+    stage = ReplayStage(RECORDS, repeat=True)
+    np.testing.assert_array_equal(stage.exchange(np.zeros(120)).voltage, np.tile(VOLTAGE, 3)[:120])
+    assert not stage.finished
+
+
+def test_the_description_says_what_it_is():
+    stage = ReplayStage(Experiment(RECORDS), name="picma")
+    promised = {n for part in (Stage, StreamingStage) for n in vars(part) if not n.startswith("_")}
+    assert promised <= set(dir(stage))
+    description = stage.description
+    assert (description.ignores_drive, description.streaming, description.measured_voltage) == (True, True, True)
+    assert (description.voltage_min, description.voltage_max, description.safe_voltage) == (1.0, 6.0, 1.0)
+    assert stage.sample_period == 1e-3
+    stage.configure(1e-3)
+    with pytest.raises(StageError, match="sample period"):
+        stage.configure(2e-3)
+
+
+def test_the_record_being_played_is_known():
+    stage = ReplayStage(RECORDS)
+    seen = []
+    while not stage.finished:
+        seen.append(stage.record.continues)
+        stage.exchange(np.zeros(10))
+    assert seen == [False, False, True, True, True]
+
+
+def test_driving_a_recording_changes_nothing():
+    stage = ReplayStage(RECORDS)
+    stage.exchange(np.zeros(5))
+    stage.set_voltage(3.3)
+    stage.safe()
+    assert stage.voltage == VOLTAGE[4]
+    stage.close()
+    with pytest.raises(StageError, match="closed"):
+        stage.exchange(np.zeros(1))
+
+
+def test_channels_are_replayed_where_every_record_has_them():
+    full = Record(VOLTAGE, DISPLACEMENT, 1e-3, other_displacement=2 * DISPLACEMENT, temperature=VOLTAGE + 290)
+    got = ReplayStage([full]).exchange(np.zeros(10))
+    np.testing.assert_array_equal(got.other_displacement, 2 * DISPLACEMENT[:10])
+    np.testing.assert_array_equal(got.temperature, VOLTAGE[:10] + 290)
+    assert ReplayStage([full, RECORDS[0]]).exchange(np.zeros(10)).temperature is None
+
+
+def test_recordings_that_cannot_be_replayed_in_one_go_are_refused():
+    with pytest.raises(StageError, match="no record"):
+        ReplayStage([])
+    with pytest.raises(StageError, match="one sample period"):
+        ReplayStage([RECORDS[0], Record([0.0], [0.0], 2e-3)])
+    with pytest.raises(StageError, match="at least one sample"):
+        ReplayStage(RECORDS).exchange(np.zeros(0))
