@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .chain import Chain, ChainState
+from .effects import BY_NAME, CHAIN
+from .errors import PiezoError
 from .model import Model
 from .sensor_zero import SensorZero
 from .voltage_history import VoltageHistory
@@ -99,3 +103,19 @@ class Warmup:
         last = max(first, min(y.size, -(-(self.zero.stop - position) // factor)))
         self._sum += factor * float(y[first:last].sum())
         self._weight += factor * (last - first)
+
+
+def compile_kernels() -> None:
+    """Run every effect once, switched on, fast and slow, so that no stream waits for a compiler.
+
+    An effect that does not stand alone with its host (softening needs a resonance) is compiled when it is first met.
+    """
+    for kind in CHAIN:
+        rows = [p for p in kind.parameters if p.off is not None and not p.is_array]
+        host = (BY_NAME[kind.host](),) if kind.host else ()
+        with suppress(PiezoError):
+            switched_on = kind(**{p.name: min(p.upper, p.off + 0.1 * p.scale) for p in rows if p.off is not None})
+            model = Model((switched_on, *host), 1e-3)
+            for period in (1e-3, 1e-2):
+                chain = model.at(period)
+                chain.run(np.linspace(0.0, 1.0, 8), chain.rest(0.0))

@@ -1,0 +1,118 @@
+"""`ModelDiagnostics`: the model node's line on /diagnostics, once a second."""
+
+from __future__ import annotations
+
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from ..model import Model
+from ..model_parameters import model_hash
+from ..predictor import Predictor
+from .conversions import SampleBlock, diagnostic
+
+
+class ModelDiagnostics:
+    """Publishes rate, losses, latency, and the residual against what the model file promises.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The model node; its full name stands before every status.
+    warn, error : float
+        Multiples of the model's free-run error.
+    """
+
+    def __init__(self, node: Node, warn: float, error: float) -> None:
+        self._node, self._warn, self._error = node, warn, error
+        self._name = f"{node.get_fully_qualified_name().lstrip('/')}: prediction"
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._problem = ""
+        self._problems = 0
+        self._stage = ""
+        self._model: Model | None = None
+        self._predictor: Predictor | None = None
+        self._promised: float | None = None
+        self._latency = 0.0
+        self._seen = (time.monotonic(), 0, 0, 0)
+        node.create_timer(1.0, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def problem(self, message: str) -> None:
+        """Tell one line of what went wrong, now and in the next report."""
+        if message != self._problem:
+            self._node.get_logger().warning(message)
+        self._problem = message
+        self._problems += 1
+
+    def model(self, model: Model) -> None:
+        """Tell the model that is followed from now on."""
+        self._model = model
+        try:
+            self._promised = float(model.provenance["free_run_error"])
+        except (KeyError, ValueError):
+            self._promised = None
+        self._node.get_logger().info(f"model {model_hash(model)}: {', '.join(e.name for e in model.effects)}")
+
+    def follow(self, predictor: Predictor) -> None:
+        """Tell the figures of a predictor from now on."""
+        self._predictor = predictor
+        self._seen = (time.monotonic(), 0, 0, 0)
+
+    def saw(self, block: SampleBlock, now: int) -> None:
+        """Note the age of a block that has been dealt with at `now` [ns]."""
+        self._stage = block.stage
+        self._latency = max(self._latency, (now - block.stamp) * 1e-9 - float(block.time[-1]))
+
+    def _publish(self) -> None:
+        values: dict[str, object] = {"problems": self._problems}
+        if self._model is not None:
+            values["model"] = model_hash(self._model)
+        predictor, received = self._predictor, False
+        lost = repeated = 0
+        if predictor is not None:
+            counts, now = predictor.continuity, time.monotonic()
+            then, received_then, lost_then, repeated_then = self._seen
+            self._seen = (now, counts.received, counts.lost, counts.repeated)
+            received = counts.received > received_then
+            lost, repeated = counts.lost - lost_then, counts.repeated - repeated_then
+            rms = predictor.residual_rms
+            values |= {
+                "rate": (counts.received - received_then) / (now - then) if now > then else 0.0,
+                "received": counts.received,
+                "lost": counts.lost,
+                "repeated": counts.repeated,
+                "restarts": counts.restarts,
+                "latency_max": self._latency,
+                "offset": predictor.offset,
+                "warming_up": predictor.warming_up,
+                "swapping": predictor.is_swapping,
+                **({} if rms is None else {"residual_rms": rms}),
+                **({} if self._promised is None else {"free_run_error": self._promised}),
+            }
+        level, message = self._state(received, lost, repeated)
+        self._problem, self._latency = "", 0.0
+        array = DiagnosticArray(status=[diagnostic(level, self._name, message, self._stage, **values)])
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(array)
+
+    def _state(self, received: bool, lost: int, repeated: int) -> tuple[bytes, str]:
+        predictor, promised = self._predictor, self._promised
+        if self._problem:
+            return DiagnosticStatus.ERROR, self._problem
+        if not received or predictor is None:
+            return DiagnosticStatus.STALE, "no samples"
+        if predictor.model is None:
+            return DiagnosticStatus.WARN, "no model: give model_file, or identify the stage"
+        rms = predictor.residual_rms
+        if predictor.warming_up:
+            return DiagnosticStatus.WARN, "warming up: joined in motion, the state before is unknown"
+        if rms is not None and promised is not None and rms > self._warn * promised:
+            level = DiagnosticStatus.ERROR if rms > self._error * promised else DiagnosticStatus.WARN
+            return level, f"residual {rms / promised:.3g} times the model's free-run error"
+        if lost:
+            return DiagnosticStatus.WARN, f"{lost} samples lost, bridged by holding the voltage"
+        if repeated:
+            return DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late, dropped"
+        return DiagnosticStatus.OK, "predicting"
