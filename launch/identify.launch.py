@@ -1,0 +1,36 @@
+"""One axis with everything that identification needs: driver, model node and identification node."""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchContext, LaunchDescription
+from launch.actions import IncludeLaunchDescription, OpaqueFunction
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+
+def generate_launch_description() -> LaunchDescription:
+    stage = Path(__file__).with_name("stage.launch.py")  # declares the arguments
+    included = IncludeLaunchDescription(PythonLaunchDescriptionSource(str(stage)))
+    return LaunchDescription([included, OpaqueFunction(function=identification)])
+
+
+def identification(context: LaunchContext) -> list[Node]:
+    namespace, file, sim_time = (
+        LaunchConfiguration(name).perform(context) for name in ("namespace", "params_file", "use_sim_time")
+    )
+    config = Path(get_package_share_directory("piezo_hysteresis")) / "config"
+    node = Node(
+        package="piezo_hysteresis",
+        executable="identification_node",
+        namespace=namespace,
+        parameters=[
+            str(config / "identification.yaml"),
+            *([file] if file else []),
+            {"use_sim_time": sim_time == "true"},
+        ],
+        output="screen",
+        sigterm_timeout="30",  # it leaves the stage safe and the recording readable
+    )
+    return [node]

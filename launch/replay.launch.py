@@ -1,0 +1,57 @@
+"""A bag played into a model node of its own namespace: `samples`, `phase` and `model`, never `command`."""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction, RegisterEventHandler
+from launch.event_handlers import OnProcessExit
+from launch.events import Shutdown
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+ARGUMENTS = (
+    ("bag", None, "path of the bag"),
+    ("axis", "", "namespace of the axis in the bag, e.g. stage_x"),
+    ("rate", "1.0", "speed of playing"),
+    ("namespace", "replay", "namespace that the bag is played into; no driver may live there"),
+    ("params_file", "", "parameter file of the model node, read after the one in share/piezo_hysteresis/config"),
+    ("use_sim_time", "true", "the model node follows the clock of the bag"),
+    ("model_file", "", "model file; empty: the model in the bag"),
+)
+PLAYED = ("samples", "phase", "model")
+
+
+def generate_launch_description() -> LaunchDescription:
+    arguments = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
+    return LaunchDescription([*arguments, OpaqueFunction(function=actions)])
+
+
+def actions(context: LaunchContext) -> list[Action]:
+    value = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
+    config = Path(get_package_share_directory("piezo_hysteresis")) / "config"
+    played = [topic(value["axis"], name) for name in PLAYED]
+    renamed = [f"{old}:={topic(value['namespace'], name)}" for old, name in zip(played, PLAYED, strict=True)]
+    model = {"model_file": value["model_file"]} if value["model_file"] else {}
+    model_node = Node(
+        package="piezo_hysteresis",
+        executable="model_node",
+        namespace=value["namespace"],
+        parameters=[
+            str(config / "model.yaml"),
+            *([value["params_file"]] if value["params_file"] else []),
+            {"use_sim_time": value["use_sim_time"] == "true", **model},
+        ],
+        output="screen",
+    )
+    player = ExecuteProcess(
+        cmd=["ros2", "bag", "play", value["bag"], "--clock", "100", "--rate", value["rate"]]
+        + ["--topics", *played, "--remap", *renamed],
+        output="screen",
+    )
+    end = RegisterEventHandler(OnProcessExit(target_action=player, on_exit=[EmitEvent(event=Shutdown())]))
+    return [model_node, player, end]
+
+
+def topic(namespace: str, name: str) -> str:
+    return f"/{namespace.strip('/')}/{name}".replace("//", "/")
