@@ -30,6 +30,7 @@ from .published_bouc_wen import PublishedBoucWen
 from .rate_dependent_hysteresis import RateDependentHysteresis
 from .sensor_bandwidth import SensorBandwidth
 from .sensor_nonlinearity import SensorNonlinearity
+from .softening import Softening
 from .thermal_drift import ThermalDrift
 from .thermal_expansion import ThermalExpansion
 
@@ -50,6 +51,7 @@ CHAIN: tuple[type[Effect], ...] = (
     CreepExponential,
     ExtraDelay,
     Arx,
+    Softening,
     ExtraResonance,
     SensorNonlinearity,
     GainDrift,
@@ -101,6 +103,7 @@ __all__ = [
     "SensorBandwidth",
     "SensorNonlinearity",
     "Setting",
+    "Softening",
     "Term",
     "ThermalDrift",
     "ThermalExpansion",

@@ -131,3 +131,53 @@ class SumBlock(Block):
             states.append(s)
             tangents.append(t)
         return y, np.vstack((mapped, *mine)), tuple(states), tuple(tangents)
+
+
+class SeriesBlock(Block):
+    """Blocks one after the other."""
+
+    def __init__(self, members: tuple[Block, ...]) -> None:
+        self.members = members
+        self.names = tuple(name for member in members for name in member.names)
+
+    def static(self, x0: float) -> float:
+        for member in self.members:
+            x0 = member.static(x0)
+        return x0
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        whole, rows = 1.0, np.empty(0)
+        for member in self.members:
+            slope, own = member.static_slopes(x0)
+            whole, rows, x0 = slope * whole, np.concatenate((slope * rows, own)), member.static(x0)
+        return whole, rows
+
+    def rest(self, x0: float, time: float) -> State:
+        states = []
+        for member in self.members:
+            states.append(member.rest(x0, time))
+            x0 = member.static(x0)
+        return tuple(states)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        states = []
+        for member, s in zip(self.members, state, strict=True):
+            x, s = member.run(x, s)
+            states.append(s)
+        return x, tuple(states)
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        tangents = []
+        for member in self.members:
+            tangents.append(member.rest_tangent(x0, dx0))
+            slope, own = member.static_slopes(x0)
+            x0, dx0 = member.static(x0), np.concatenate((slope * dx0, own))
+        return tuple(tangents)
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        states, tangents = [], []
+        for member, s, t in zip(self.members, state, tangent, strict=True):
+            x, dx, s, t = member.linearise(x, dx, s, t)
+            states.append(s)
+            tangents.append(t)
+        return x, dx, tuple(states), tuple(tangents)

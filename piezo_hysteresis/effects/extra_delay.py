@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..parameter import Parameter
-from .arx import lagrange
+from .arx_block import lagrange
 from .block import Block
 from .effect import Effect, Place, Setting
 from .taps import TapsBlock

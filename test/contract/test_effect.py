@@ -21,6 +21,7 @@ from piezo_hysteresis.effects import (
     Effect,
     Offset,
     PublishedBoucWen,
+    Softening,
     ThermalDrift,
 )
 from piezo_hysteresis.effects.time_block import TimeBlock
@@ -34,6 +35,9 @@ UNUSUAL = {
     "amplifier_saturation": {"lower": 1.4, "upper": 4.4},
 }
 """Sizes of effects that are not off at a finite small value."""
+
+MAY_DIVERGE = (PublishedBoucWen, Softening)
+"""At their bounds the explicit step is unstable, and the stiffness vanishes under the drive; both are told."""
 
 
 def typical(kind: type[Effect]) -> Effect:
@@ -213,7 +217,7 @@ def test_finite_at_the_corners_of_the_bounds(kind: type[Effect]) -> None:
             continue
         checked += 1
         for period in (PERIOD, 50 * PERIOD):
-            if kind is PublishedBoucWen:  # the explicit step is unstable for a large beta, and says so
+            if kind in MAY_DIVERGE:
                 with contextlib.suppress(DivergenceError):
                     run(model, u, period)
             else:

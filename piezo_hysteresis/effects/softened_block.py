@@ -1,0 +1,202 @@
+"""The ARX with a dominant mode whose stiffness changes with deflection.
+
+G is split into its dominant mode M = g/(1 + m1 z⁻¹ + m2 z⁻²), g = 1 + m1 + m2, and the rest R = G/M. With the force
+N(x) = k2 |x| x + k3 x³ the modal coordinate obeys x_i = −m1 x_(i−1) − m2 x_(i−2) + g (w_i − N(x_(i−1))). Only its
+deviation ξ from the linear mode goes through R, beside the unchanged ARX: y = G w + R ξ. Off, ξ is exactly zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import ModelError
+from ..kernel import kernel
+from .arx_block import ArxBlock
+from .block import Array, Block, MemorylessBlock, State
+
+
+def split(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    """Dominant mode (m1, m2) of B/A, the rest of A without its leading 1, and their derivatives by a, (na, na).
+
+    The dominant mode is the complex pole pair with the largest residue over distance from the unit circle.
+
+    Raises
+    ------
+    ModelError
+        If A has no complex pole pair.
+
+    >>> mode, rest, _ = split(np.array([-1.7, 1.1, -0.15]), np.ones(1))
+    >>> mode.round(9).tolist(), rest.round(9).tolist()
+    ([-1.5, 0.8], [-0.2])
+    """
+    poles = np.roots(np.append(1.0, a))
+    above = poles[poles.imag > 1e-9]
+    if not above.size:
+        raise ModelError("softening: the ARX has no complex pole pair; expected a resonance, order 2 or more")
+
+    def height(pole: complex) -> float:
+        others = poles[np.abs(poles - pole) > 0]
+        return float(np.abs(np.polyval(b[::-1], 1 / pole) / np.prod(1 - others / pole)) / (1 - np.abs(pole)))
+
+    pole = max(above, key=height)
+    mode = np.array([-2.0 * pole.real, np.abs(pole) ** 2])
+    rest = np.polydiv(np.append(1.0, a), np.append(1.0, mode))[0][1:]
+    columns = np.zeros((a.size, a.size))
+    for k in range(a.size):
+        factor = np.append(1.0, rest if k < 2 else mode)
+        first = k if k < 2 else k - 2
+        columns[first : first + factor.size, k] = factor[: a.size - first]
+    return mode, rest, np.asarray(np.linalg.inv(columns))
+
+
+@kernel
+def force(x, k2, k3):
+    """N(x)."""
+    return (k2 * abs(x) + k3 * x * x) * x
+
+
+@kernel
+def force_slope(x, k2, k3):
+    """∂N/∂x."""
+    return 2.0 * k2 * abs(x) + 3.0 * k3 * x * x
+
+
+@kernel
+def settle(w, k2, k3, x):
+    """Static deflections x (n,) with x + N(x) = w; not a number where the stiffness vanishes on the way."""
+    for i in range(w.size):
+        x[i] = w[i]
+        for _ in range(50):
+            stiffness = 1.0 + force_slope(x[i], k2, k3)
+            if stiffness <= 0.0:
+                x[i] = np.nan
+                break
+            step = (w[i] - x[i] - force(x[i], k2, k3)) / stiffness
+            x[i] += step
+            if abs(step) <= 1e-15 * abs(x[i]):
+                break
+
+
+@kernel
+def run_mode_deviation(w, x0, p, z, xi):
+    """ξ (n,) for w (n,) relative to rest at x0; p = [m1, m2, k2, k3]; z = linear mode, ξ, two samples each."""
+    gain, held = 1.0 + p[0] + p[1], force(x0, p[2], p[3])
+    for i in range(w.size):
+        excess = force(x0 + (z[0] + z[2]), p[2], p[3]) - held
+        mode = gain * w[i] - p[0] * z[0] - p[1] * z[1]
+        xi[i] = -p[0] * z[2] - p[1] * z[3] - gain * excess
+        z[1], z[0], z[3], z[2] = z[0], mode, z[2], xi[i]
+
+
+@kernel
+def linearise_mode_deviation(w, dw, x0, dx0, p, z, dz, dxi):
+    """∂ξ to dxi (m + 4, n): rows dw (m, n), then p; dx0 (m + 4,) are slopes of x0, z (4,) and dz (m + 4, 4) updated."""
+    gain, m = 1.0 + p[0] + p[1], dw.shape[0]
+    held, held_slope = force(x0, p[2], p[3]), force_slope(x0, p[2], p[3])
+    by_p = np.zeros(4)
+    mode_by_p = np.zeros(4)
+    for i in range(w.size):
+        x = x0 + (z[0] + z[2])
+        excess, slope = force(x, p[2], p[3]) - held, force_slope(x, p[2], p[3])
+        mode_by_p[0], mode_by_p[1] = w[i] - z[0], w[i] - z[1]
+        by_p[0], by_p[1] = -z[2] - excess, -z[3] - excess
+        by_p[2], by_p[3] = -gain * (abs(x) * x - abs(x0) * x0), -gain * (x * x * x - x0 * x0 * x0)
+        for r in range(m + 4):
+            d_excess = slope * (dx0[r] + dz[r, 0] + dz[r, 2]) - held_slope * dx0[r]
+            d_mode = -p[0] * dz[r, 0] - p[1] * dz[r, 1]
+            d_xi = -p[0] * dz[r, 2] - p[1] * dz[r, 3] - gain * d_excess
+            if r < m:
+                d_mode += gain * dw[r, i]
+            else:
+                d_mode += mode_by_p[r - m]
+                d_xi += by_p[r - m]
+            dz[r, 1], dz[r, 0], dz[r, 3], dz[r, 2] = dz[r, 0], d_mode, dz[r, 2], d_xi
+            dxi[r, i] = d_xi
+        mode = gain * w[i] - p[0] * z[0] - p[1] * z[1]
+        xi = -p[0] * z[2] - p[1] * z[3] - gain * excess
+        z[1], z[0], z[3], z[2] = z[0], mode, z[2], xi
+
+
+class StaticSoftening(MemorylessBlock):
+    """Deflection under a slow w, for records slower than the model."""
+
+    names = ("softening.k2", "softening.k3")
+
+    def __init__(self, k2: float, k3: float) -> None:
+        self.k2, self.k3 = k2, k3
+
+    def value(self, x: Array) -> Array:
+        settled = np.empty(x.shape)
+        settle(x, self.k2, self.k3, settled)
+        return settled
+
+    def slope(self, x: Array) -> Array:
+        at = self.value(x)
+        return np.asarray(1.0 / (1.0 + 2.0 * self.k2 * np.abs(at) + 3.0 * self.k3 * at * at))
+
+    def by_parameter(self, x: Array) -> Array:
+        at = self.value(x)
+        return -self.slope(x) * np.vstack((np.abs(at) * at, at * at * at))
+
+
+class SoftenedBlock(Block):
+    """State: of the ARX; w and x at rest; of mode and ξ; of the rest."""
+
+    def __init__(self, arx: ArxBlock, delay: float, k2: float, k3: float) -> None:
+        self.arx = arx
+        mode, rest, self.by_a = split(arx.a, arx.b)
+        self.loop = np.append(mode, (k2, k3))
+        self.mode_gain = 1.0 + mode.sum()
+        self.rest_of_arx = ArxBlock((), rest, arx.b / self.mode_gain, delay)
+        self.settled = StaticSoftening(k2, k3)
+        self.names = (*arx.names, *self.settled.names)
+
+    def static(self, x0: float) -> float:
+        return self.arx.gain * self.settled.static(x0)
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        slope, own = self.settled.static_slopes(x0)
+        by_arx = self.arx.gain_slopes() * self.settled.static(x0)
+        return self.arx.gain * slope, np.concatenate((by_arx, self.arx.gain * own))
+
+    def rest(self, x0: float, time: float) -> State:
+        return self.arx.rest(x0, time), (x0, self.settled.static(x0)), np.zeros(4), self.rest_of_arx.zeros(1)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        arx, (w0, x0), z, filtered = state
+        y, arx = self.arx.run(x, arx)
+        xi, z = np.empty(x.shape), z.copy()
+        run_mode_deviation(x - w0, x0, self.loop, z, xi)
+        added, filtered = self.rest_of_arx.filter(xi[None, :], filtered)
+        return y + (self.arx.gain * (x0 - w0) + added[0]), (arx, (w0, x0), z, filtered)
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        slope, own = self.settled.static_slopes(x0)
+        settled = np.concatenate((slope * dx0, np.zeros(2), own))
+        moved = np.zeros((len(settled), 4))
+        filtered = self.rest_of_arx.zeros(len(settled))
+        return self.arx.rest_tangent(x0, dx0), np.array(dx0), settled, moved, filtered, self.rest_of_arx.own_rest()
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        arx, (w0, x0), z, filtered = state
+        d_arx, dw0, dx0, dz, d_filtered, own = tangent
+        m, na, nb = len(dx), self.arx.a.size, self.arx.b.size
+        dz, xi = dz.copy(), np.empty(x.shape)
+        d_xi = np.empty((m + 4, x.size))
+        linearise_mode_deviation(x - w0, dx - dw0[:, None], x0, dx0, self.loop, z.copy(), dz, d_xi)
+        z = z.copy()
+        run_mode_deviation(x - w0, x0, self.loop, z, xi)
+        y, rows, arx, d_arx = self.arx.linearise(x, dx, arx, d_arx)
+        added, after = self.rest_of_arx.filter(xi[None, :], filtered)
+        by_rest, own = self.rest_of_arx.by_parameter(xi, added[0], filtered[0], own)
+        through, d_filtered = self.rest_of_arx.filter(d_xi, d_filtered)
+        rows[:m] += self.arx.gain * (dx0[:m] - dw0)[:, None] + through[:m]
+        rows[m:] += (self.arx.gain_slopes() * (x0 - w0))[:, None]
+        by_mode = through[m : m + 2] - added / self.mode_gain
+        rows[m : m + na] += self.by_a.T @ np.vstack((by_mode, by_rest[: na - 2]))
+        rows[m + na : m + na + nb] += by_rest[na - 2 : -1] / self.mode_gain
+        rows[m + na + nb] += by_rest[-1]
+        by_stiffness = self.arx.gain * dx0[m + 2 :, None] + through[m + 2 :]
+        y = y + (self.arx.gain * (x0 - w0) + added[0])
+        tangent = (d_arx, dw0, dx0, dz, d_filtered, own)
+        return y, np.vstack((rows, by_stiffness)), (arx, (w0, x0), z, after), tangent

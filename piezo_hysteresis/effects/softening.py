@@ -1,0 +1,35 @@
+"""Stiffness that changes with deflection: a term of the dominant mode of the ARX."""
+
+from __future__ import annotations
+
+from ..parameter import Parameter
+from .effect import Place, Term
+
+
+class Softening(Term):
+    """Restoring force of the dominant mode that is not proportional to its deflection.
+
+    Parameters
+    ----------
+    k2 : float
+        Relative change of stiffness with |x| [1]; negative softens.
+    k3 : float
+        Relative change of stiffness with x² [1].
+
+    Notes
+    -----
+    x is the coordinate of the dominant complex pole pair of G, in units of the static hysteresis output w. G is split
+    into that mode and the rest; the delay of G stays outside the loop of the mode.
+    """
+
+    name = "softening"
+    family = "dynamics"
+    place = Place.DYNAMICS
+    host = "arx"
+    equation = "m ẍ + c ẋ + k x (1 + k2 |x| + k3 x²) = k w"
+    signature = "a resonance that moves with amplitude: large chirps across it; statically a sensor cubic"
+    source = "Duffing oscillator on the modal coordinate"
+    parameters = (
+        Parameter("k2", "k2", "1", 0.0, -0.2, 0.2, "change of stiffness with |x|", "Duffing", 0.0, 0.02),
+        Parameter("k3", "k3", "1", 0.0, -0.2, 0.2, "change of stiffness with x²", "Duffing", 0.0, 0.02),
+    )
