@@ -25,4 +25,4 @@ else:
 
     def kernel(function: F) -> F:
         """Compile the loop to machine code at first use and keep it on disk."""
-        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)

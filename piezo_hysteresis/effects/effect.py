@@ -170,7 +170,7 @@ class Effect(ABC):
         """
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and other._values == self._values  # type: ignore[attr-defined]
+        return type(other) is type(self) and other._values == self._values
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(self._values.items())))
