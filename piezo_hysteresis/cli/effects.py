@@ -1,0 +1,67 @@
+"""``piezo effects``: the catalogue, printed from the classes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from rich.console import Console
+from rich.table import Table
+
+from ..effects import BASELINE, CHAIN, Effect
+from ..model import effect_named
+from ..parameter import Parameter
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("effects", help="the catalogue of physical effects", description=__doc__)
+    parser.add_argument("name", nargs="?", help="print all about this effect, e.g. creep")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the catalogue, or one effect; returns 0.
+
+    Raises
+    ------
+    ModelError
+        If the catalogue has no effect of that name.
+    """
+    console = Console(file=sys.stdout, highlight=False)
+    if args.name is None:
+        console.print(listing())
+        console.print("all about one: piezo effects NAME")
+    else:
+        describe(effect_named(args.name), console)
+    return 0
+
+
+def listing() -> Table:
+    """One line for every effect, in the order in which they act."""
+    table = Table("effect", "family", "place", "how its absence shows", title="Catalogue of effects, in chain order")
+    for effect in CHAIN:
+        name = f"[dim]{effect.name}[/dim]" if effect in BASELINE else f"[bold]{effect.name}[/bold]"
+        table.add_row(name, effect.family, effect.place.name.lower(), effect.signature)
+    return table
+
+
+def describe(effect: type[Effect], console: Console) -> None:
+    """Everything the class says about itself."""
+    summary = (effect.__doc__ or "").strip().splitlines()[0]
+    console.print(f"[bold]{effect.name}[/bold]  ({effect.family}, {effect.place.name.lower()})  {summary}")
+    console.print(f"    {effect.equation}", markup=False)
+    console.print(f"Shows as: {effect.signature}", markup=False)
+    console.print(f"Source: {effect.source}", markup=False)
+    for label, value in (("Term of", effect.host), ("Needs the channel", effect.channel)):
+        if value:
+            console.print(f"{label}: {value}", markup=False)
+    table = Table("parameter", "symbol", "unit", "default", "bounds", "off at", "meaning")
+    for row in effect.parameters:
+        bounds, off = f"{row.lower:g} … {row.upper:g}", "" if row.off is None else f"{row.off:g}"
+        table.add_row(row.name, row.symbol, row.unit, _default(row), bounds, off, row.meaning)
+    console.print(table)
+
+
+def _default(row: Parameter) -> str:
+    return ", ".join(f"{v:g}" for v in row.value) if isinstance(row.value, tuple) else f"{row.value:g}"

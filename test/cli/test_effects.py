@@ -1,0 +1,40 @@
+"""``piezo effects`` prints what the classes say."""
+
+import argparse
+
+import pytest
+
+from piezo_hysteresis.cli import effects
+from piezo_hysteresis.effects import CHAIN
+from piezo_hysteresis.errors import ModelError
+
+
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    parser = argparse.ArgumentParser()
+    effects.add_parser(parser.add_subparsers())
+    args = parser.parse_args(["effects", *arguments])
+    assert args.run(args) == 0
+    return " ".join(capsys.readouterr().out.split())
+
+
+def test_the_list_names_every_effect(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    out = printed(capsys)
+    for effect in CHAIN:
+        assert effect.name in out
+        assert effect.family in out
+
+
+@pytest.mark.parametrize("effect", CHAIN, ids=lambda e: e.name)
+def test_one_effect_tells_equation_source_and_parameters(
+    effect, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    out = printed(capsys, effect.name)
+    for text in (effect.equation, effect.signature, effect.source, *(p.meaning for p in effect.parameters)):
+        assert " ".join(text.split()) in out
+
+
+def test_an_unknown_name_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(ModelError, match="unknown effect 'crep'"):
+        printed(capsys, "crep")
