@@ -13,13 +13,16 @@ from pathlib import Path
 
 from ..errors import RecordingError
 from ..record import Experiment
+from .bag import Bag
+from .bag_writer import BagWriter
 from .format import Format, WritableFormat
 from .layout import Column, Layout
 from .npz import Npz
+from .rosbag2 import Rosbag2, recorded_model
 
-__all__ = ["FORMATS", "Format", "Layout", "Npz", "read", "write"]
+__all__ = ["FORMATS", "Bag", "BagWriter", "Format", "Layout", "Npz", "Rosbag2", "read", "recorded_model", "write"]
 
-FORMATS: Mapping[str, Format] = {"npz": Npz()}
+FORMATS: Mapping[str, Format] = {"npz": Npz(), "rosbag2": Rosbag2()}
 """Name of every format to its reader, in the order in which they are asked whether they know a path."""
 
 

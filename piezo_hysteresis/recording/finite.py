@@ -1,4 +1,4 @@
-"""Records from channels that may have holes: split at every hole, told, never interpolated."""
+"""Records from channels with holes: split at every hole, told, never interpolated."""
 
 from __future__ import annotations
 
@@ -26,30 +26,30 @@ def stretches(good: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def finite_records(
-    voltage: Samples,
-    displacement: Samples,
+    channels: Mapping[str, Samples],
     sample_period: float,
-    extra: Mapping[str, Samples] | None = None,
+    breaks: Mapping[int, int] | None = None,
     **labels: Any,
-) -> tuple[tuple[Record, ...], tuple[Notice, ...]]:
-    """One phase as records without its non-finite samples.
+) -> tuple[list[Record], list[Notice]]:
+    """One phase as records without its non-finite and missing samples.
 
     Parameters
     ----------
-    voltage, displacement : (n,) ndarray
-        Drive [V] and answer [m], with NaN or infinity where nothing was measured.
+    channels : mapping of str to (n,) ndarray
+        `voltage` [V] and `displacement` [m], NaN or infinite where nothing was measured; `other_displacement` [m] and
+        `temperature` [K] are optional and left out where they have holes.
     sample_period : float
         Time between samples [s].
-    extra : mapping of str to (n,) ndarray, optional
-        `other_displacement` [m] and `temperature` [K]; left out where they have holes.
+    breaks : mapping of int to int, optional
+        Sample before which others are missing, to their number.
     **labels
         The other fields of `Record`.
 
     Returns
     -------
-    records : tuple of Record
+    records : list of Record
         A record behind a hole `continues` and is `truncated`: its state can be carried, but not exactly.
-    notices : tuple of Notice
+    notices : list of Notice
         What was dropped.
 
     Raises
@@ -58,40 +58,51 @@ def finite_records(
         On unequal channels or where no finite sample is left.
     """
     phase = str(labels.get("phase", "record"))
+    voltage, displacement = channels["voltage"], channels["displacement"]
+    if voltage.ndim != 1 or voltage.shape != displacement.shape or voltage.size == 0:
+        return [Record(voltage, displacement, sample_period, **labels)], []  # raises, and says what is wrong
     notices = []
-    kept: dict[str, Any] = {}
-    for name, values in (extra or {}).items():
-        if np.isfinite(values).all():
-            kept[name] = values
+    kept = {}
+    for name in channels.keys() - {"voltage", "displacement"}:
+        if np.isfinite(channels[name]).all():
+            kept[name] = channels[name]
         else:
             notices.append(Notice("non_finite", f"{name} has non-finite samples: the channel is left out", phase))
-    if voltage.ndim != 1 or voltage.shape != displacement.shape or voltage.size == 0:
-        # Record says precisely what is wrong with the shapes
-        return (Record(voltage, displacement, sample_period, **labels),), tuple(notices)
     good = np.isfinite(voltage) & np.isfinite(displacement)
-    if good.all():
-        return (Record(voltage, displacement, sample_period, **kept, **labels),), tuple(notices)
-    runs = stretches(good)
-    if not runs:
+    edges = sorted(breaks or {})
+    pieces = [(a + i, a + j) for a, b in _between(edges, good.size) for i, j in stretches(good[a:b])]
+    if not pieces:
         raise RecordError(f"phase '{phase}': got no finite sample among {good.size}")
-    shortest = min(SHORTEST_SHARE * good.size, max(b - a for a, b in runs))
-    runs = [(a, b) for a, b in runs if b - a >= shortest]
-    lost = good.size - sum(b - a for a, b in runs)
-    notices.append(
-        Notice(
-            "non_finite",
-            f"{int(np.count_nonzero(~good))} of {good.size} samples are not finite: {lost} dropped, "
-            f"the phase is split into {len(runs)}",
-            phase,
-            severe=lost > good.size // 2,
+    shortest = min(SHORTEST_SHARE * good.size, max(b - a for a, b in pieces))
+    pieces = [(a, b) for a, b in pieces if b - a >= shortest]
+    dropped = good.size - sum(b - a for a, b in pieces)
+    if dropped:
+        notices.append(
+            Notice(
+                "non_finite" if not good.all() else "gap",
+                f"{int(np.count_nonzero(~good))} of {good.size} samples are not finite: "
+                f"{dropped} dropped with what is too short between holes",
+                phase,
+                severe=dropped > good.size // 2,
+            )
         )
-    )
-    start_time = float(labels.pop("start_time", 0.0))
-    records = []
-    for a, b in runs:
+    if len(pieces) > 1:
+        notices.append(Notice("split", f"the phase is split at its holes into {len(pieces)} records", phase))
+    begin = float(labels.pop("start_time", 0.0))
+    missing = np.cumsum([0, *((breaks or {})[e] for e in edges)])
+    records: list[Record] = []
+    for a, b in pieces:
         if a > 0:
-            labels |= {"continues": True, "truncated": True, "initial_voltage": None}
-        part = {name: values[a:b] for name, values in kept.items()} | labels
-        start = start_time + a * sample_period
+            labels |= {
+                "continues": bool(records or labels.get("continues")),
+                "truncated": True,
+                "initial_voltage": None,
+            }
+        start = begin + (a + int(missing[np.searchsorted(edges, a, "right")])) * sample_period
+        part: dict[str, Any] = {name: values[a:b] for name, values in kept.items()} | labels
         records.append(Record(voltage[a:b], displacement[a:b], sample_period, start_time=start, **part))
-    return tuple(records), tuple(notices)
+    return records, notices
+
+
+def _between(edges: list[int], size: int) -> list[tuple[int, int]]:
+    return list(zip([0, *edges], [*edges, size], strict=True))

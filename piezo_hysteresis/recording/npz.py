@@ -46,7 +46,7 @@ class Npz:
             end = parts[-1].start_time + parts[-1].duration
         return Experiment(tuple(records), str(path), tuple(notices))
 
-    def _phase(self, file: Path, layout: Layout, end: float) -> tuple[tuple[Record, ...], tuple[Notice, ...]]:
+    def _phase(self, file: Path, layout: Layout, end: float) -> tuple[list[Record], list[Notice]]:
         with np.load(file, allow_pickle=False) as archive:
             if not isinstance(archive, np.lib.npyio.NpzFile) or archive.zip is None:
                 raise RecordingError("got a single array, expected an .npz archive")
@@ -63,11 +63,10 @@ class Npz:
 
             period = layout.sample_period or layout.in_si("sample_period", values.numbers("sample_period"))
             name = layout.phases if isinstance(layout.phases, str) else values.text("phase", _stem(file))
+            optional = [key for key in ("other_displacement", "temperature") if place.get(key, key) in values]
             return finite_records(
-                channel("voltage"),
-                channel("displacement"),
+                {key: channel(key) for key in ("voltage", "displacement", *optional)},
                 _scalar("sample_period", np.asarray(period)),
-                {key: channel(key) for key in ("other_displacement", "temperature") if place.get(key, key) in values},
                 phase=name,
                 start_time=number("start_time", end),
                 continues=bool(number("continues", 0.0)),

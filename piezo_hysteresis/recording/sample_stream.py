@@ -1,0 +1,243 @@
+"""`SampleStream`: blocks of the topic `samples`, in the order of arrival, become stretches of one phase each."""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordError
+from ..record import Notice, Samples
+from .block import Block
+from .time_base import round_period
+
+PERIOD_TOLERANCE = 0.01
+"""Blocks whose sample periods differ by more than this share do not belong together."""
+
+LONGEST_SILENCE = 60.0
+"""An index that runs ahead of the clock by more than this is no gap but another start of the driver [s]."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Stretch:
+    """Samples of one phase number and one sample period."""
+
+    channels: dict[str, Samples]
+    """Voltage [V], displacement [m] and what else the blocks hold."""
+    sample_period: float
+    phase: int
+    start_time: float
+    """Time of the first sample since the first one of the stream [s]."""
+    received_ns: int
+    """Time at which its first block was received [ns]."""
+    lost: int
+    """Samples missing just before it."""
+    breaks: dict[int, int]
+    """Sample before which others are missing, to their number."""
+    first: bool
+    """True for the first stretch since a start of the driver, or of the recording."""
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return self.channels["voltage"].size
+
+
+@dataclass
+class _Run:
+    """What the driver sent from one start on: index and arrival (start, stop) of every piece in one go."""
+
+    first: bool
+    period: float
+    expected: int
+    pieces: list[tuple[int, int, int]] = field(default_factory=list)
+
+
+class SampleStream:
+    """Collects blocks; memory grows with the samples only.
+
+    Losses, repetitions and reordering are recognised by the running index, which wraps at 2³². An index that jumps back
+    while time goes on means that the driver was started again.
+
+    Parameters
+    ----------
+    sample_period : float, optional
+        Goes before what the blocks say about their times [s].
+    """
+
+    def __init__(self, sample_period: float | None = None) -> None:
+        self._given_period = sample_period
+        self._channels: dict[str, array[float]] = {}
+        self._index, self._phase = array("I"), array("I")
+        self._starts: list[int] = []
+        self._times_ns: list[int] = []
+        self._periods: list[float] = []
+        self._received_ns: list[int] = []
+
+    @property
+    def size(self) -> int:
+        """Number of samples received."""
+        return len(self._index)
+
+    def add(self, block: Block, received_ns: int) -> None:
+        """Append a block in the order of arrival; channels that other blocks have are filled with NaN."""
+        begin, n = self.size, block.phase.size
+        first = self._index[-1] + 1 if begin else 0
+        index = block.index if block.index is not None else (first + np.arange(n, dtype=np.int64)).astype(np.uint32)
+        self._index.frombytes(index.tobytes())
+        self._phase.frombytes(block.phase.tobytes())
+        for name in self._channels.keys() | block.channels.keys():
+            if name not in self._channels:
+                self._channels[name] = array("d", [np.nan]) * begin
+            values = block.channels[name] if name in block.channels else np.full(n, np.nan)
+            self._channels[name].frombytes(values.tobytes())
+        time = block.time
+        if self._given_period is not None or time is None or n < 2 or not np.isfinite(time).all():
+            period = self._given_period or np.nan
+        else:
+            period = float(time[-1] - time[0]) / (n - 1)
+        offset = float(time[0]) if time is not None and abs(time[0]) < LONGEST_SILENCE else 0.0
+        self._starts.append(begin)
+        self._times_ns.append(block.stamp_ns + round(offset * 1e9))
+        self._periods.append(period if period > 0 else np.nan)
+        self._received_ns.append(received_ns)
+
+    def stretches(self, split_phases: bool = True) -> tuple[list[Stretch], list[Notice]]:
+        """Everything received, in order of the index.
+
+        Parameters
+        ----------
+        split_phases : bool
+            False to ignore the phase numbers.
+
+        Returns
+        -------
+        stretches : list of Stretch
+        notices : list of Notice
+            Repeated and reordered samples, and new starts of the driver; losses are told by the stretches.
+
+        Raises
+        ------
+        RecordError
+            If nothing tells the sample period.
+        """
+        stretches: list[Stretch] = []
+        notices: list[Notice] = []
+        end = 0.0
+        for run in self._runs():
+            if run.first and stretches:
+                seconds = (self._time_ns(run.pieces[0][1], run.period) - self._times_ns[0]) * 1e-9
+                end = max(end, seconds)
+                notices.append(Notice("restart", f"the driver was started again {end:.6g} s after the first sample"))
+            stretches += self._cut(run, end, split_phases, notices)
+            end = stretches[-1].start_time + stretches[-1].size * run.period
+        return stretches, notices
+
+    def _block_periods(self) -> NDArray[np.float64]:
+        periods = np.array(self._periods)
+        known = np.isfinite(periods)
+        if not known.any():  # one sample per block: the stamps are all there is
+            steps = np.diff(np.array(self._times_ns)) * 1e-9 / np.diff(np.array(self._starts))
+            if not (steps > 0).any():
+                raise RecordError("got no field 'time' and no stamps that grow, expected either; give sample_period")
+            return np.full(periods.size, np.median(steps[steps > 0]))
+        latest = np.maximum.accumulate(np.where(known, np.arange(periods.size), known.argmax()))
+        return np.asarray(periods[latest])
+
+    def _block_of(self, arrival: int) -> int:
+        return bisect_right(self._starts, arrival) - 1
+
+    def _time_ns(self, arrival: int, period: float) -> int:
+        block = self._block_of(arrival)
+        return self._times_ns[block] + round((arrival - self._starts[block]) * period * 1e9)
+
+    def _runs(self) -> list[_Run]:
+        periods = self._block_periods()
+        index = np.frombuffer(self._index, np.uint32)
+        other = np.abs(np.diff(periods)) > PERIOD_TOLERANCE * periods[1:]
+        jumps = np.flatnonzero(np.diff(index) != 1) + 1
+        edges = np.unique(np.concatenate(([0], jumps, np.array(self._starts, np.int64)[1:][other], [index.size])))
+        runs: list[_Run] = []
+        for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            period = float(periods[self._block_of(a)])
+            run, step = (runs[-1], _signed(int(index[a]) - runs[-1].expected)) if runs else (None, 0)
+            if run is None or self._restarted(a, step, period):
+                run, step = _Run(True, period, int(index[a])), 0
+                runs.append(run)
+            elif abs(period / run.period - 1) > PERIOD_TOLERANCE:
+                run = _Run(False, period, run.expected)
+                runs.append(run)
+            start = run.expected + step
+            run.pieces.append((start, a, b))
+            run.expected = max(run.expected, start + b - a)
+        for run in runs:
+            same = periods[np.abs(periods / run.period - 1) <= PERIOD_TOLERANCE]
+            run.period = round_period(float(np.median(same)))
+        return runs
+
+    def _restarted(self, arrival: int, step: int, period: float) -> bool:
+        elapsed = (self._time_ns(arrival, period) - self._time_ns(arrival - 1, period)) * 1e-9
+        return elapsed > 0 if step < 0 else step * period > 10 * max(elapsed, 0.0) + LONGEST_SILENCE
+
+    def _cut(self, run: _Run, begin: float, split_phases: bool, notices: list[Notice]) -> Iterator[Stretch]:
+        pieces, repeated = _swept(run.pieces)
+        if repeated:
+            notices.append(Notice("duplicate", f"{repeated} samples came more than once: the first ones count"))
+        late = sum(b[1] < a[1] for a, b in zip(pieces, pieces[1:], strict=False))
+        if late:
+            notices.append(Notice("non_monotonic", f"{late} pieces came out of order: sorted by their index"))
+        starts = [start for start, _, _ in pieces]
+        lost = [0] + [start - _end(earlier) for start, earlier in zip(starts[1:], pieces, strict=False)]
+        offsets = [0, *accumulate(b - a for _, a, b in pieces)]
+        channels = {
+            name: _gathered(np.frombuffer(column, np.float64), pieces) for name, column in self._channels.items()
+        }
+        phase = _gathered(np.frombuffer(self._phase, np.uint32), pieces)
+        changes = (np.flatnonzero(np.diff(phase)) + 1).tolist() if split_phases else []
+        for i, j in zip([0, *changes], [*changes, phase.size], strict=True):
+            piece = bisect_right(offsets, i) - 1
+            inside = range(piece + 1, bisect_left(offsets, j))
+            within = i - offsets[piece]
+            yield Stretch(
+                {name: values[i:j] for name, values in channels.items()},
+                run.period,
+                int(phase[i]),
+                begin + (starts[piece] + within - starts[0]) * run.period,
+                self._received_ns[self._block_of(pieces[piece][1] + within)],
+                0 if within else lost[piece],
+                {offsets[p] - i: lost[p] for p in inside if lost[p]},
+                run.first and i == 0,
+            )
+
+
+def _signed(step: int) -> int:
+    """An index difference modulo 2³² as the nearest signed one."""
+    return (step + 0x80000000) % 0x100000000 - 0x80000000
+
+
+def _end(piece: tuple[int, int, int]) -> int:
+    start, a, b = piece
+    return start + b - a
+
+
+def _swept(pieces: list[tuple[int, int, int]]) -> tuple[list[tuple[int, int, int]], int]:
+    """Pieces in order of their index, each sample once; and the number of samples that came again."""
+    kept: list[tuple[int, int, int]] = []
+    repeated = 0
+    for start, a, b in sorted(pieces):
+        again = min(max(0, _end(kept[-1]) - start), b - a) if kept else 0
+        repeated += again
+        if again < b - a:
+            kept.append((start + again, a + again, b))
+    return kept, repeated
+
+
+def _gathered(values: NDArray[Any], pieces: list[tuple[int, int, int]]) -> NDArray[Any]:
+    parts = [values[a:b] for _, a, b in pieces]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)

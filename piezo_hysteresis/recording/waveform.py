@@ -1,0 +1,144 @@
+"""The name of a drive signal by what it looks like: sine, triangle, chirp, multisine, noise, step, ramp, rest."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from ..record import Samples
+
+_POINTS = 40_000
+_LEAST_SWING = 0.05
+_REGULAR = 0.1
+_LIKE = 0.03
+_PERIODIC = 0.9
+
+
+def phase_name(voltage: Samples, sample_period: float) -> str:
+    """Propose the phase name of a drive signal without pauses.
+
+    A swing is the movement from one turning point to the next. Straight swings make a triangle, cosine-shaped ones of
+    equal duration a sine; what repeats itself otherwise is a multisine, what does not is noise.
+
+    Parameters
+    ----------
+    voltage : (n,) ndarray
+        Drive [V].
+    sample_period : float
+        Time between samples [s].
+
+    Returns
+    -------
+    str
+        One of rest, step, ramp, chirp, triangle, minor_loops, ``sine_<f>hz``, multisine, noise.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) * 1e-3
+    >>> phase_name(np.sin(2 * np.pi * 5 * t), 1e-3), phase_name(np.abs(t % 1 - 0.5), 1e-3)
+    ('sine_5hz', 'triangle')
+    """
+    span = float(np.ptp(voltage))
+    if span <= 1e-9 * float(np.abs(voltage).max()):
+        return "rest"
+    turns = turning_points(voltage, _LEAST_SWING * span)
+    if turns.size <= 2:
+        return _transition(voltage)
+    if _is_chirp(voltage):
+        return "chirp"
+    part = voltage
+    if np.median(np.diff(turns)) < 8 * max(1, voltage.size // _POINTS):  # too fast for the coarse turning points
+        middle = voltage.size // 2
+        part = voltage[max(0, middle - _POINTS // 2) : middle + _POINTS // 2]
+        turns = turning_points(part, _LEAST_SWING * span)
+    straight, cosine = _shape(part, turns)
+    reversals = turns[1:-1]  # the ends of the record are none
+    periods = reversals[2:] - reversals[:-2]
+    regular = periods.size < 2 or float(np.std(periods)) < _REGULAR * float(np.mean(periods))
+    if straight < _LIKE:
+        return "triangle" if regular else "minor_loops"
+    if cosine < _LIKE and regular:
+        swing = float(np.mean(np.diff(reversals if reversals.size > 1 else turns)))
+        return f"sine_{0.5 / (swing * sample_period):.3g}hz"
+    return "multisine" if _repeats(part if part.size < voltage.size else voltage) else "noise"
+
+
+def turning_points(voltage: Samples, least_swing: float) -> NDArray[np.int64]:
+    """Positions of the first sample, of every reversal by at least `least_swing` [V], and of the last sample."""
+    positions = np.arange(voltage.size)
+    if voltage.size > _POINTS:
+        length = 2 * voltage.size // _POINTS
+        blocks = voltage[: voltage.size // length * length].reshape(-1, length)
+        extremes = np.stack((blocks.argmin(axis=1), blocks.argmax(axis=1)), axis=1)
+        extremes.sort(axis=1)
+        positions = np.append((extremes + length * np.arange(len(blocks))[:, None]).ravel(), voltage.size - 1)
+    found = [0]
+    candidate, direction = 0, 0
+    values = voltage.tolist() if voltage.size <= _POINTS else None
+    for position in positions.tolist():
+        value = values[position] if values else voltage[position]
+        best = values[candidate] if values else voltage[candidate]
+        if direction == 0 and abs(value - best) >= least_swing:
+            direction, candidate = (1 if value > best else -1), position
+        elif direction and (value - best) * direction > 0:
+            candidate = position
+        elif direction and (best - value) * direction >= least_swing:
+            found.append(candidate)
+            direction, candidate = -direction, position
+    return np.array([*found, voltage.size - 1])
+
+
+def _transition(voltage: Samples) -> str:
+    """Step or ramp, by the time that the middle four fifths of the way take."""
+    way = np.abs(voltage - voltage[0]) / np.ptp(voltage)
+    moving = np.count_nonzero((way > 0.1) & (way < 0.9))
+    return "step" if moving <= max(2, voltage.size // 20) else "ramp"
+
+
+def _shape(voltage: Samples, turns: NDArray[np.int64]) -> tuple[float, float]:
+    """Deviation of the swings from straight lines and from half cosines: rms relative to the swing, median."""
+    inner = list(zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True))
+    whole = inner[1:-1] or inner
+    line, half_cosine = [], []
+    for a, b in whole[:: max(1, len(whole) // 200)]:
+        if b - a < 4:
+            continue
+        way = (voltage[a : b + 1] - voltage[a]) / (voltage[b] - voltage[a])
+        time = np.linspace(0.0, 1.0, b - a + 1)
+        line.append(float(np.sqrt(np.mean((way - time) ** 2))))
+        half_cosine.append(float(np.sqrt(np.mean((way - (1 - np.cos(np.pi * time)) / 2) ** 2))))
+    return (float(np.median(line)), float(np.median(half_cosine))) if line else (1.0, 1.0)
+
+
+def _is_chirp(voltage: Samples) -> bool:
+    """True where the rate of mean crossings grows or falls steadily by at least three times."""
+    parts = 8
+    if voltage.size < 32 * parts:
+        return False
+    blocks = voltage[: voltage.size // parts * parts].reshape(parts, -1)
+    crossings = np.array([_crossings(block) for block in blocks], float)
+    if crossings[0] > crossings[-1]:
+        crossings = crossings[::-1]
+    steady = np.all(np.diff(crossings) >= -1) and np.count_nonzero(np.diff(crossings) > 0) >= parts - 3
+    return bool(steady and crossings[-1] >= 3 * max(crossings[0], 1.0) and crossings[-1] >= 8)
+
+
+def _crossings(voltage: Samples) -> int:
+    centred = voltage - voltage.mean()
+    away = np.sign(centred[np.abs(centred) > 0.2 * centred.std()])
+    return int(np.count_nonzero(np.diff(away)))
+
+
+def _repeats(voltage: Samples) -> bool:
+    """True where the autocorrelation comes back, for odd multisines also with the other sign."""
+    x = voltage[: 1 << 20] - voltage[: 1 << 20].mean()
+    size = fft.next_fast_len(2 * x.size, real=True)
+    overlap = fft.irfft(np.abs(fft.rfft(x, size)) ** 2, size)[: x.size // 2 + 1]
+    energy = np.cumsum(x**2)
+    lags = np.arange(overlap.size)
+    head = energy[x.size - 1 - lags]
+    tail = energy[-1] - np.concatenate(([0.0], energy))[lags]
+    similarity = np.abs(overlap) / np.sqrt(head * tail)
+    first = np.flatnonzero(similarity < 0.5)
+    return bool(first.size and similarity[first[0] :].max() > _PERIODIC)
