@@ -1,5 +1,7 @@
 """Promises of the plant as a whole: reproducible, independent of blocks, limits, parameters from and to a mapping."""
 
+import importlib
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -40,6 +42,17 @@ def test_the_same_seed_is_the_same_experiment_and_another_is_not():
     assert np.any(other.displacement != WHOLE.displacement)
     assert np.any(other.other_displacement != WHOLE.other_displacement)
     np.testing.assert_array_equal(other.voltage, WHOLE.voltage)
+
+
+def test_compiled_kernels_equal_the_same_loops_in_plain_python(monkeypatch):
+    """What a user without numba gets."""
+    for name in ("electronics", "hysteresis", "creep", "structure", "environment", "sensor"):
+        module = importlib.import_module(f"piezo_hysteresis.stage.plant.{name}")
+        for function, loop in list(vars(module).items()):
+            if hasattr(loop, "py_func"):
+                monkeypatch.setattr(module, function, loop.py_func)
+    plain = Plant(EVERYTHING, TS, seed=4).run(DRIVE[:60])
+    np.testing.assert_allclose(plain.displacement, WHOLE.displacement[:60], rtol=1e-12)
 
 
 def test_everything_at_once_stays_finite_and_within_the_sensor():

@@ -52,6 +52,14 @@ def test_readings_and_drive_lie_on_the_steps_of_16_bit_converters():
     np.testing.assert_allclose(volts, np.rint(volts), atol=1e-9)
 
 
+def test_the_converter_never_rounds_beyond_the_drive_limits():
+    """6.1 V and 0.1 V are no steps of the converter; what was applied can be played again."""
+    parameters = PlantParameters.from_mapping({"electronics.voltage_min": 0.1, "electronics.voltage_max": 6.1})
+    applied = Plant(parameters, TS, voltage=0.1).run(np.array([0.1, 6.1])).voltage
+    assert 0.1 <= applied[0] < 0.1 + 20 / 65536
+    assert 6.1 - 20 / 65536 < applied[1] <= 6.1
+
+
 def test_sensor_clips_at_its_range():
     y = Plant(PlantParameters.from_mapping({"sensor.offset": 50e-6}), TS).run(np.full(1000, 10.0)).displacement
     assert y.max() == 60e-6 - 120e-6 / 65536
@@ -167,6 +175,11 @@ def test_an_effect_that_is_off_is_exactly_absent(name, value, also):
     a = Plant(PlantParameters().with_values(on), TS, seed=1).run(drive).displacement
     b = Plant(PlantParameters().with_values({**on, name: value}), TS, seed=1).run(drive).displacement
     assert np.any(a != b)
+
+
+def test_a_spring_that_gives_way_is_refused():
+    with pytest.raises(ParameterError, match="spring"):
+        PlantParameters.from_mapping({"structure.softening_quadratic": -0.4, "structure.softening_cubic": -0.3})
 
 
 def test_a_sensor_too_small_for_the_stage_is_refused():

@@ -42,11 +42,13 @@ class Electronics(Group):
         return 2 * self.dac_range / 2**self.dac_bits if self.dac_bits else 0.0
 
     def convert(self, voltage: Samples) -> Samples:
-        """The drive the converter really gives [V]."""
+        """The drive the converter really gives [V]: the nearest of its steps that lies within the drive limits."""
         if not self.dac_bits:
             return np.array(voltage)
         half = 2 ** (self.dac_bits - 1)
-        return np.clip(np.rint(voltage / self.lsb), -half, half - 1) * self.lsb
+        lowest = math.ceil(self.voltage_min / self.lsb - 1e-9)
+        highest = min(math.floor(self.voltage_max / self.lsb + 1e-9), half - 1)
+        return np.clip(np.rint(voltage / self.lsb), lowest, highest) * self.lsb
 
 
 class Amplifier:

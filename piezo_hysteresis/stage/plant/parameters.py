@@ -42,7 +42,8 @@ class PlantParameters:
     Raises
     ------
     ParameterError
-        If the full stroke does not fit the sensor, or the drive limits do not fit the converter.
+        If the full stroke does not fit the sensor, the drive limits do not fit the converter, or a softened spring
+        gives way.
 
     Examples
     --------
@@ -66,7 +67,10 @@ class PlantParameters:
                 f"electronics: got voltage_min {e.voltage_min:g} V and voltage_max {e.voltage_max:g} V, expected them "
                 f"ordered and within ±{e.dac_range:g} V, which the converter can give"
             )
-        reach = max(abs(self.stroke(0.0, e.voltage_min)), abs(self.stroke(0.0, e.voltage_max)))
+        ends = self.stroke(0.0, e.voltage_min), self.stroke(0.0, e.voltage_max)
+        for end in ends:
+            self.structure.static_mode1(end, abs(ends[1] - ends[0]))
+        reach = max(map(abs, ends))
         if reach > self.sensor.range:
             raise ParameterError(
                 f"sensor.range: got ±{self.sensor.range:g} m for a stage that reaches {reach:g} m, expected at least "

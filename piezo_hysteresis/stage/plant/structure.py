@@ -55,7 +55,13 @@ class Structure(Group):
         return self.softening_quadratic * abs(x / full) + self.softening_cubic * (x / full) ** 2
 
     def static_mode1(self, w: float, full: float) -> float:
-        """First modal coordinate of the settled stage, in units of w."""
+        """First modal coordinate of the settled stage at load `w`, in the unit of `w` and of the `full` stroke.
+
+        Raises
+        ------
+        ParameterError
+            If the softened spring cannot carry the load.
+        """
         load = self.share1 * w
         if load == 0.0 or (self.softening_quadratic == 0.0 and self.softening_cubic == 0.0):
             return load
