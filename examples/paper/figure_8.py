@@ -1,0 +1,33 @@
+"""Fig. 8: the same sines, MBW alone: the dc gain of G in place of G.
+
+The loop of the stage widens with frequency, that of the model does not. On a stage that shares no code with the model
+the error is the row that the published coefficients predict (table_1.py).
+"""
+
+from __future__ import annotations
+
+import published
+from campaign import alone, joint
+from exhibit import STATIC, Exhibit, canvas, main
+from table_1 import lag_error
+from validation import draw_loops
+
+
+def figure_8() -> Exhibit:
+    """Loops of MBW alone at the frequencies of Table 1."""
+    figure, axes = canvas(2, 3)
+    row = draw_loops(axes, alone(joint("bouc_wen").model), "bouc_wen", "MBW alone", {"color": STATIC})
+    return Exhibit(
+        "figure_8",
+        figure,
+        {
+            "frequency [Hz]": list(published.FREQUENCIES),
+            "MBW alone, simulated stage [% of peak-to-peak]": row,
+            "lag of the published G [% of peak-to-peak]": [lag_error(f) for f in published.FREQUENCIES],
+            "MBW alone, paper [%]": list(published.MBW_ROW),
+        },
+    )
+
+
+if __name__ == "__main__":
+    main(figure_8)

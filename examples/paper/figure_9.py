@@ -1,0 +1,39 @@
+"""Fig. 9: a triangle of 100 Hz, fitted by nobody: the dynamic model and MBW alone against the measurement."""
+
+from __future__ import annotations
+
+import numpy as np
+import published
+from campaign import alone, experiment, joint, last_period
+from exhibit import DYNAMIC, MEASURED, STATIC, Exhibit, canvas, main
+
+
+def figure_9() -> Exhibit:
+    """The last two periods, and what each model leaves."""
+    record = experiment("bouc_wen").named("triangle_100hz")[0]
+    end = last_period(record, 100.0, level=1.0).stop
+    part = slice(end - 2 * round(0.01 / record.sample_period), end)
+    measured = record.displacement[part]
+    time = 1e3 * record.sample_period * np.arange(measured.size)
+
+    figure, (above, below) = canvas(1, 2)
+    above.plot(time, measured * 1e6, color=MEASURED, label="measured")
+    numbers: dict[str, float | list[float]] = {}
+    for name, model, colour in (
+        ("dynamic model", joint("bouc_wen").model, DYNAMIC),
+        ("MBW alone", alone(joint("bouc_wen").model), STATIC),
+    ):
+        predicted = model.simulate(record)[0][part]
+        error = published.percent_of_range(measured - predicted, measured)
+        numbers[f"{name} [% of peak-to-peak]"] = error
+        above.plot(time, predicted * 1e6, "--", color=colour, label=name)
+        below.plot(time, (measured - predicted) * 1e6, color=colour, label=f"{name}: {error:.2f} %")
+    above.set(xlabel="time [ms]", ylabel="y [µm]")
+    below.set(xlabel="time [ms]", ylabel="measured − predicted [µm]")
+    above.legend()
+    below.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    return Exhibit("figure_9", figure, numbers)
+
+
+if __name__ == "__main__":
+    main(figure_9)

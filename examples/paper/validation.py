@@ -1,0 +1,46 @@
+"""Errors of a model on the validation sines of Table 1, in the measure that the paper is consistent with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import published
+from campaign import experiment, last_period
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Record
+
+
+def sine(operator: str, frequency: float) -> Record:
+    """The validation sine of one frequency [Hz] on one stage."""
+    return experiment(operator).named(f"sine_{frequency:g}hz")[0]
+
+
+def last_loop(model: Model, record: Record, frequency: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Voltage [V], measured and free-run displacement [m] of the last period."""
+    part = last_period(record, frequency)
+    return record.voltage[part], record.displacement[part], model.simulate(record)[0][part]
+
+
+def error_row(model: Model, operator: str) -> list[float]:
+    """RMS error in % of peak-to-peak at the frequencies of Table 1."""
+    row = []
+    for frequency in published.FREQUENCIES:
+        _, measured, predicted = last_loop(model, sine(operator, frequency), frequency)
+        row.append(published.percent_of_range(measured - predicted, measured))
+    return row
+
+
+def draw_loops(axes: list[Axes], model: Model, operator: str, label: str, style: Mapping[str, object]) -> list[float]:
+    """Measured and predicted loop at every frequency, one per axes; returns the errors."""
+    row = error_row(model, operator)
+    for ax, frequency, error in zip(axes, published.FREQUENCIES, row, strict=True):
+        voltage, measured, predicted = last_loop(model, sine(operator, frequency), frequency)
+        ax.plot(voltage, measured * 1e6, color="#000000", label="measured")
+        ax.plot(voltage, predicted * 1e6, "--", label=label, **style)
+        ax.set(xlabel="u [V]", ylabel="y [µm]")
+        ax.set_title(f"{frequency:g} Hz: {error:.2f} %")
+    axes[0].legend()
+    return row
