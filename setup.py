@@ -14,6 +14,7 @@ setup(
     maintainer="piezo_hysteresis maintainers",
     maintainer_email="piezo-hysteresis@users.noreply.github.com",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={f"{NAME}.report": ["page.css"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -14,7 +14,7 @@ from ..model import Model
 from ..record import Record
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BLACK, BLUE, GREEN, PREDICTED, SKY, canvas
+from .style import BLACK, GREEN, PREDICTED, SKY, canvas, legend_above, plain_log, styled
 
 Array = NDArray[np.float64]
 
@@ -22,8 +22,11 @@ POINTS = 48
 """Frequencies drawn per level."""
 COHERENT = 0.5
 """Lines of less coherence are left out."""
+GAP = 8
+"""Incoherent lines in a row at which the drive is taken to end."""
 
 
+@styled
 def bode(comparison: Comparison) -> Drawing | None:
     """Gain and phase from drive to displacement, from the noise phases or what replaces them."""
     levels = _levels(comparison)
@@ -49,14 +52,18 @@ def bode(comparison: Comparison) -> Drawing | None:
         phase_axis.errorbar(f, angle, np.degrees(2 * sigma), **options)
         data |= {f"frequency_Hz_{number + 1}": f, f"gain_m_per_V_{number + 1}": np.abs(value)}
         data |= {f"phase_deg_{number + 1}": angle, f"relative_deviation_{number + 1}": sigma}
-        told.append(f"measured at {rms:.2g} V rms: gain {gain[0]:.3g} µm/V at {f[0]:.3g} Hz, phase {angle[-1]:.0f}° at {f[-1]:.4g} Hz")
+        told.append(
+            f"measured at {rms:.2g} V rms: gain {gain[0]:.3g} µm/V at {f[0]:.3g} Hz, "
+            f"phase {angle[-1]:.0f}° at {f[-1]:.4g} Hz"
+        )
         if number == 0 and comparison.now is not None:
-            ours = _response([comparison.experiment[i] for i in members], [comparison.now.predicted[i] for i in members])
+            answers = [comparison.now.predicted[i] for i in members]
+            ours = _response([comparison.experiment[i] for i in members], answers)
             if ours is not None:
-                line = ours.value[at]
-                gain_axis.plot(f, 1e6 * np.abs(line), label="predicted, same estimator", **PREDICTED)
-                phase_axis.plot(f, np.degrees(np.unwrap(np.angle(line))), **PREDICTED)
-                data |= {"predicted_gain_m_per_V": np.abs(line), "predicted_phase_deg": np.degrees(np.unwrap(np.angle(line)))}
+                line, turn = np.abs(ours.value[at]), np.degrees(np.unwrap(np.angle(ours.value[at])))
+                gain_axis.plot(f, 1e6 * line, label="predicted, same estimator", **PREDICTED)
+                phase_axis.plot(f, turn, **PREDICTED)
+                data |= {"predicted_gain_m_per_V": line, "predicted_phase_deg": turn}
     if not told:
         return None
     _linear_part(comparison.model, gain_axis, phase_axis, data)
@@ -65,14 +72,16 @@ def bode(comparison: Comparison) -> Drawing | None:
     gain_axis.set_ylabel("gain [µm/V]")
     phase_axis.set_ylabel("phase [°]")
     phase_axis.set_xlabel("frequency [Hz]")
-    gain_axis.legend(loc="lower left")
+    plain_log(gain_axis.yaxis)
+    legend_above(figure, gain_axis, 2)
+    figure.align_ylabels()
     return Drawing(
         "bode",
         "Frequency response",
-        "From drive to displacement, hysteresis included, averaged over segments; bars are ± 2σ. The dashed line is the "
-        "model's own answer through the same estimator: this is the fair comparison. The dotted line is G alone times the slope "
-        "of the loop at a turning point; noise of larger amplitude wears the hysteresis off and departs from it at low "
-        "frequency. Two levels that disagree tell of hysteresis, backlash or a gain that depends on amplitude.",
+        "From drive to displacement, hysteresis included, averaged over segments; bars are ± 2σ. Dashed: the answer of "
+        "the model through the same estimator, the fair comparison. Dotted: G alone times the slope of the loop at a "
+        "turning point; larger noise wears the hysteresis off and departs from it at low frequency. Two levels that "
+        "disagree tell of hysteresis, backlash or a gain that depends on amplitude.",
         "Bode diagram. " + "; ".join(told) + ".",
         figure,
         data,
@@ -120,8 +129,10 @@ def _response(records: Sequence[Record], predicted: Sequence[Array] | None) -> F
 def _spread(found: FrequencyResponse) -> NDArray[np.intp]:
     """Indices of coherent lines, about equally spaced on a logarithmic axis."""
     (good,) = np.nonzero(found.coherence > COHERENT)
-    if good.size == 0:
-        good = np.arange(found.frequency.size)
+    good = good[good > 0] if good.size > 2 else np.arange(1, found.frequency.size)
+    # by chance single lines of pure noise look coherent: stop at the first wide gap
+    (gaps,) = np.nonzero(np.diff(good) > GAP)
+    good = good[: gaps[0] + 1] if gaps.size else good
     wanted = np.geomspace(found.frequency[good[0]], found.frequency[good[-1]], POINTS)
     nearest = np.abs(np.log(found.frequency[good])[:, None] - np.log(wanted)).argmin(axis=0)
     return np.asarray(good[np.unique(nearest)])

@@ -63,9 +63,7 @@ class Comparison:
 
     def indices(self, *phases: str) -> list[int]:
         """Numbers of the records whose phase name is, or begins with, one of `phases`."""
-        return [
-            i for i, r in enumerate(self.experiment) if r.phase in phases or r.phase.split("_")[0] in phases
-        ]
+        return [i for i, r in enumerate(self.experiment) if r.phase in phases or r.phase.split("_")[0] in phases]
 
 
 def compare(

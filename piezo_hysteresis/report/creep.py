@@ -9,7 +9,7 @@ from ..identification.edges import find_edges
 from ..record import Record
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BEFORE, MEASURED, PREDICTED, canvas, duration
+from .style import BEFORE, MEASURED, PREDICTED, canvas, duration, plain_log, styled
 
 Array = NDArray[np.float64]
 
@@ -22,13 +22,15 @@ REFERENCE = 0.1
 POINTS = 60
 
 
+@styled
 def creep(comparison: Comparison) -> Drawing | None:
     """Displacement since 0.1 s after a change of level, in % of that change: mean over the holds."""
     holds = [h for i, r in enumerate(comparison.experiment) for h in _holds(r, i)]
     if not holds:
         return None
-    longest = max(length for _, _, _, length in holds)
-    time = np.geomspace(REFERENCE, 0.98 * longest, POINTS)
+    together = float(np.median([length for _, _, _, length in holds]))
+    holds = [hold for hold in holds if hold[3] >= 0.95 * together]
+    time = np.geomspace(REFERENCE, 0.95 * together, POINTS)
     figure, axes = canvas(1, 1, 3.6)
     axis = axes[0, 0]
     data: dict[str, Array] = {"time_since_change_s": time}
@@ -39,25 +41,26 @@ def creep(comparison: Comparison) -> Drawing | None:
     if comparison.now is not None:
         sources.append(("predicted", list(comparison.now.predicted), PREDICTED))
     for label, signals, style in sources:
-        curves = np.array([_curve(comparison.experiment[i], signals[i], start, end, time) for i, start, end, _ in holds])
-        count = np.sum(np.isfinite(curves), axis=0)
-        mean = np.nansum(curves, axis=0) / count
+        curves = np.array(
+            [_curve(comparison.experiment[i], signals[i], start, end, time) for i, start, end, _ in holds]
+        )
+        mean = curves.mean(axis=0)
         axis.semilogx(time, mean, label=label, **style)
         if label == "measured" and len(holds) > 2:
-            spread = 2 * np.sqrt(np.nansum((curves - mean) ** 2, axis=0) / np.maximum(count - 1, 1) / count)
-            spread[count < 2] = np.nan
-            axis.fill_between(time, mean - spread, mean + spread, color="#cccccc", linewidth=0, label="± 2 standard errors")
+            spread = 2 * curves.std(axis=0, ddof=1) / np.sqrt(len(holds))
+            axis.fill_between(time, mean - spread, mean + spread, color="#cccccc", linewidth=0, label="± 2 std. errors")
         data[f"{label.replace(' ', '_')}_percent"] = mean
         decades = np.log10(time[-1] / REFERENCE)
         told.append(f"{label} {mean[-1]:.2f} % after {duration(time[-1])}, {mean[-1] / decades:.2f} % per decade")
     axis.set_xlabel("time since the change of level [s]")
+    plain_log(axis.xaxis)
     axis.set_ylabel("creep [% of the change]")
     axis.legend(loc="upper left")
     return Drawing(
         "creep",
         "Creep",
         f"Mean over {len(holds)} holds of at least {SHORTEST_HOLD} s after a change of level, zero at {REFERENCE} s. "
-        "Logarithmic creep is a straight line here; a line that bends up late is drift, one that stays flat is neither.",
+        "Logarithmic creep is a straight line here; what bends up late is drift, what stays flat is neither.",
         "Creep: " + "; ".join(told) + ".",
         figure,
         data,
@@ -81,17 +84,13 @@ def _holds(record: Record, index: int) -> list[tuple[int, int, int, float]]:
 
 
 def _curve(record: Record, y: Array, start: int, end: int, time: Array) -> Array:
-    """Creep in % at the times wanted, NaN after the end of the hold, for one change of level."""
-    hold = record.voltage[end]
-    (left,) = np.nonzero(np.abs(record.voltage[end:] - hold) > 0.01 * np.ptp(record.voltage))
-    stop = end + int(left[0]) if left.size else record.size
+    """Creep in % at the times wanted for one change of level."""
+    stop = min(record.size, end + int(1.05 * time[-1] / record.sample_period) + 2)
     t, part = record.sample_period * np.arange(1, stop - end + 1), y[end:stop]
     edges = np.concatenate(([time[0] / 1.1], np.sqrt(time[1:] * time[:-1]), [time[-1] * 1.1]))
     place = np.digitize(t, edges) - 1
     inside = (place >= 0) & (place < time.size)
     count = np.bincount(place[inside], minlength=time.size)
     mean = np.bincount(place[inside], part[inside], time.size) / np.maximum(count, 1)
-    sparse = np.interp(time, t, part)
-    mean = np.where(count > 0, mean, sparse)
-    mean[time > t[-1]] = np.nan
+    mean = np.where(count > 0, mean, np.interp(time, t, part))
     return np.asarray(100.0 * (mean - mean[0]) / (mean[0] - y[start]))

@@ -7,6 +7,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -41,7 +42,12 @@ class Drawing:
     caption: str
     alternative: str
     figure: Figure
-    data: Mapping[str, NDArray]
+    data: Mapping[str, NDArray[Any]]
+
+    def __post_init__(self) -> None:
+        with mpl.rc_context(SETTINGS):
+            self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")  # found once, kept for every format
 
     def svg(self) -> str:
         """The figure as SVG text, the same for the same data."""
@@ -69,4 +75,4 @@ class Drawing:
 
 
 def _cell(value: object) -> str:
-    return f"{value:.9g}" if isinstance(value, float | np.floating) else str(value)
+    return f"{value:.7g}" if isinstance(value, float | np.floating) else str(value)

@@ -6,9 +6,10 @@ import numpy as np
 
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BLUE, GREY, ORANGE, canvas
+from .style import BLUE, GREY, ORANGE, canvas, legend_above, plain_log, styled
 
 
+@styled
 def gap(comparison: Comparison) -> Drawing | None:
     """Dots on a logarithmic axis: floor, error of the first model, error of the last one."""
     now, before = comparison.now, comparison.before
@@ -18,10 +19,12 @@ def gap(comparison: Comparison) -> Drawing | None:
     place = np.arange(len(names))
     figure, axes = canvas(1, 1, 0.27 * len(names) + 1.1)
     axis = axes[0, 0]
-    floors = 100.0 / now.range * np.array(
-        [
-            np.sqrt(np.mean([comparison.floors[r.index] ** 2 for r in now.rows if r.phase == name])) for name in names
-        ]
+    floors = (
+        100.0
+        / now.range
+        * np.array(
+            [np.sqrt(np.mean([comparison.floors[r.index] ** 2 for r in now.rows if r.phase == name])) for name in names]
+        )
     )
     after = np.array([now.by_phase[n] for n in names])
     data = {"phase": np.array(names), "floor_percent_of_range": floors, "error_percent_of_range": after}
@@ -33,12 +36,15 @@ def gap(comparison: Comparison) -> Drawing | None:
         axis.plot(old, place, linestyle="none", marker="s", markerfacecolor="none", color=BLUE, label="before")
         data["error_before_percent_of_range"] = old
         told = f"error {before.percent:.3g} % of range before and {now.percent:.3g} % after"
-    axis.plot(after, place, linestyle="none", marker="o", color=ORANGE, label="after" if before is not None else "error")
+    axis.plot(
+        after, place, linestyle="none", marker="o", color=ORANGE, label="after" if before is not None else "error"
+    )
     axis.set_xscale("log")
+    plain_log(axis.xaxis)
     axis.set_yticks(place, names)
     axis.invert_yaxis()
     axis.set_xlabel("rms error [% of range]")
-    figure.legend(*axis.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    legend_above(figure, axis)
     worst = names[int(np.argmax(after))]
     return Drawing(
         "gap",

@@ -12,7 +12,7 @@ from ..discrepancy.residual import drive_frequency
 from ..record import Record
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import MEASURED, PREDICTED, canvas
+from .style import MEASURED, PREDICTED, canvas, styled
 from .thinning import thinned
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ PANELS = 6
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """One way up and down of the drive in a record: from trough to trough."""
+    """One way up and down of the drive in a record, between two samples of equal drive."""
 
     index: int
     part: slice
@@ -46,8 +46,16 @@ def cycles(record: Record, index: int = 0) -> list[Cycle]:
         return []
     padded = np.concatenate(([u.max() + span], u, [u.max() + span]))
     troughs = find_peaks(-padded, prominence=0.05 * span)[0] - 1
-    pairs = zip(troughs, troughs[1:], strict=False)
-    return [Cycle(index, slice(int(a), int(b) + 1), float(np.ptp(u[a : b + 1]))) for a, b in pairs]
+    return [_closed(u, int(a), int(b), index) for a, b in zip(troughs, troughs[1:], strict=False)]
+
+
+def _closed(u: Array, first: int, last: int, index: int) -> Cycle:
+    """The part between two troughs that begins and ends at the drive of the higher one."""
+    peak = first + int(np.argmax(u[first : last + 1]))
+    level = max(u[first], u[last])
+    start = first + int(np.flatnonzero(u[first : peak + 1] <= level)[-1])
+    stop = peak + int(np.flatnonzero(u[peak : last + 1] <= level)[0]) + 1
+    return Cycle(index, slice(start, stop), float(u[peak] - level))
 
 
 def opening(voltage: Array, displacement: Array) -> float:
@@ -63,6 +71,7 @@ def opening(voltage: Array, displacement: Array) -> float:
     return 100.0 * abs(ways[1] - ways[0]) / height
 
 
+@styled
 def loops_by_amplitude(comparison: Comparison) -> Drawing | None:
     """Slow loops of up to six swings, from the largest to the smallest."""
     slow = comparison.indices("triangle", "minor")
@@ -77,6 +86,8 @@ def loops_by_amplitude(comparison: Comparison) -> Drawing | None:
     for cycle in sorted(found, key=lambda c: -c.swing):
         if not groups or groups[-1].swing - cycle.swing > 0.05 * largest:
             groups.append(cycle)
+        elif cycle.index < groups[-1].index:
+            groups[-1] = cycle
     kept = [groups[i] for i in np.unique(np.linspace(0, len(groups) - 1, PANELS).round().astype(int))]
     titles = [f"{c.swing:.3g} V, {comparison.experiment[c.index].phase}" for c in kept]
     return _drawing(
@@ -90,6 +101,7 @@ def loops_by_amplitude(comparison: Comparison) -> Drawing | None:
     )
 
 
+@styled
 def loops_by_frequency(comparison: Comparison) -> Drawing | None:
     """The last cycle of every sine: rate-dependent hysteresis and lag open the loop with frequency."""
     kept, titles = [], []
@@ -129,7 +141,8 @@ def _drawing(
     columns = min(3, len(kept))
     rows = -(-len(kept) // columns)
     figure, axes = canvas(rows, columns, 2.9 * rows + 0.3)
-    data, told = {}, []
+    data: dict[str, Array] = {}
+    told = []
     for panel, (axis, cycle, heading) in enumerate(zip(axes.flat, kept, titles, strict=False), 1):
         record = comparison.experiment[cycle.index]
         u, y = record.voltage[cycle.part], record.displacement[cycle.part]

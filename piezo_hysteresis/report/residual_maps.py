@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BLUE, GREY, ORANGE, canvas
+from .style import BLUE, GREY, ORANGE, canvas, legend_above, styled
 
 Array = NDArray[np.float64]
 
@@ -17,6 +17,7 @@ PER_RECORD = 20_000
 BINS = 24
 
 
+@styled
 def residual_maps(comparison: Comparison) -> Drawing | None:
     """Maps of residual against u, y and du/dt, with the mean of rising and of falling drive."""
     now = comparison.now
@@ -25,26 +26,27 @@ def residual_maps(comparison: Comparison) -> Drawing | None:
     u, y, rate, e = (np.concatenate(parts) for parts in zip(*_samples(comparison), strict=True))
     limit = float(np.quantile(np.abs(e), 0.9995)) or 1e-12
     figure, axes = canvas(1, 3, 3.4, sharey=True)
-    slow = float(np.quantile(np.abs(rate[rate != 0.0]), 0.05)) if rate.any() else 1.0
+    fast = max(float(np.abs(rate).max()), 1e-9)
+    slow = 10.0 ** np.ceil(np.log10(fast) - 4.0)
     data: dict[str, Array] = {}
     told = []
-    for axis, (name, values, label) in zip(
-        axes.flat,
-        (("drive_V", u, "drive u [V]"), ("displacement_um", 1e6 * y, "displacement y [µm]"), ("rate_V_per_s", rate, "rate du/dt [V/s]")),
-        strict=True,
-    ):
+    quantities = (
+        ("drive_V", u, "drive u [V]"),
+        ("displacement_um", 1e6 * y, "displacement y [µm]"),
+        ("rate_V_per_s", rate, "rate du/dt [V/s]"),
+    )
+    for axis, (name, values, label) in zip(axes.flat, quantities, strict=True):
         if name == "rate_V_per_s":
             axis.set_xscale("symlog", linthresh=slow)
-            reach = max(float(np.abs(rate).max()), 2 * slow)
-            positive = np.geomspace(slow, reach, BINS // 2 + 1)
+            axis.set_xticks([-100 * slow, -slow, slow, 100 * slow])
+            positive = np.geomspace(slow, fast, BINS // 2)
             edges = np.concatenate((-positive[::-1], positive))
         else:
             edges = np.linspace(values.min(), values.max(), BINS + 1)
         fine = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b in zip(edges, edges[1:], strict=False)]))
         counts, xs, ys = np.histogram2d(values, e, bins=(fine, np.linspace(-limit, limit, 101)))
-        axis.pcolormesh(
-            xs, 1e9 * ys, np.where(counts > 0, counts, np.nan).T, cmap="Greys", norm=LogNorm(1, counts.max() * 2), rasterized=True
-        )
+        seen = np.where(counts > 0, counts, np.nan).T
+        axis.pcolormesh(xs, 1e9 * ys, seen, cmap="Greys", norm=LogNorm(0.3, 20 * counts.max()), rasterized=True)
         axis.axhline(0.0, color=GREY, linewidth=0.8)
         for sign, colour, line, word in ((1, ORANGE, "-", "rising"), (-1, BLUE, (0, (4, 2)), "falling")):
             centre, mean = _means(values, e, edges, np.sign(rate) == sign)
@@ -54,13 +56,12 @@ def residual_maps(comparison: Comparison) -> Drawing | None:
                 told.append(f"over {name} {word} the mean residual spans {1e9 * np.ptp(mean):.3g} nm")
         axis.set_xlabel(label)
     axes[0, 0].set_ylabel("residual [nm]")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    legend_above(figure, axes[0, 0])
     return Drawing(
         "residual_maps",
         "Residual against drive, displacement and rate",
-        "Grey: how often a residual occurs, all phases with equal weight (logarithmic). A mean that bends away from zero "
-        "is something the model lacks: bent over u or y a static nonlinearity, split between rising and falling a "
+        "Grey: how often a residual occurs, all phases with equal weight, logarithmic. A mean away from zero is "
+        "something the model lacks: bent over u or y a static nonlinearity, split between rising and falling a "
         "hysteresis, growing with du/dt a lag or a rate dependence.",
         "Maps of the residual: " + "; ".join(told) + ".",
         figure,

@@ -8,7 +8,7 @@ from scipy.signal import welch
 
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BEFORE, FLOOR, MEASURED, PREDICTED, canvas, duration
+from .style import BEFORE, FLOOR, MEASURED, PREDICTED, canvas, duration, legend_above, styled
 
 Array = NDArray[np.float64]
 
@@ -16,6 +16,7 @@ PANELS = 3
 """Most sample periods drawn."""
 
 
+@styled
 def residual_spectrum(comparison: Comparison) -> Drawing | None:
     """Amplitude density of displacement, residual and floor, one panel per sample period of the experiment."""
     now, before = comparison.now, comparison.before
@@ -47,13 +48,12 @@ def residual_spectrum(comparison: Comparison) -> Drawing | None:
         floor = float(np.sqrt(2.0 * period * np.mean(comparison.noise[members] ** 2)))
         axis.axhline(1e9 * floor, label="white noise", **FLOOR)
         data |= {f"residual_m_per_rtHz_{name}": left, f"white_noise_m_per_rtHz_{name}": np.array([floor])}
-        axis.set_title(f"phases sampled every {duration(period)}")
+        axis.set_title(f"sampled every {duration(period)}")
         axis.set_xlabel("frequency [Hz]")
         worst = f[int(np.argmax(left / floor))] if floor > 0 else f[int(np.argmax(left))]
         told.append(f"sampled every {duration(period)} the residual stands out most at {worst:.3g} Hz")
     axes[0, 0].set_ylabel("amplitude density [nm/√Hz]")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    legend_above(figure, axes[0, 0])
     return Drawing(
         "residual_spectrum",
         "Spectrum of the residual",

@@ -5,17 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ..errors import IdentificationError
 from ..identification.delay import StepResponse, identify_delay, step_response
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BLUE, GREEN, MEASURED, PREDICTED, canvas, duration
+from .style import BLUE, GREEN, MEASURED, PREDICTED, canvas, duration, styled
 
 ZOOM = 24
 """Samples drawn around the onset."""
 
 
+@styled
 def step(comparison: Comparison) -> Drawing | None:
     """Response per volt to the fastest edges of the experiment, averaged, ± 2σ of the noise."""
     members = comparison.indices("step", "steps") or list(range(len(comparison.experiment)))
@@ -32,9 +34,8 @@ def step(comparison: Comparison) -> Drawing | None:
         answers = [comparison.now.predicted[i] for i in members]
         predicted = step_response([replace(r, displacement=y) for r, y in zip(records, answers, strict=True)])
     figure, (axes,) = canvas(1, 2, 3.4)
-    first = int(np.argmax(measured.mean >= 0.9 * measured.mean[-1])) if measured.mean[-1] > 0 else ZOOM
-    for axis, end in ((axes[0], min(measured.mean.size, max(ZOOM, delay.samples + 8))), (axes[1], min(measured.mean.size, max(8 * first, 4 * ZOOM)))):
-        _draw(axis, measured, predicted, end)
+    _draw(axes[0], measured, predicted, min(measured.mean.size, max(ZOOM, delay.samples + 8)))
+    _draw(axes[1], measured, predicted, measured.mean.size)
     axes[0].axvline(1e6 * delay.time, color=BLUE, linestyle=(0, (6, 2, 1, 2)), label=f"delay {delay.samples} samples")
     model = comparison.model
     if model is not None and "arx" in model:
@@ -43,7 +44,7 @@ def step(comparison: Comparison) -> Drawing | None:
     axes[0].set_title("onset")
     axes[1].set_title("whole response")
     axes[0].set_ylabel("displacement per volt [µm/V]")
-    axes[0].legend(loc="upper left")
+    axes[0].legend(loc="lower right")
     data = {
         "time_s": measured.sample_period * np.arange(measured.mean.size),
         "measured_m_per_V": measured.mean,
@@ -55,22 +56,21 @@ def step(comparison: Comparison) -> Drawing | None:
     return Drawing(
         "step",
         "Step and delay",
-        f"Mean of {measured.edges} edges, ± 2σ. The {delay}. The first sample that stands out of the noise tells the delay; the cost of a fit "
-        "does not." + (f" Note: {told}." if told else ""),
-        f"Step response: {delay}; after {duration(data['time_s'][-1])} it has reached {1e6 * measured.mean[-1]:.4g} µm/V.",
+        f"Mean of {measured.edges} edges, ± 2σ; {delay}. The first sample that stands out of the noise tells it, the "
+        "cost of a fit does not." + (f" Note: {told}." if told else ""),
+        f"Step response: {delay}; it reaches {1e6 * measured.mean[-1]:.4g} µm/V after {duration(data['time_s'][-1])}.",
         figure,
         data,
     )
 
 
-def _draw(axis: object, measured: StepResponse, predicted: StepResponse | None, end: int) -> None:
+def _draw(axis: Axes, measured: StepResponse, predicted: StepResponse | None, end: int) -> None:
     time = 1e6 * measured.sample_period * np.arange(end)
-    scale, unit = (1e-3, "ms") if time[-1] > 2e3 else (1.0, "µs")
+    scale, unit = (1e-3, "ms") if time[-1] > 1e3 else (1.0, "µs")
     style = {**MEASURED, "marker": "o" if end < 64 else "", "markersize": 3}
-    axis.errorbar(  # type: ignore[attr-defined]
-        scale * time, 1e6 * measured.mean[:end], 2e6 * measured.deviation[:end], label="measured ± 2σ", elinewidth=0.8, **style
-    )
+    mean, bars = 1e6 * measured.mean[:end], 2e6 * measured.deviation[:end]
+    axis.errorbar(scale * time, mean, bars, label="measured ± 2σ", elinewidth=0.8, **style)
     if predicted is not None:
         upto = min(end, predicted.mean.size)
-        axis.plot(scale * time[:upto], 1e6 * predicted.mean[:upto], label="predicted", **PREDICTED)  # type: ignore[attr-defined]
-    axis.set_xlabel(f"time since the edge [{unit}]")  # type: ignore[attr-defined]
+        axis.plot(scale * time[:upto], 1e6 * predicted.mean[:upto], label="predicted", **PREDICTED)
+    axis.set_xlabel(f"time since the edge [{unit}]")

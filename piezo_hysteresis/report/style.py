@@ -5,10 +5,17 @@ Colours are those of Okabe and Ito; what is measured is always the grey solid li
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY = "#1a1a1a", "#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9"
 GREY = "#8c8c8c"
@@ -19,7 +26,7 @@ BEFORE: dict[str, Any] = {"color": BLUE, "linestyle": (0, (1, 1.2)), "linewidth"
 FLOOR: dict[str, Any] = {"color": GREY, "linestyle": (0, (6, 2, 1, 2)), "linewidth": 1.2}
 RESIDUAL: dict[str, Any] = {"color": ORANGE, "linestyle": "-", "linewidth": 0.9}
 
-SETTINGS: dict[str, Any] = {
+SETTINGS: Any = {
     "font.size": 9.5,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
@@ -44,6 +51,17 @@ WIDTH = 9.0
 """Width of every figure [inch]."""
 
 
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """Draw with `SETTINGS`, whatever the process has set."""
+
+    @wraps(draw)
+    def inside(*args: P.args, **options: P.kwargs) -> R:
+        with mpl.rc_context(SETTINGS):
+            return draw(*args, **options)
+
+    return inside
+
+
 def canvas(rows: int, columns: int, height: float, **options: Any) -> tuple[Figure, Any]:
     """A figure without global state and its axes, shape (rows, columns).
 
@@ -56,10 +74,21 @@ def canvas(rows: int, columns: int, height: float, **options: Any) -> tuple[Figu
     **options
         Passed on to `Figure.subplots`.
     """
-    with mpl.rc_context(SETTINGS):
-        figure = Figure(figsize=(WIDTH, height), layout="constrained")
-        axes = figure.subplots(rows, columns, squeeze=False, **options)
-    return figure, axes
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def plain_log(axis: Any) -> None:
+    """Label a logarithmic axis with plain numbers at 1, 2, 5."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(FuncFormatter(lambda value, _: ""))
+
+
+def legend_above(figure: Figure, axes: Axes, columns: int = 4) -> None:
+    """One legend for the figure, outside of the panels."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(columns, len(labels)))
 
 
 def nanometre(metres: float) -> str:

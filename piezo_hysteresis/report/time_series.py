@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from ..record import Record
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BEFORE, FLOOR, MEASURED, PREDICTED, RESIDUAL, canvas
+from .style import BEFORE, FLOOR, MEASURED, PREDICTED, RESIDUAL, canvas, styled
 from .thinning import thinned
+
+Array = NDArray[np.float64]
 
 COLUMNS = 3
 PANELS = 12
@@ -18,20 +23,25 @@ TURNS = 16
 """Turning points of the drive that one panel can show."""
 
 
-def window(record: Record, centre: int) -> slice:
-    """The part of a record to draw: all of it, or as many turning points around sample `centre` as can be told apart."""
-    span = float(np.ptp(record.voltage))
-    if span == 0.0:
-        return slice(0, record.size)
-    wave = np.concatenate(([record.voltage.min() - span], record.voltage, [record.voltage.min() - span]))
-    tops = find_peaks(wave, prominence=0.02 * span)[0].size
+def window(record: Record, residual: Array | None) -> slice:
+    """The part of a record to draw.
+
+    All of it, or as many turning points of the drive as can be told apart: in the middle half of the record, where the
+    drive is not on its way from or to rest, around the largest residual.
+    """
+    quarter = record.size // 4
+    middle = slice(quarter, record.size - quarter)
+    drive = record.voltage[middle]
+    tops = find_peaks(drive, prominence=0.02 * (float(np.ptp(drive)) or 1.0))[0].size
     if 2 * tops <= TURNS:
         return slice(0, record.size)
-    length = min(record.size, max(64, record.size * TURNS // (2 * tops)))
-    start = int(np.clip(centre - length // 2, 0, record.size - length))
-    return slice(start, start + length)
+    length = max(64, drive.size * TURNS // (2 * tops))
+    centre = quarter + (drive.size // 2 if residual is None else int(np.argmax(np.abs(residual[middle]))))
+    start = int(np.clip(centre - length // 2, 0, max(0, record.size - length)))
+    return slice(start, min(record.size, start + length))
 
 
+@styled
 def time_series(comparison: Comparison) -> Drawing:
     """One panel per phase name: displacement above, residual below; fast phases around their largest residual."""
     first: dict[str, int] = {}
@@ -48,16 +58,15 @@ def time_series(comparison: Comparison) -> Drawing:
         len(heights), columns, (2.9 if now is not None else 1.9) * bands + 0.3, gridspec_kw={"height_ratios": heights}
     )
     step = len(heights) // bands
-    data = {}
+    data: dict[str, NDArray[Any]] = {}
     for place, index in enumerate(shown):
         record = comparison.experiment[index]
         row, column = step * (place // columns), place % columns
-        centre = int(np.argmax(np.abs(now.residuals[index]))) if now is not None else record.size // 2
-        part = window(record, centre)
+        part = window(record, None if now is None else now.residuals[index])
         time = record.sample_period * np.arange(record.size)[part]
         scale, unit = (1e3, "ms") if time[-1] < 0.5 else (1.0, "s")
         y = record.displacement[part]
-        at = thinned(y)
+        at = thinned(y, 500)
         upper = axes[row, column]
         upper.plot(scale * time[at], 1e6 * y[at], label="measured", **MEASURED)
         data |= {f"time_s_{record.phase}": time[at], f"measured_m_{record.phase}": y[at]}
@@ -70,10 +79,10 @@ def time_series(comparison: Comparison) -> Drawing:
             upper.tick_params(labelbottom=False)
             if before is not None:
                 old = before.residuals[index][part]
-                old_at = thinned(old)
+                old_at = thinned(old, 700)
                 bottom.plot(scale * time[old_at], 1e9 * old[old_at], label="residual before", **BEFORE)
             e = now.residuals[index][part]
-            e_at = thinned(e)
+            e_at = thinned(e, 700)
             bottom.plot(scale * time[e_at], 1e9 * e[e_at], label="residual", **RESIDUAL)
             for sign in (-2.0, 2.0):
                 bottom.axhline(sign * 1e9 * comparison.floors[index], **FLOOR)
@@ -92,6 +101,7 @@ def time_series(comparison: Comparison) -> Drawing:
         handles |= dict(zip(*(axes[1, 0].get_legend_handles_labels())[::-1], strict=True))
         handles["± 2 × floor"] = axes[1, 0].get_lines()[-1]
     figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles))
+    figure.align_ylabels()
     names = ", ".join(comparison.experiment[i].phase for i in shown)
     words = "no model was given" if now is None else f"largest residual {1e9 * now.largest:.3g} nm"
     return Drawing(

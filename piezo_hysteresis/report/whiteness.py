@@ -8,9 +8,14 @@ from ..discrepancy.correlation import CAPTION, correlate
 from ..errors import RecordError
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BLACK, GREY, canvas
+from .style import BLACK, GREY, canvas, styled
+from .thinning import thinned
+
+SHARE = 40
+"""The largest lag drawn is one part in so many of the record."""
 
 
+@styled
 def whiteness(comparison: Comparison) -> Drawing | None:
     """Auto- and cross-correlation of the residual in the phase with the broadest drive."""
     now = comparison.now
@@ -24,7 +29,9 @@ def whiteness(comparison: Comparison) -> Drawing | None:
         members = [max(range(len(comparison.experiment)), key=lambda i: comparison.experiment[i].size)]
     record = comparison.experiment[members[0]]
     try:
-        found = correlate(now.residuals[members[0]], record.voltage, record.sample_period)
+        found = correlate(
+            now.residuals[members[0]], record.voltage, record.sample_period, max(20, record.size // SHARE)
+        )
     except RecordError:
         return None
     figure, (axes,) = canvas(1, 2, 3.0)
@@ -34,8 +41,8 @@ def whiteness(comparison: Comparison) -> Drawing | None:
         (axes[1], found.cross_lag, found.cross, found.cross_bound, "residual with the drive"),
     ):
         axis.axhspan(-bound, bound, color="#dddddd", label="99 % bounds", zorder=0)
-        axis.vlines(scale * lag, 0.0, values, color=BLACK, linewidth=1.2)
-        axis.plot(scale * lag, values, linestyle="none", marker="o", markersize=2.5, color=BLACK)
+        at = thinned(values)
+        axis.plot(scale * lag[at], values[at], color=BLACK, linewidth=1.2)
         axis.axhline(0.0, color=GREY, linewidth=0.8)
         axis.set_title(f"{title}, {record.phase}")
         axis.set_xlabel(f"lag [{unit}]")
@@ -48,8 +55,8 @@ def whiteness(comparison: Comparison) -> Drawing | None:
     return Drawing(
         "residual_tests",
         "Residual tests",
-        f"In {record.phase} the residual is {white} and {free}. {CAPTION} With this many samples the tests fire at the slightest misfit: read "
-        "the height, not only the crossing.",
+        f"In {record.phase} the residual is {white} and {free}. {CAPTION} With this many samples the tests fire at the "
+        "slightest misfit: read the height, not only the crossing.",
         f"Residual tests in {record.phase}: the residual is {white} and {free}; largest cross-correlation "
         f"{np.max(np.abs(found.cross)):.3g} against a bound of {found.cross_bound:.3g}.",
         figure,

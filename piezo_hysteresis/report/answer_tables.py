@@ -1,0 +1,40 @@
+"""Tables of a diagnosis: the effects found, where the residual sits, why the others were rejected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .table import Table
+
+
+def effect_table(answer: Mapping[str, Any]) -> Table | None:
+    """Every effect found, parameter by parameter, with 95 % intervals."""
+    rows = []
+    for effect in answer.get("effects", ()):
+        twins = ", ".join(effect["confusable_with"]) or "none"
+        share = f"{100 * effect['explained_fraction']:.0f} %"
+        for name, value in effect["parameters"].items():
+            interval = value.get("interval_95")
+            told = f"{interval[0]:.4g} … {interval[1]:.4g}" if interval else ""
+            rows.append(
+                (effect["name"], effect["family"], share, twins, name, f"{value['value']:.4g}", told, value["unit"])
+            )
+    header = ("effect", "family", "explains", "confusable with", "parameter", "value", "95 %", "unit")
+    return Table("Effects found", header, tuple(rows), "", frozenset({2, 5, 6})) if rows else None
+
+
+def where_table(answer: Mapping[str, Any]) -> Table | None:
+    """Axes along which the residual is concentrated, the strongest first."""
+    rows = tuple(
+        (place["axis"].replace("_", " "), f"{100 * place['share']:.0f} %", place["detail"])
+        for place in answer.get("where", ())
+    )
+    note = "Share of the power of the residual, before anything was added."
+    return Table("Where the residual sits", ("axis", "share", "detail"), rows, note, frozenset({1})) if rows else None
+
+
+def rejection_table(answer: Mapping[str, Any]) -> Table | None:
+    """Effects that were tried and why they were not taken."""
+    rows = tuple((r["name"], r["reason"]) for r in answer.get("rejected", ()))
+    return Table("Rejected", ("effect", "reason"), rows) if rows else None

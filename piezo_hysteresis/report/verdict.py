@@ -1,0 +1,111 @@
+"""The verdict in plain words, before any figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .comparison import Comparison
+from .style import nanometre
+
+ENOUGH = 1.5
+"""Mean square of error over floor up to which nothing is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One headline and the sentences under it."""
+
+    headline: str
+    sentences: tuple[str, ...]
+
+
+def verdict(comparison: Comparison, answer: Mapping[str, Any] | None = None) -> Verdict:
+    """Say what the comparison, and the diagnosis if there is one, come to.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Models against measurement.
+    answer : mapping, optional
+        The answer of a diagnosis, as it is written for machines.
+    """
+    severe = [n.message for n in comparison.experiment.notices if n.severe]
+    doubts = tuple(f"Caution: {message}." for message in severe)
+    if comparison.now is None:
+        return Verdict("The recording, without a model", (*doubts, "No model was given: only the data are shown."))
+    if answer is None:
+        return Verdict(_fit_headline(comparison), (*doubts, *_fit_sentences(comparison)))
+    return Verdict(_headline(answer), (*doubts, *_sentences(answer), *_fit_sentences(comparison)))
+
+
+def _excess(comparison: Comparison) -> float:
+    assert comparison.now is not None
+    ratios = [(row.rms / comparison.floors[row.index]) ** 2 for row in comparison.now.rows]
+    return float(sum(ratios) / len(ratios))
+
+
+def _fit_headline(comparison: Comparison) -> str:
+    now = comparison.now
+    assert now is not None
+    return f"The model predicts this experiment to {now.percent:.2g} % of range"
+
+
+def _fit_sentences(comparison: Comparison) -> tuple[str, ...]:
+    now, before = comparison.now, comparison.before
+    assert now is not None
+    worst = max(now.rows, key=lambda row: row.rms / comparison.floors[row.index])
+    floor = 100.0 * float((comparison.floors**2).mean() ** 0.5) / now.range
+    sentences = [
+        f"In free run the error is {nanometre(now.rms)} rms over all phases, {now.percent:.3g} % of a range of "
+        f"{nanometre(now.range)}; the floor is {floor:.2g} %."
+    ]
+    if before is not None:
+        sentences.append(f"Before, it was {nanometre(before.rms)}, {before.percent:.3g} % of range.")
+    if _excess(comparison) <= ENOUGH:
+        sentences.append("That is the floor: what is left is noise.")
+    else:
+        times = worst.rms / comparison.floors[worst.index]
+        sentences.append(
+            f"It stands out most in {worst.phase}: {worst.percent:.3g} % of range, {times:.3g} times its floor."
+        )
+    return tuple(sentences)
+
+
+def _headline(answer: Mapping[str, Any]) -> str:
+    names = [effect["name"].replace("_", " ") for effect in answer.get("effects", ())]
+    if answer["verdict"] == "named" and names:
+        return (
+            f"Missing effect: {' and '.join(names)}" if len(names) == 1 else f"Missing effects: {' and '.join(names)}"
+        )
+    if answer["verdict"] == "nothing_missing":
+        return "Nothing is missing beyond the noise"
+    return "Something is missing, but it cannot be named"
+
+
+def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
+    found = []
+    for effect in answer.get("effects", ()):
+        name = effect["name"].replace("_", " ")
+        found.append(f"{name.capitalize()} explains {100 * effect['explained_fraction']:.0f} % of what was missing.")
+        if not effect["member_certain"]:
+            twins = ", ".join(t.replace("_", " ") for t in effect["confusable_with"])
+            others = f": {twins} would do as well" if twins else ""
+            found.append(f"The family ({effect['family']}) is certain, the member is not{others}.")
+    places = [place for place in answer.get("where", ()) if place.get("detail")]
+    if places:
+        found.append(f"The residual sits mostly here: {places[0]['detail']}.")
+    gap = answer.get("gap_percent_of_range") or {}
+    if gap.get("after") is not None:
+        found.append(
+            f"On data used neither for fitting nor for choosing the gap goes from {gap['before']:.3g} % to "
+            f"{gap['after']:.3g} % of range, floor {gap['floor']:.3g} %."
+        )
+    following = answer.get("next_experiment")
+    if following:
+        names = " from ".join(n.replace("_", " ") for n in following.get("separates", ()))
+        found.append(
+            f"To learn more, record the phase “{following['phase']}”" + (f": it separates {names}." if names else ".")
+        )
+    return tuple(found)
