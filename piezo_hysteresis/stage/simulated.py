@@ -35,7 +35,10 @@ class SimulatedStage(Simulation):
     (200, 'step')
     """
 
-    _streaming = True
+    def __init__(
+        self, parameters: PlantParameters | None = None, *, seed: int = 0, sample_period: float = 20e-6
+    ) -> None:
+        super().__init__(parameters, seed=seed, sample_period=sample_period, streaming=True)
 
     def exchange(self, voltage: Samples) -> Acquired:
         """Apply a block of drive voltages [V] and return what was applied and measured, sample by sample."""
@@ -59,8 +62,6 @@ class SimulatedMemoryStage(Simulation):
         Speed at which a waveform plays: 1 is real time; infinite as fast as the machine can.
     """
 
-    _streaming = False
-
     def __init__(
         self,
         parameters: PlantParameters | None = None,
@@ -76,26 +77,25 @@ class SimulatedMemoryStage(Simulation):
                 f"memory stage: got longest_block {longest_block}, dead_time {dead_time:g} s, real_time_factor "
                 f"{real_time_factor:g}, expected at least 1 sample, no negative time and a positive factor"
             )
-        self._longest_block = longest_block
-        super().__init__(parameters, seed=seed, sample_period=sample_period)
+        super().__init__(
+            parameters, seed=seed, sample_period=sample_period, streaming=False, longest_block=longest_block
+        )
         self._dead_time, self._factor = dead_time, real_time_factor
         self._waveform: Samples | None = None
         self._acquired: Acquired | None = None
-        self._armed = False
-        self._end = 0.0
+        self._armed, self._playing = False, False
+        self._begin = 0.0
 
     def upload(self, voltage: Samples) -> None:
         """Store a waveform [V]."""
-        self._require_idle()
+        self._require_ready()
         self._waveform = self._check(voltage, self.voltage).copy()
         self._armed = False
 
     def arm(self) -> None:
         """Make ready to start; takes `dead_time` of simulated time at the voltage in force."""
-        self._require_idle()
-        if self._waveform is None:
-            raise StageError(f"{self._description.name}: armed without a waveform, expected upload() first")
-        self._check(self._waveform, self.voltage)
+        self._require_ready()
+        self._check(self._uploaded(), self.voltage)
         idle = round(self._dead_time / self._sample_period)
         if idle:
             self._plant.run(np.full(idle, self.voltage))
@@ -103,44 +103,61 @@ class SimulatedMemoryStage(Simulation):
 
     def start(self) -> None:
         """Play and record the waveform."""
-        self._require_open()
-        if not self._armed or self._waveform is None:
+        self._require_ready()
+        if not self._armed:
             raise StageError(f"{self._description.name}: started without being armed, expected arm() first")
-        self._armed = False
-        self._end = time.monotonic() + self._waveform.size * self._sample_period / self._factor
-        self._acquired = Acquired(*self._plant.run(self._waveform))
+        self._armed, self._playing, self._begin = False, True, time.monotonic()
 
     def wait(self, timeout: float) -> None:
         """Return when the waveform has been played; StageError after `timeout` [s]."""
-        self._require_open()
-        if self._acquired is None:
-            raise StageError(f"{self._description.name}: nothing to wait for, expected start() first")
-        left = self._end - time.monotonic()
-        time.sleep(min(max(left, 0.0), max(timeout, 0.0)))
+        left = self._left() if self._playing else 0.0
+        time.sleep(min(left, max(timeout, 0.0)))
         if left > timeout:
             raise StageError(
                 f"{self._description.name}: still playing after {timeout:g} s, expected {left:.3g} s; wait again"
             )
+        self._require_ready()
+        if self._acquired is None:
+            raise StageError(f"{self._description.name}: nothing to wait for, expected start() first")
 
     def read(self) -> Acquired:
         """The record of the waveform that was played."""
-        self._require_idle()
+        self._require_ready()
         if self._acquired is None:
             raise StageError(f"{self._description.name}: nothing recorded, expected upload, arm, start, wait first")
         return self._acquired
 
     def configure(self, sample_period: float) -> None:
         """Sample at another period [s]; a waveform in memory is forgotten."""
-        self._require_idle()
         super().configure(sample_period)
         self._waveform, self._acquired, self._armed = None, None, False
 
     def safe(self) -> None:
-        """Stop what plays and apply the safe voltage."""
-        self._end, self._armed = 0.0, False
+        """Stop what plays where it is and apply the safe voltage."""
+        self._armed = False
+        if self._playing:
+            waveform = self._uploaded()
+            share = 1 - self._left() * self._factor / (waveform.size * self._sample_period) if self._left() else 1.0
+            played = waveform[: int(share * waveform.size)]
+            if played.size:
+                self._plant.run(played)
+            self._playing = False
         super().safe()
 
-    def _require_idle(self) -> None:
-        self._require_open()
-        if time.monotonic() < self._end:
+    def _uploaded(self) -> Samples:
+        if self._waveform is None:
+            raise StageError(f"{self._description.name}: holds no waveform, expected upload() first")
+        return self._waveform
+
+    def _left(self) -> float:
+        """Time until the waveform has been played [s]."""
+        duration = self._uploaded().size * self._sample_period / self._factor
+        return max(self._begin + duration - time.monotonic(), 0.0)
+
+    def _require_ready(self) -> None:
+        super()._require_ready()
+        if not self._playing:
+            return
+        if self._left() > 0.0:
             raise StageError(f"{self._description.name}: is still playing, expected wait() first")
+        self._acquired, self._playing = Acquired(*self._plant.run(self._uploaded())), False

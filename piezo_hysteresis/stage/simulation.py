@@ -20,24 +20,27 @@ _LONGEST_PERIOD = 10e-3
 class Simulation:
     """What both kinds of simulated stage share: a plant behind limits, the slow path, whole phases played from rest."""
 
-    _streaming: bool
-    _longest_block: int | None = None
-
     def __init__(
-        self, parameters: PlantParameters | None = None, *, seed: int = 0, sample_period: float = 20e-6
+        self,
+        parameters: PlantParameters | None,
+        *,
+        seed: int,
+        sample_period: float,
+        streaming: bool,
+        longest_block: int | None = None,
     ) -> None:
         self.parameters = PlantParameters() if parameters is None else parameters
         e, sensor = self.parameters.electronics, self.parameters.sensor
         rest = min(max(0.0, e.voltage_min), e.voltage_max)
         self._description = Description(
-            name=f"simulated {'streaming' if self._streaming else 'memory'} stage, seed {seed}",
-            streaming=self._streaming,
+            name=f"simulated {'streaming' if streaming else 'memory'} stage, seed {seed}",
+            streaming=streaming,
             sample_period_min=_SHORTEST_PERIOD,
             sample_period_max=_LONGEST_PERIOD,
             voltage_min=e.voltage_min,
             voltage_max=e.voltage_max,
             safe_voltage=rest,
-            longest_block=self._longest_block,
+            longest_block=longest_block,
             amplifier_gain=e.amplifier_gain,
             displacement_min=-sensor.range,
             displacement_max=sensor.range - sensor.lsb,
@@ -48,9 +51,12 @@ class Simulation:
         self._closed = False
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any], *, seed: int = 0, sample_period: float = 20e-6) -> Self:
-        """A stage whose parameters are the defaults changed by a mapping, see `PlantParameters.from_mapping`."""
-        return cls(PlantParameters.from_mapping(mapping), seed=seed, sample_period=sample_period)
+    def from_mapping(cls, mapping: Mapping[str, Any], **options: Any) -> Self:
+        """A stage whose parameters are the defaults changed by a mapping, see `PlantParameters.from_mapping`.
+
+        `options` are the other arguments of the class.
+        """
+        return cls(PlantParameters.from_mapping(mapping), **options)
 
     @property
     def description(self) -> Description:
@@ -74,7 +80,7 @@ class Simulation:
 
     def configure(self, sample_period: float) -> None:
         """Sample at another period [s]; the plant is taken as settled at the voltage in force."""
-        self._require_open()
+        self._require_ready()
         period = self._description.check_sample_period(sample_period)
         if period != self._sample_period:
             self._plant.configure(period, self.voltage)
@@ -132,7 +138,7 @@ class Simulation:
         StageError
             If the drive breaks a limit; nothing is played.
         """
-        self._require_open()
+        self._require_ready()
         start = self.voltage
         if not continues:
             start = float(np.ravel(voltage)[0]) if initial_voltage is None else float(initial_voltage)
@@ -154,7 +160,7 @@ class Simulation:
         )
         return record.decimate(average) if average > 1 else record
 
-    def _require_open(self) -> None:
+    def _require_ready(self) -> None:
         if self._closed:
             raise StageError(f"{self._description.name}: is closed, expected an open stage; make a new one")
 
@@ -162,5 +168,5 @@ class Simulation:
         return self._description.check_voltage(voltage, start, self._sample_period)
 
     def _run(self, voltage: Samples) -> Reading:
-        self._require_open()
+        self._require_ready()
         return self._plant.run(self._check(voltage, self.voltage))

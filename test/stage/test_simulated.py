@@ -83,19 +83,30 @@ def test_memory_refuses_what_is_out_of_order():
 
 
 def test_a_waveform_takes_its_time_where_that_is_asked_for():
-    """At 1e-4 of real time 20 ms last 200 s: still playing, nothing to read, and safe() stops it."""
+    """At 1e-4 of real time 20 ms last 200 s: everything but safe() and close() has to wait."""
     stage = SimulatedMemoryStage(real_time_factor=1e-4)
     stage.upload(np.full(1000, 3.0))
     stage.arm()
     stage.start()
     with pytest.raises(StageError, match="still playing"):
         stage.wait(0.0)
-    for busy in (stage.read, lambda: stage.upload(np.zeros(1)), lambda: stage.configure(1e-3)):
+    for busy in (stage.read, stage.start, stage.read_displacement, lambda: stage.upload(np.zeros(1))):
         with pytest.raises(StageError, match="still playing"):
             busy()
+    armed = stage.time
     stage.safe()
     assert stage.voltage == 0.0
-    assert stage.read_displacement() == pytest.approx(stage.parameters.stroke(0, 3.0), rel=0.3)
+    assert stage.time < armed + 0.02, "stopped before its end"
+    with pytest.raises(StageError, match="nothing recorded"):
+        stage.read()
+
+
+def test_a_real_time_memory_stage_gives_what_a_fast_one_gives():
+    drive = np.linspace(0.0, 5.0, 200)
+    fast, paced = (SimulatedMemoryStage(seed=1, real_time_factor=f) for f in (math.inf, 1.0))
+    np.testing.assert_array_equal(
+        play_from_memory(fast, drive).displacement, play_from_memory(paced, drive).displacement
+    )
 
 
 @KINDS
