@@ -59,7 +59,7 @@ class BoucWen(Effect):
     family = "hysteresis"
     place = Place.HYSTERESIS
     equation = "w = p1 v³ + p2 v + h;  dh = A dv − β|dv|h − γ dv|h|"
-    signature = "rate-independent loops with one memory state, saturating at |A|/(β+γ)"
+    signature = "rate-independent loops with one memory state, saturating at |A|/(β + γ sgn A)"
     source = "paper, Eq. (2), (3), (6); exact step for n = 1"
     parameters = MODIFIED_BOUC_WEN
 

@@ -12,7 +12,7 @@ class InitialState(Term):
     Parameters
     ----------
     h0 : float
-        h at the start [normalised, 1]; at most |A|/(β + γ) in size.
+        h at the start [normalised, 1]; at most |A|/(β + γ sgn A) in size.
     """
 
     name = "initial_state"

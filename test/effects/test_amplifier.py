@@ -1,0 +1,59 @@
+"""Limits of the amplifier."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from piezo_hysteresis.effects import AmplifierSaturation, AmplifierSlewLimit, Effect, Setting
+from piezo_hysteresis.errors import ParameterError
+
+PERIOD = 2e-5
+
+
+def run(effect: Effect, x: np.ndarray) -> np.ndarray:
+    block = effect.block(Setting(PERIOD, PERIOD))
+    return block.run(x, block.rest(x[0], 0.0))[0]
+
+
+def test_a_step_becomes_a_ramp_of_the_slew_limit() -> None:
+    y = run(AmplifierSlewLimit(S=1000.0), np.append(1.0, np.full(399, 5.0)))
+    np.testing.assert_allclose(y, np.minimum(1.0 + 1000.0 * PERIOD * np.arange(400), 5.0), rtol=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=50), st.floats(1.0, 1e6))
+def test_no_step_is_larger_than_the_limit_and_a_drive_inside_it_passes(x: list[float], slope: float) -> None:
+    drive = np.array(x)
+    y = run(AmplifierSlewLimit(S=slope), drive)
+    assert np.abs(np.diff(y)).max() <= slope * PERIOD * (1 + 1e-9) + 1e-14
+    if np.abs(np.diff(drive)).max() <= slope * PERIOD:
+        np.testing.assert_array_equal(y, drive)
+
+
+def test_saturation_clips_hard_without_corner() -> None:
+    x = np.linspace(-5.0, 12.0, 300)
+    y = run(AmplifierSaturation(lower=-1.0, upper=10.0, corner=0.0), x)
+    np.testing.assert_allclose(y, np.clip(x, -1.0, 10.0), atol=1e-14)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(0.0, 2.0), st.floats(5.0, 10.0), st.floats(0.01, 2.0))
+def test_a_corner_is_smooth_monotonic_and_ends_at_the_limits(lower: float, upper: float, corner: float) -> None:
+    x = np.linspace(-8.0, 18.0, 20001)
+    y = run(AmplifierSaturation(lower=lower, upper=upper, corner=corner), x)
+    slope = np.diff(y) / np.diff(x)
+    assert (slope > -1e-9).all()
+    assert (slope < 1 + 1e-9).all()
+    assert np.abs(np.diff(slope)).max() < 1.1 * np.diff(x)[0] / (2 * corner)
+    assert y[0] == pytest.approx(lower, abs=1e-12)
+    assert y[-1] == pytest.approx(upper, abs=1e-12)
+    inside = (x > lower + corner) & (x < upper - corner)
+    np.testing.assert_array_equal(y[inside], x[inside])
+
+
+def test_crossed_limits_are_refused() -> None:
+    with pytest.raises(ParameterError, match="expected lower < upper"):
+        AmplifierSaturation(lower=5.0, upper=1.0)

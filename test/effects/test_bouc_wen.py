@@ -1,0 +1,184 @@
+"""The loop against Eq. (2) integrated by scipy, and the promises of its two kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from piezo_hysteresis.effects import (
+    AsymmetricHysteresis,
+    BoucWen,
+    HysteresisExponent,
+    InitialState,
+    PublishedBoucWen,
+    RateDependentHysteresis,
+    Setting,
+    Term,
+)
+from piezo_hysteresis.effects.loop import run_general, run_plain
+from piezo_hysteresis.errors import ModelError, ParameterError
+
+PERIOD = 1e-3
+SETTING = Setting(PERIOD, PERIOD)
+TURNS = np.array([0.0, 0.6, 0.2, 0.5, -0.4, 0.3])
+
+
+def polyline(turns: np.ndarray, steps: int) -> np.ndarray:
+    """Straight lines between turning points, `steps` samples each."""
+    return np.interp(np.arange(steps * (turns.size - 1) + 1) / steps, np.arange(turns.size), turns)
+
+
+def state_of(v: np.ndarray, *terms: Term, **values: float) -> np.ndarray:
+    """h of the loop alone: p1 = p2 = 0."""
+    block = BoucWen(p1=0.0, p2=0.0, **values).block(SETTING, terms)
+    return block.run(v, block.rest(v[0], 0.0))[0]
+
+
+def integrated(turns: np.ndarray, rate, h: float = 0.0) -> np.ndarray:
+    """h at the turning points from dh/dv = rate(h, s) in direction s, by scipy."""
+    ends = [h]
+    for a, b in zip(turns[:-1], turns[1:], strict=True):
+        s = np.sign(b - a)
+        crossing = lambda v, h: h[0]  # noqa: E731
+        v = a
+        while (b - v) * s > 1e-12:
+            part = solve_ivp(
+                lambda v, h, s=s: rate(h, s), (v, b), [h], rtol=1e-11, atol=1e-13, events=crossing, max_step=0.01
+            )
+            v, h = part.t[-1], part.y[0, -1]
+        ends.append(h)
+    return np.array(ends)
+
+
+def law(values: dict[str, float], phi1=0.0, phi2=0.0, n=1.0, amplitude=1.0):
+    """Eq. (2) with terms, as dh/dv in direction s."""
+    a, beta, gamma = values["A"] * amplitude, values["beta"], values["gamma"]
+
+    def rate(h, s):
+        power = np.abs(h / 0.2) ** (n - 1.0)
+        loss = power * (beta * s * h + gamma * np.abs(h))
+        return a - loss + phi1 * h + phi2 * s * np.abs(h)
+
+    return rate
+
+
+VALUES = {"A": -0.7691, "beta": 4.6075, "gamma": -0.8725}
+
+
+def test_the_loop_solves_equation_2_exactly_at_any_number_of_samples() -> None:
+    expected = integrated(TURNS, law(VALUES))
+    for steps in (1, 7, 500):
+        got = state_of(polyline(TURNS, steps), **VALUES)[::steps]
+        np.testing.assert_allclose(got, expected, atol=2e-10)
+
+
+def test_asymmetry_solves_its_equation() -> None:
+    expected = integrated(TURNS, law(VALUES, phi1=0.9, phi2=-0.5))
+    got = state_of(polyline(TURNS, 11), AsymmetricHysteresis(phi1=0.9, phi2=-0.5), **VALUES)[::11]
+    np.testing.assert_allclose(got, expected, atol=2e-10)
+
+
+@pytest.mark.parametrize("n", [1.2, 1.7, 2.0])
+def test_exponent_solves_its_equation(n: float) -> None:
+    expected = integrated(TURNS, law(VALUES, n=n))
+    got = state_of(polyline(TURNS, 200), HysteresisExponent(n=n), **VALUES)[::200]
+    np.testing.assert_allclose(got, expected, atol=3e-5)
+
+
+@pytest.mark.parametrize(("k", "a"), [(0.05, 0.5), (-0.03, 0.0), (0.02, 1.0)])
+def test_rate_changes_the_slope_of_the_state_with_speed(k: float, a: float) -> None:
+    v = np.arange(200) * 0.003
+    speed = 0.003 / PERIOD
+    factor = 1.0 + k * (np.log(speed) if a == 0.0 else (speed**a - 1.0) / a)
+    expected = state_of(v, **{**VALUES, "A": VALUES["A"] * factor})
+    np.testing.assert_allclose(state_of(v, RateDependentHysteresis(k=k, a=a), **VALUES), expected, rtol=1e-12)
+
+
+def test_rate_law_is_continuous_at_the_logarithm() -> None:
+    v = np.sin(np.arange(200) / 10.0)
+    near = state_of(v, RateDependentHysteresis(k=0.05, a=1e-7), **VALUES)
+    np.testing.assert_allclose(state_of(v, RateDependentHysteresis(k=0.05, a=0.0), **VALUES), near, atol=1e-7)
+
+
+def test_a_remanent_state_is_there_at_rest_and_forgotten_after_a_swing() -> None:
+    v = np.concatenate((np.zeros(50), polyline(np.array([0.0, 3.0, 0.0]), 100)))
+    clean, remanent = state_of(v, **VALUES), state_of(v, InitialState(h0=0.05), **VALUES)
+    np.testing.assert_array_equal(remanent[:50], 0.05)
+    assert abs(remanent[-1] - clean[-1]) < 1e-6
+
+
+numbers = st.floats(-1.0, 1.0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(numbers, min_size=2, max_size=40),
+    st.floats(-3.0, 3.0),
+    st.floats(0.0, 20.0),
+    st.floats(-1.0, 1.0),
+)
+def test_the_general_kernel_with_everything_off_is_the_plain_one_bit_for_bit(
+    v: list[float], a: float, beta: float, share: float
+) -> None:
+    loop = np.array([a, beta, share * beta, 0.0, 0.0, 1.0, 0.0, 0.5])
+    samples, plain, general = np.array(v), np.empty(len(v)), np.empty(len(v))
+    start = np.array([0.01, v[0]])
+    run_plain(samples, loop, start.copy(), plain)
+    run_general(samples, loop, PERIOD, start.copy(), general)
+    np.testing.assert_array_equal(general, plain)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(numbers, min_size=2, max_size=60),
+    st.sampled_from([-0.8, 0.8]),
+    st.floats(0.5, 20.0),
+    st.floats(-0.95, 0.95),
+)
+def test_the_state_stays_below_its_bound(v: list[float], a: float, beta: float, share: float) -> None:
+    gamma = share * beta
+    h = state_of(np.array(v), A=a, beta=beta, gamma=gamma)
+    assert np.abs(h).max() <= abs(a) / (beta + np.sign(a) * gamma) * (1 + 1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(numbers, min_size=3, max_size=20), st.integers(2, 5))
+def test_the_result_does_not_depend_on_how_finely_a_line_is_sampled(turns: list[float], steps: int) -> None:
+    v = np.array(turns)
+    np.testing.assert_allclose(state_of(polyline(v, steps), **VALUES)[::steps], state_of(v, **VALUES), atol=1e-13)
+
+
+def test_the_published_form_is_equation_7() -> None:
+    v = polyline(TURNS, 40)
+    effect = PublishedBoucWen()
+    block = effect.block(SETTING)
+    w, _ = block.run(v, block.rest(v[0], 0.0))
+    h, expected = 0.0, []
+    for before, now in zip(np.append(v[0], v[:-1]), v, strict=True):
+        dv = now - before
+        h += effect["A"] * dv - effect["beta"] * abs(dv) * h - effect["gamma"] * dv * abs(h)
+        expected.append(effect["p1"] * now**3 + effect["p2"] * now + h)
+    np.testing.assert_allclose(w, expected, rtol=1e-13)
+
+
+def test_the_published_form_converges_to_the_exact_one() -> None:
+    def error(steps: int) -> float:
+        v = polyline(TURNS, steps)
+        block = PublishedBoucWen(p1=0.0, p2=0.0).block(SETTING)
+        return float(np.abs(block.run(v, block.rest(v[0], 0.0))[0] - state_of(v, **VALUES)).max())
+
+    assert error(2000) < 0.6 * error(1000) < 0.36 * error(500)
+
+
+@pytest.mark.parametrize("kind", [BoucWen, PublishedBoucWen])
+def test_an_unbounded_loop_is_refused(kind) -> None:
+    with pytest.raises(ParameterError, match="expected beta >= "):
+        kind(beta=1.0, gamma=-1.5)
+
+
+def test_a_term_has_no_block_of_its_own() -> None:
+    with pytest.raises(ModelError, match="term of 'bouc_wen'"):
+        InitialState(h0=0.1).block(SETTING)

@@ -1,0 +1,64 @@
+"""Plays: the memory of turning points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from piezo_hysteresis.effects import Backlash, Effect, HysteresisMemory, Setting
+from piezo_hysteresis.errors import ParameterError
+
+SETTING = Setting(1e-3, 1e-3)
+
+
+def run(effect: Effect, x: np.ndarray) -> np.ndarray:
+    block = effect.block(SETTING)
+    return block.run(x, block.rest(x[0], 0.0))[0]
+
+
+levels = st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=50)
+
+
+@settings(max_examples=50, deadline=None)
+@given(levels, st.floats(0.0, 0.5))
+def test_backlash_never_leaves_its_play_and_moves_only_when_pushed(x: list[float], b: float) -> None:
+    drive = np.array(x)
+    y = run(Backlash(b=b), drive)
+    assert (np.abs(y - drive) <= b + 1e-15).all()
+    moved = np.diff(y) != 0
+    np.testing.assert_allclose(np.abs(y - drive)[1:][moved], b, atol=1e-15)
+    assert (np.diff(y)[moved] * np.diff(drive)[moved] > 0).all()
+
+
+def test_backlash_is_blind_below_its_half_width() -> None:
+    x = 2.0 + 0.05 * np.sin(np.arange(200) / 7.0)
+    np.testing.assert_array_equal(run(Backlash(b=0.06), x), np.full(200, 2.0))
+
+
+@settings(max_examples=40, deadline=None)
+@given(levels)
+def test_memory_is_the_weighted_sum_of_plays(x: list[float]) -> None:
+    effect = HysteresisMemory(c=[0.3, -0.1, 0.2], reach=0.4)
+    drive = np.array(x)
+    parts = [c * run(Backlash(b=r), drive) for c, r in zip(effect.array("c"), effect.radii, strict=True)]
+    np.testing.assert_allclose(run(effect, drive), sum(parts), atol=1e-15)
+
+
+@settings(max_examples=40, deadline=None)
+@given(levels, st.floats(-0.5, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_a_closed_minor_loop_returns_to_the_point_where_it_left(
+    x: list[float], top: float, down: float, up: float
+) -> None:
+    bottom = top - down * (top + 1.0)
+    turn = bottom + up * (top - bottom)
+    path = np.array([*x, -1.0, top, bottom, turn, bottom, top])
+    y = run(HysteresisMemory(c=np.full(8, 0.1)), path)
+    np.testing.assert_allclose(y[-1], y[-5], atol=1e-14)
+    np.testing.assert_allclose(y[-2], y[-4], atol=1e-14)
+
+
+def test_one_play_is_no_grid() -> None:
+    with pytest.raises(ParameterError, match="expected at least 2"):
+        HysteresisMemory(c=[0.1])
