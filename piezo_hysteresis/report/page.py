@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +13,7 @@ from .answer_tables import effect_table, rejection_table, where_table
 from .bode import bode
 from .comparison import Comparison
 from .creep import creep
+from .document import document
 from .drawing import Drawing
 from .error_table import error_table, frequency_table
 from .gap import gap
@@ -25,7 +23,6 @@ from .quality_table import notice_table, record_table
 from .residual_maps import residual_maps
 from .spectrum import residual_spectrum
 from .step import step
-from .style import nanometre
 from .table import Table
 from .time_series import time_series
 from .verdict import verdict
@@ -112,10 +109,10 @@ def page(
             if drawing is not None:
                 drawn.setdefault(heading, []).append(drawing)
     tables = _tables(comparison, fit, answer)
-    headings = [h for h in (*SECTIONS, "Parameters", "Data") if h in drawn or h in tables]
-    body = "".join(_section(h, tables.get(h, ()), drawn.get(h, ())) for h in headings)
+    headings = [h for h in ("Diagnosis", *SECTIONS, "Parameters", "Data") if h in drawn or h in tables]
+    parts = {h: (drawn.get(h, []), tables.get(h, [])) for h in headings}
     drawings = tuple(d for group in drawn.values() for d in group)
-    return Page(_document(title, comparison, answer, headings, body), drawings)
+    return Page(document(title, comparison, verdict(comparison, answer), parts), drawings)
 
 
 def _tables(comparison: Comparison, fit: Fit | None, answer: Mapping[str, Any] | None) -> dict[str, list[Table]]:
@@ -123,79 +120,9 @@ def _tables(comparison: Comparison, fit: Fit | None, answer: Mapping[str, Any] |
         "Errors": [error_table(comparison), frequency_table(comparison)],
         "Data": [notice_table(comparison.experiment), record_table(comparison.experiment, comparison.noise)],
     }
+    if answer is not None:
+        tables["Diagnosis"] = [effect_table(answer), where_table(answer), rejection_table(answer)]
     if comparison.model is not None:
         tables["Parameters"] = [parameter_table(comparison.model, fit)]
         tables["Parameters"] += [correlation_table(fit)] if fit is not None else []
     return {heading: kept for heading, found in tables.items() if (kept := [t for t in found if t is not None])}
-
-
-def _section(heading: str, tables: list[Table] | tuple[()], drawings: list[Drawing] | tuple[()]) -> str:
-    content = "".join(_figure(d) for d in drawings) + "".join(t.html() for t in tables)
-    name = heading.lower()
-    return f'<section id="{name}" aria-labelledby="{name}-h"><h2 id="{name}-h">{heading}</h2>\n{content}</section>\n'
-
-
-def _figure(drawing: Drawing) -> str:
-    picture, numbers = (base64.b64encode(text.encode()).decode() for text in (drawing.svg(), drawing.csv()))
-    return (
-        f'<h3 id="{drawing.name}">{escape(drawing.title)}</h3>\n<figure aria-labelledby="{drawing.name}">'
-        f'<img alt="{escape(drawing.alternative)}" src="data:image/svg+xml;base64,{picture}">'
-        f"<figcaption>{escape(drawing.caption)} "
-        f'<a class="download" download="{drawing.name}.csv" href="data:text/csv;base64,{numbers}">'
-        f"The numbers of “{escape(drawing.title)}” (CSV)</a></figcaption></figure>\n"
-    )
-
-
-def _figures_of_merit(comparison: Comparison) -> Iterator[tuple[str, str]]:
-    now, before = comparison.now, comparison.before
-    if now is not None:
-        if before is not None:
-            yield "error before", f"{before.percent:.3g} %"
-        yield "error after" if before is not None else "error", f"{now.percent:.3g} %"
-        yield "floor", f"{100 * float((comparison.floors**2).mean() ** 0.5) / now.range:.2g} %"
-        yield "rms error", nanometre(now.rms)
-        yield "range", nanometre(now.range)
-    yield "phases", f"{len(comparison.experiment)}"
-    yield "samples", f"{comparison.experiment.size:,}".replace(",", " ")
-
-
-def _document(
-    title: str, comparison: Comparison, answer: Mapping[str, Any] | None, headings: list[str], body: str
-) -> str:
-    said = verdict(comparison, answer)
-    merit = "".join(f"<div><dt>{k}</dt><dd>{v}</dd></div>" for k, v in _figures_of_merit(comparison))
-    details = (
-        ""
-        if answer is None
-        else "".join(
-            t.html() for t in (effect_table(answer), where_table(answer), rejection_table(answer)) if t is not None
-        )
-    )
-    links = "".join(f'<li><a href="#{h.lower()}">{h}</a></li>' for h in ("Verdict", *headings))
-    model = comparison.model
-    chain = "no model" if model is None else " → ".join(e.name for e in model.effects)
-    return f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(title)}</title>
-<style>
-{files(__package__).joinpath("page.css").read_text(encoding="utf-8")}</style>
-</head>
-<body>
-<a class="skip" href="#verdict">Skip to the verdict</a>
-<header><p>{escape(comparison.experiment.source)}</p><h1>{escape(title)}</h1>
-<p>Model: {escape(chain)}</p></header>
-<nav aria-label="Sections"><ul>{links}</ul></nav>
-<main>
-<section id="verdict" aria-labelledby="verdict-h"><h2 id="verdict-h">{escape(said.headline)}</h2>
-{"".join(f"<p>{escape(s)}</p>" for s in said.sentences)}
-<dl class="figures">{merit}</dl></section>
-{details}{body}</main>
-<footer><p>Errors are those of free-run simulation: the model sees the drive only, never the measured displacement. Per
-cents are RMS over peak-to-peak displacement of the experiment. The floor of a phase is its sensor noise or 0.03 % of
-range, whichever is larger.</p></footer>
-</body>
-</html>
-"""

@@ -43,6 +43,7 @@ def step(comparison: Comparison) -> Drawing | None:
         axes[0].axvline(1e6 * lag, color=GREEN, linestyle=(0, (1, 1.4)), label=f"delay of the model {duration(lag)}")
     axes[0].set_title("onset")
     axes[1].set_title("whole response")
+    axes[1].set_xscale("log")
     axes[0].set_ylabel("displacement per volt [µm/V]")
     axes[0].legend(loc="lower right")
     data = {

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from ..discrepancy.residual import drive_frequency
 from ..record import Record
 from .comparison import Comparison
 from .drawing import Drawing
@@ -48,7 +49,10 @@ def time_series(comparison: Comparison) -> Drawing:
     for index, record in enumerate(comparison.experiment):
         if record.phase not in first or _rms(comparison, index) > _rms(comparison, first[record.phase]):
             first[record.phase] = index
-    shown = sorted(first.values())
+    sines = sorted((f, r.phase) for r in comparison.experiment if (f := drive_frequency(r)) is not None)
+    ends = {sines[0][1], sines[-1][1]} if sines else set()
+    between = {phase for _, phase in sines} - ends
+    shown = sorted(index for phase, index in first.items() if phase not in between)
     if len(shown) > PANELS:
         shown = sorted(sorted(shown, key=lambda i: -_rms(comparison, i))[:PANELS])
     now, before = comparison.now, comparison.before
@@ -64,7 +68,7 @@ def time_series(comparison: Comparison) -> Drawing:
         row, column = step * (place // columns), place % columns
         part = window(record, None if now is None else now.residuals[index])
         time = record.sample_period * np.arange(record.size)[part]
-        scale, unit = (1e3, "ms") if time[-1] < 0.5 else (1.0, "s")
+        scale, unit = (1e3, "ms") if time[-1] < 2.0 else (1.0, "s")
         y = record.displacement[part]
         at = thinned(y, 500)
         upper = axes[row, column]
@@ -80,7 +84,9 @@ def time_series(comparison: Comparison) -> Drawing:
             if before is not None:
                 old = before.residuals[index][part]
                 old_at = thinned(old, 700)
-                bottom.plot(scale * time[old_at], 1e9 * old[old_at], label="residual before", **BEFORE)
+                bottom.plot(
+                    scale * time[old_at], 1e9 * old[old_at], label="residual before", **{**BEFORE, "linewidth": 0.9}
+                )
             e = now.residuals[index][part]
             e_at = thinned(e, 700)
             bottom.plot(scale * time[e_at], 1e9 * e[e_at], label="residual", **RESIDUAL)
@@ -108,7 +114,7 @@ def time_series(comparison: Comparison) -> Drawing:
         "time_series",
         "Against time",
         "Displacement and, below it, measured minus predicted. Fast phases are shown around their largest residual; of "
-        "repeated phases the one with the largest error is drawn.",
+        "repeated phases the one with the largest error is drawn, of the sines the slowest and the fastest.",
         f"Displacement against time for the phases {names}; {words}.",
         figure,
         data,
