@@ -139,15 +139,17 @@ class Acquisition:
         Returns
         -------
         bool
-            False where that took longer than `timeout` [s]; the thread has ended all the same.
+            False where the stage was not there within `timeout` [s]. True also for a thread that had failed: it has
+            made the stage safe, or told that it could not.
         """
+        if not self._thread.is_alive():
+            return True
         self._safe.clear()
         self.stop()
-        reached = not self._thread.is_alive() or self._safe.wait(timeout)
+        reached = self._safe.wait(timeout)
         self._halting.set()
-        if self._thread.is_alive():
-            self._thread.join()
-        return reached and self.playback.is_safe
+        self._thread.join(timeout)
+        return reached
 
     def _run(self) -> None:
         try:

@@ -9,7 +9,6 @@ from typing import Any
 
 import yaml
 
-from .. import recording
 from ..errors import ParameterError, RecordingError, StageError
 from ..parameter import Parameter
 from ..stage.hidden import hidden_effect
@@ -94,6 +93,8 @@ def _open_replay(values: Mapping[str, Any], sample_period: float) -> Stage:
     path = values["experiment"]
     if not path:
         raise RecordingError("replay.experiment: got no path, expected that of a recording")
+    from .. import recording  # not needed by any other back end, and slow to import
+
     records = recording.read(path).records
     if sample_period:
         records = tuple(r for r in records if abs(r.sample_period / sample_period - 1) < 1e-6)

@@ -61,7 +61,8 @@ class DriverNode(LifecycleNode):
         try:
             settings = DriverSettings.from_values(read(self, DRIVER))
             values = read(self, BACK_ENDS[settings.stage].rows, f"{settings.stage}.")
-            session = DriverSession(settings, values, self.get_namespace())
+            place = f"{self.resolve_topic_name('samples')} of domain {self.context.get_domain_id()}"
+            session = DriverSession(settings, values, place)
             try:
                 self._refuse_second_driver(settings.discovery_time)
             except StageError:

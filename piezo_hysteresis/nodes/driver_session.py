@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -29,8 +28,8 @@ class DriverSession:
         Of the driver.
     values : mapping
         Of the rows of the back end, by name.
-    namespace : str
-        Of the node.
+    place : str
+        What no other driver may share, in words: topic and domain.
 
     Raises
     ------
@@ -38,10 +37,9 @@ class DriverSession:
         If the stage cannot be opened, is driven already, or does not allow what the settings ask for.
     """
 
-    def __init__(self, settings: DriverSettings, values: Mapping[str, Any], namespace: str) -> None:
+    def __init__(self, settings: DriverSettings, values: Mapping[str, Any], place: str) -> None:
         self.settings, self._values = settings, values
-        domain = os.environ.get("ROS_DOMAIN_ID", "0")
-        self._lock = StageLock([f"namespace {namespace} of domain {domain}"])
+        self._lock = StageLock([place])
         try:
             self.stage = open_stage(settings.stage, values, settings.sample_period, settings.real_time_factor)
         except BaseException:

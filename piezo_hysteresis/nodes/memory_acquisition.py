@@ -34,20 +34,24 @@ class MemoryAcquisition(Acquisition):
     def _step(self) -> None:
         playback = cast(Playback, self.playback)
         with self._access:
-            pending, voltage = playback.pending, playback.voltage
+            pending = playback.pending
         if pending:
             self._play(playback, min(pending, self.stage.description.longest_block or pending))
         else:
-            self._rest(playback, voltage)
+            self._rest(playback)
 
-    def _rest(self, playback: Playback, voltage: float) -> None:
+    def _rest(self, playback: Playback) -> None:
         due = time.monotonic() + self._rest_period
         while time.monotonic() < due:
             if not self._wait_until(min(due, time.monotonic() + self._poll)):
                 return
             if playback.pending:
                 return
-        displacement = self.stage.read_displacement()
+        self._look(playback)
+
+    def _look(self, playback: Playback) -> None:
+        """One sample on the slow path."""
+        voltage, displacement = self.stage.voltage, self.stage.read_displacement()
         first = max(self._time_base.index_at(time.monotonic()), self.index)
         with self._access:
             if playback.pending:
@@ -89,3 +93,4 @@ class MemoryAcquisition(Acquisition):
         self.stage.safe()
         with self._access:
             playback.jump(self.stage.voltage)
+        self._look(playback)

@@ -216,6 +216,8 @@ class Playback:
             ramp = self.voltage + math.copysign(self._step, self._target - self.voltage) * steps
             stretch = np.clip(ramp, min(self.voltage, self._target), max(self.voltage, self._target))
             self.voltage, self._held = float(stretch[-1]), 0
+            if not self.pending:
+                self.voltage, self._stopping = self._target, False
             return stretch
         self.voltage, self._stopping = self._target, False
         stretch = np.full(min(count, self._hold_limit - self._held), self.voltage)

@@ -172,6 +172,11 @@ class Lab:
         """Messages of command_status, from now on and the last ones before."""
         return self.listen(DiagnosticStatus, "command_status", COMMAND_STATUS)
 
+    @staticmethod
+    def states(statuses: list[DiagnosticStatus], name: str) -> list[str]:
+        """The states that a command went through, in order."""
+        return [values_of(status)["state"] for status in list(statuses) if status.name == name]
+
     def diagnostics(self) -> list[DiagnosticArray]:
         return self.listen(DiagnosticArray, "/diagnostics", 10)
 
@@ -220,11 +225,6 @@ class Lab:
 
 
 _TRANSITIONS = {"configure": 1, "cleanup": 2, "activate": 3, "deactivate": 4}
-
-
-def states(statuses: list[DiagnosticStatus], name: str) -> list[str]:
-    """The states of a command, in order."""
-    return [values_of(status)["state"] for status in list(statuses) if status.name == name]
 
 
 def _command(executable: str) -> list[str]:

@@ -22,10 +22,6 @@ IDEAL = {"simulated__electronics__dac_bits": 0.0, "ramp_rate": RAMP_RATE}
 """Without a converter the voltages published are those applied, bit for bit."""
 
 
-def states(statuses, name):
-    return [values_of(status)["state"] for status in list(statuses) if status.name == name]
-
-
 def steepest(samples):
     """Steepest change of the voltage between two samples [V/s]."""
     assert samples.lost == 0
@@ -37,7 +33,7 @@ def test_every_sample_of_a_command_arrives_or_is_told_lost(lab):
     samples, statuses, phases = lab.streaming(), lab.statuses(), lab.phases()
     wave = np.concatenate(([0.0], np.random.default_rng(1).uniform(0, 10, 50_000), [0.0]))
     lab.send(wave, "noise")
-    lab.wait(lambda: states(statuses, "noise") == ["accepted", "playing", "done"], "the end of the command")
+    lab.wait(lambda: lab.states(statuses, "noise") == ["accepted", "playing", "done"], "the end of the command")
     values = values_of(next(s for s in statuses if values_of(s)["state"] == "done"))
     number, first = int(values["phase"]), int(values["first_index"])
     lab.wait(lambda: samples.index[-1] > first + wave.size, "the samples after it")
@@ -77,7 +73,7 @@ def test_a_refused_command_plays_nothing(lab):
     lab.wait(lambda: {s.name for s in statuses} >= set(refused), "all refusals")
     reasons = {s.name: s.message for s in statuses}
     for name, (_, _, _, reason) in refused.items():
-        assert states(statuses, name) == ["refused"]
+        assert lab.states(statuses, name) == ["refused"]
         assert reason in reasons[name], reasons[name]
     blocks = len(samples.blocks)
     lab.wait(lambda: len(samples.blocks) > blocks + 10, "later blocks")
@@ -91,8 +87,8 @@ def test_a_second_command_is_refused_and_the_first_played_whole(lab):
     wave = np.linspace(0, 2, 20_000)
     lab.send(wave, "first")
     lab.send(np.zeros(10), "second")
-    lab.wait(lambda: "done" in states(statuses, "first"), "the first command")
-    assert states(statuses, "second") == ["refused"]
+    lab.wait(lambda: "done" in lab.states(statuses, "first"), "the first command")
+    assert lab.states(statuses, "second") == ["refused"]
     lab.wait(lambda: samples.phase[-1] == 2, "the hold after it")
     assert np.array_equal(samples.of_phase(1), wave)
 
@@ -106,7 +102,7 @@ def test_set_voltage_ramps_and_holds(lab):
     assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
     for wrong in (10.5, -0.5, float("nan")):
         ask.publish(Float64(data=wrong))
-    lab.wait(lambda: states(statuses, "set_voltage") == ["refused"] * 3, "three refusals")
+    lab.wait(lambda: lab.states(statuses, "set_voltage") == ["refused"] * 3, "three refusals")
     assert samples.voltage.max() == 4.0
     lab.wait(lambda: live and live[-1].position[0] == 4.0, "live values")
     assert list(live[-1].name) == ["voltage", "displacement"]
@@ -129,10 +125,10 @@ def test_stop_ramps_a_playing_waveform_down(lab):
     lab.wait(lambda: samples.voltage[-1] == 3.0, "the top")
     assert lab.call(Trigger, "driver_node/stop").success
     lab.wait(lambda: samples.voltage[-1] == 0.0, "the safe voltage")
-    assert states(statuses, "long") == ["accepted", "playing", "stopped"]
+    assert lab.states(statuses, "long") == ["accepted", "playing", "stopped"]
     assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
     lab.send(np.zeros(10), "next")
-    lab.wait(lambda: "done" in states(statuses, "next"), "a later command")
+    lab.wait(lambda: "done" in lab.states(statuses, "next"), "a later command")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
@@ -183,6 +179,29 @@ def test_a_second_driver_refuses_until_the_first_is_gone(lab, same_machine, tmp_
     assert lab.transition("configure", "second")
     assert lab.transition("activate", "second")
     lab.wait(lambda: len(samples.blocks) > blocks, "blocks of the second")
+
+
+def test_a_killed_driver_can_be_started_again_at_once(lab):
+    first = lab.driver(**IDEAL)
+    samples = lab.streaming()
+    first.signal(signal.SIGKILL)
+    first.wait()
+    blocks = len(samples.blocks)
+    lab.driver(**IDEAL)
+    lab.wait(lambda: len(samples.blocks) > blocks + 5, "blocks of the second")
+
+
+def test_further_signals_do_not_cut_the_ramp(lab):
+    driver = lab.driver(**{**IDEAL, "ramp_rate": 4.0})
+    samples = lab.streaming()
+    lab.send(np.linspace(0, 4, 20_000), "up")
+    lab.wait(lambda: samples.voltage[-1] == 4.0, "the top")
+    for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM):
+        driver.signal(number)
+        lab.wait(lambda top=samples.voltage[-1]: samples.voltage[-1] < top, "the way down")
+    assert driver.wait() == 0
+    lab.wait(lambda: samples.voltage[-1] == 0.0, "the safe voltage")
+    assert steepest(samples) <= 4 / (19_999 * PERIOD) * (1 + 1e-6)
 
 
 def _set(**values):
@@ -241,7 +260,7 @@ def test_a_stage_with_memory_plays_blocks_and_tells_the_dead_time(lab):
     samples, statuses = lab.streaming(), lab.statuses()
     wave = np.sin(np.linspace(0, np.pi, 25_000)) * 5
     lab.send(wave, "sine")
-    lab.wait(lambda: "done" in states(statuses, "sine"), "the end of the command")
+    lab.wait(lambda: "done" in lab.states(statuses, "sine"), "the end of the command")
     lab.wait(lambda: samples.phase[-1] == 2, "the hold after it")
     assert np.array_equal(samples.of_phase(1), wave)
     played = [b for b in samples.blocks if b.phase[0] == 1]

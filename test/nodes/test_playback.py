@@ -76,12 +76,21 @@ def test_stop_leaves_the_waveform_at_the_ramp_rate():
     assert p.is_stopping
     with pytest.raises(StageError, match="safe voltage"):
         p.play(np.zeros(3), "next")
-    voltage, _, events = taken(p, 3, 10)
-    assert np.allclose(voltage, [0.4, 0.3, 0.2, 0.1] + [0.0] * 9, rtol=0, atol=1e-12)
+    voltage, _, events = taken(p, 3, 2)
+    assert np.allclose(voltage, [0.4, 0.3, 0.2, 0.1, 0.0], rtol=0, atol=1e-12)
     assert events[0] == (0, Happening.STOPPED, "1 sine")
     assert p.is_safe
     assert not p.is_stopping
     p.play(np.zeros(3), "next")
+
+
+def test_stop_next_to_the_safe_voltage_ends_on_it():
+    p = playback()
+    p.play(np.array([1e-13]), "step")
+    p.take(2)
+    p.stop()
+    assert p.take(3).voltage[-1] == 0.0
+    assert p.is_safe
 
 
 def test_commands_are_refused_while_one_is_played():
@@ -146,7 +155,7 @@ def test_no_step_is_steeper_than_the_ramp_or_the_waveform(script, hold_timeout, 
                 assert (steps[~commanded] <= 100.0 * PERIOD * (1 + 1e-9)).all()
                 numbers += drive.phase.tolist()
                 last = drive.voltage[-1]
-                assert p.voltage == last
+                assert p.voltage == pytest.approx(last, abs=1e-12)
             elif what == "ramp":
                 p.ramp_to(value)
             elif what == "play":

@@ -1,0 +1,187 @@
+"""The acquisition against a stage that checks every sample itself, and can fail."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.nodes.acquisition import Acquisition
+from piezo_hysteresis.nodes.memory_acquisition import MemoryAcquisition
+from piezo_hysteresis.nodes.playback import Happening, Playback
+from piezo_hysteresis.nodes.time_base import TimeBase
+from piezo_hysteresis.stage.simulated import SimulatedMemoryStage
+from piezo_hysteresis.stage.stage import Acquired, Description
+
+PERIOD = 1e-4
+RAMP_RATE = 200.0
+
+
+class Witness:
+    """A stage whose displacement is its voltage, which refuses what it should not be given, and fails when told to."""
+
+    def __init__(self, *, fails_at=None, unsafe=False):
+        self.description = Description("witness", True, PERIOD, PERIOD, 0.0, 10.0, max_slew_rate=RAMP_RATE)
+        self.sample_period = PERIOD
+        self.voltage = 0.0
+        self.made_safe = 0
+        self._fails_at, self._unsafe, self._calls = fails_at, unsafe, 0
+
+    def exchange(self, voltage):
+        self._calls += 1
+        if self._calls == self._fails_at:
+            raise StageError("witness: link lost")
+        block = self.description.check_voltage(voltage, self.voltage, PERIOD)
+        self.voltage = float(block[-1])
+        return Acquired(block, block)
+
+    def safe(self):
+        self.made_safe += 1
+        if self._unsafe:
+            raise StageError("witness: no link")
+        self.voltage = 0.0
+
+
+class Listener:
+    """Keeps deliveries and failures."""
+
+    def __init__(self):
+        self.deliveries, self.failures, self._new = [], [], threading.Condition()
+
+    def deliver(self, delivery):
+        with self._new:
+            self.deliveries.append(delivery)
+            self._new.notify_all()
+
+    def fail(self, error):
+        with self._new:
+            self.failures.append(error)
+            self._new.notify_all()
+
+    def wait(self, condition):
+        with self._new:
+            assert self._new.wait_for(lambda: condition(self), 30.0)
+
+    def joined(self, name):
+        return np.concatenate([getattr(d.block, name) for d in self.deliveries])
+
+    def events(self, happening):
+        return [e.phase.name for d in self.deliveries for e in d.events if e.happening is happening]
+
+
+def started(stage, kind=Acquisition, rate=10.0, **named):
+    listener = Listener()
+    playback = Playback(stage.voltage, 0.0, PERIOD, RAMP_RATE)
+    acquisition = kind(
+        stage, playback, TimeBase(PERIOD, rate), 100, time.time_ns, listener.deliver, listener.fail, **named
+    )
+    acquisition.start()
+    listener.wait(lambda heard: heard.deliveries or heard.failures)
+    return acquisition, listener
+
+
+def play(acquisition, waveform, name):
+    acquisition.play(np.asarray(waveform), name, 1, lambda wave, voltage: None, lambda phase, size: None)
+
+
+def test_make_safe_ramps_down_and_tells_every_sample_of_it():
+    acquisition, listener = started(Witness())
+    play(acquisition, np.linspace(0, 5, 300), "up")
+    listener.wait(lambda heard: "up" in heard.events(Happening.DONE))
+    assert acquisition.make_safe(30.0)
+    voltage = listener.joined("voltage")
+    assert voltage.max() == 5.0
+    assert voltage[-1] == 0.0
+    assert np.abs(np.diff(voltage)).max() <= RAMP_RATE * PERIOD * (1 + 1e-9)
+    assert np.array_equal(listener.joined("index"), np.arange(voltage.size))
+    assert not listener.failures
+
+
+def test_a_failing_stage_is_made_safe_and_told_once():
+    stage = Witness(fails_at=3)
+    acquisition, listener = started(stage)
+    listener.wait(lambda heard: heard.failures)
+    assert [str(e) for e in listener.failures] == ["witness: link lost"]
+    assert stage.made_safe == 1
+    assert acquisition.make_safe(30.0)
+    assert len(listener.deliveries) == 2
+
+
+def test_a_stage_that_cannot_be_made_safe_is_told():
+    _, listener = started(Witness(fails_at=2, unsafe=True))
+    listener.wait(lambda heard: heard.failures)
+    assert "could not be brought to its safe voltage: witness: no link" in str(listener.failures[0])
+
+
+def test_the_stage_is_the_last_line_of_defence():
+    """A waveform that got past every check is not played, and the driver tells."""
+    stage = Witness()
+    acquisition, listener = started(stage)
+    play(acquisition, [0.0, 11.0], "too_high")
+    listener.wait(lambda heard: heard.failures)
+    assert "11 V" in str(listener.failures[0])
+    assert stage.made_safe == 1
+    assert not listener.joined("voltage").any()
+
+
+def test_a_fault_of_the_program_leaves_the_stage_safe_too():
+    stage = Witness()
+    stage.exchange = lambda voltage: 1 / 0
+    _, listener = started(stage)
+    listener.wait(lambda heard: heard.failures)
+    assert "ZeroDivisionError" in str(listener.failures[0])
+    assert stage.made_safe == 1
+
+
+def test_a_stall_is_caught_up_with_by_count():
+    stage = Witness()
+    acquisition, listener = started(stage, rate=1.0)
+    exchange, stalled = stage.exchange, threading.Event()
+
+    def slow(voltage):
+        if not stalled.is_set():
+            stalled.set()
+            time.sleep(0.2)
+        return exchange(voltage)
+
+    stage.exchange = slow
+    stalled.wait(30.0)
+    before = len(listener.deliveries)
+    listener.wait(lambda heard: len(heard.deliveries) > before + 30)
+    assert acquisition.make_safe(30.0)
+    stamps = np.array([d.block.stamp for d in listener.deliveries])
+    assert np.abs(np.diff(stamps) - round(100 * PERIOD * 1e9)).max() <= 1
+    assert np.array_equal(listener.joined("index"), np.arange(100 * len(listener.deliveries)))
+
+
+def test_after_a_long_stall_stamps_move_and_samples_do_not():
+    acquisition, listener = started(Witness(), rate=1.0)
+    acquisition.patience = -1.0
+    before = len(listener.deliveries)
+    listener.wait(lambda heard: len(heard.deliveries) > before + 3)
+    assert acquisition.make_safe(30.0)
+    assert acquisition.tally.postponed > 0.0
+    assert np.array_equal(listener.joined("index"), np.arange(100 * len(listener.deliveries)))
+
+
+@pytest.mark.parametrize("playing", [True, False])
+def test_stop_breaks_off_what_plays_from_memory(playing):
+    stage = SimulatedMemoryStage(sample_period=PERIOD, longest_block=100_000)
+    acquisition, listener = started(stage, MemoryAcquisition, rate=1.0, rest_period=0.01)
+    if playing:
+        play(acquisition, np.concatenate((np.linspace(0, 5, 300), np.full(50_000, 5.0))), "long")
+        time.sleep(0.1)
+    else:
+        acquisition.ramp_to(1.0)
+        listener.wait(lambda heard: heard.joined("voltage")[-1] == pytest.approx(1.0, abs=1e-3))
+    acquisition.stop()
+    assert acquisition.make_safe(30.0)
+    assert stage.voltage == 0.0
+    assert listener.events(Happening.STOPPED) == (["long"] if playing else [])
+    voltage = listener.joined("voltage")
+    assert voltage[-1] == 0.0
+    index = listener.joined("index").astype(np.int64)
+    assert (np.diff(index) > 0).all()
+    assert acquisition.tally.never_measured + voltage.size == index[-1] + 1
+    assert not listener.failures
