@@ -1,0 +1,156 @@
+"""`Bench`: what a person at the bench has of the stage: services, waveforms, the live residual. ROS messages only."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from numpy.typing import NDArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
+
+from piezo_hysteresis.nodes.cloud import from_cloud
+from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
+from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Trace:
+    """What the model node said while a waveform was played.
+
+    Attributes
+    ----------
+    residual : (n,) ndarray
+        Measured minus predicted displacement of every sample [m].
+    live_rms : list of float
+        What `residual_rms` showed meanwhile [m].
+    """
+
+    residual: Array
+    live_rms: list[float]
+
+    @property
+    def rms(self) -> float:
+        """RMS residual over the whole waveform [m]."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+
+class Bench:
+    """Client of the three nodes in one namespace.
+
+    Parameters
+    ----------
+    namespace : str
+        Of the nodes.
+    sample_period : float
+        Of the driver [s].
+    check : callable
+        Called while waiting; raises where a node has died.
+    """
+
+    def __init__(self, namespace: str, sample_period: float, check: Callable[[], None]) -> None:
+        self._sample_period, self._check = sample_period, check
+        self.node = Node("demo", namespace=namespace)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self.status: DiagnosticStatus | None = None
+        self.models: list[str] = []
+        self._blocks: list[tuple[NDArray[np.uint32], Array]] | None = None
+        self._live_rms: list[float] = []
+        self._ended: dict[str, DiagnosticStatus] = {}
+        self._command = self.node.create_publisher(PointCloud2, "command", COMMAND)
+        subscribe = self.node.create_subscription
+        subscribe(DiagnosticStatus, "status", self._on_status, LATCHED)
+        subscribe(DiagnosticStatus, "command_status", self._on_command_status, COMMAND_STATUS)
+        subscribe(String, "model", lambda message: self.models.append(message.data), LATCHED)
+        subscribe(Float64, "residual_rms", self._on_rms, COMMAND)
+        subscribe(PointCloud2, "predicted_samples", self._on_predicted, SAMPLES)
+        self._services = {
+            name: self.node.create_client(Trigger, f"identification_node/{name}")
+            for name in ("plan", "identify", "diagnose")
+        }
+
+    def _on_status(self, status: DiagnosticStatus) -> None:
+        self.status = status
+
+    def _on_command_status(self, status: DiagnosticStatus) -> None:
+        if values_of(status)["state"] in ("refused", "done", "stopped"):
+            self._ended[status.name] = status
+
+    def _on_rms(self, message: Float64) -> None:
+        self._live_rms.append(message.data)
+
+    def _on_predicted(self, cloud: PointCloud2) -> None:
+        if self._blocks is not None:
+            columns = from_cloud(cloud, {"index": "u4", "residual": "f8"})
+            self._blocks.append((columns["index"], columns["residual"]))
+
+    def until(self, done: Callable[[], bool], what: str, timeout: float) -> Iterator[None]:
+        """Spin until `done`, giving control back ten times a second.
+
+        Raises
+        ------
+        TimeoutError
+            If it takes longer than `timeout` [s].
+        """
+        end = time.monotonic() + timeout
+        while not done():
+            if time.monotonic() > end:
+                raise TimeoutError(f"{what}: nothing after {timeout:g} s")
+            self._check()
+            tick = time.monotonic() + 0.1
+            while time.monotonic() < tick:
+                self._executor.spin_once(timeout_sec=0.02)
+            yield
+
+    def wait(self, done: Callable[[], bool], what: str, timeout: float) -> None:
+        """Spin until `done`."""
+        for _ in self.until(done, what, timeout):
+            pass
+
+    def call(self, service: str) -> Trigger.Response:
+        """Call a service of the identification node, which answers at once."""
+        client = self._services[service]
+        self.wait(client.service_is_ready, f"service {service}", 60.0)
+        future = client.call_async(Trigger.Request())
+        self.wait(future.done, f"answer of {service}", 30.0)
+        return future.result()
+
+    def play(self, voltage: Array, name: str, timeout: float = 120.0) -> Trace:
+        """Play a waveform [V] and listen to the model node meanwhile.
+
+        Raises
+        ------
+        RuntimeError
+            If the driver does not play it to its end.
+        TimeoutError
+            If that, or its prediction, takes too long.
+        """
+        self.wait(lambda: self._command.get_subscription_count() > 0, "a driver", 60.0)
+        self._live_rms = []
+        self.wait(lambda: bool(self._live_rms), "a prediction by the model node", 60.0)
+        self._blocks, self._live_rms = [], []
+        self._ended.pop(name, None)
+        stamp = self.node.get_clock().now().to_msg()
+        self._command.publish(command_to_cloud(voltage, self._sample_period, name, stamp))
+        self.wait(lambda: name in self._ended, f"end of '{name}'", timeout)
+        told = values_of(self._ended[name])
+        if told["state"] != "done":
+            raise RuntimeError(f"the driver did not play '{name}': {told['state']}, {self._ended[name].message}")
+        first = int(told["first_index"])
+        last = (first + voltage.size - 1) % 2**32
+        self.wait(lambda: self._seen(last), "the prediction of the last sample", 30.0)
+        index, residual = (np.concatenate(column) for column in zip(*self._blocks, strict=True))
+        live, self._blocks = self._live_rms, None
+        return Trace(residual[(index - np.uint32(first)) < voltage.size], live)
+
+    def _seen(self, index: int) -> bool:
+        return bool(self._blocks) and (int(self._blocks[-1][0][-1]) - index) % 2**32 < 2**31

@@ -1,0 +1,85 @@
+"""`Processes`: the nodes of the demo as processes of their own, ended by their own id on every way out."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from ament_index_python.packages import get_package_prefix
+
+PACKAGE = "piezo_hysteresis"
+PATIENCE = 20.0
+"""Time that a node gets to end by itself [s]; a driver ramps to its safe voltage first."""
+
+_SET_PARENT_DEATH_SIGNAL = 1
+
+
+def _end_with_parent() -> None:
+    """Should the demo be killed outright, its nodes get SIGTERM from the kernel, and the stage is left safe."""
+    ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGTERM)
+
+
+class Processes:
+    """Node processes, started one by one and ended together, the last one first.
+
+    Parameters
+    ----------
+    namespace : str
+        Of all nodes.
+    logs : pathlib.Path
+        Folder for what they print.
+    """
+
+    def __init__(self, namespace: str, logs: Path) -> None:
+        self._namespace, self._logs = namespace, logs
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, executable: str, **parameters: object) -> None:
+        """Start an executable of the package; parameters are named with ``__`` for the dot."""
+        program = Path(get_package_prefix(PACKAGE)) / "lib" / PACKAGE / executable
+        command = [str(program), "--ros-args", "-r", f"__ns:={self._namespace}"]
+        for name, value in parameters.items():
+            command += ["-p", f"{name.replace('__', '.')}:={value}"]
+        self._logs.mkdir(parents=True, exist_ok=True)
+        with (self._logs / f"{executable}.log").open("wb") as log:
+            self._running[executable] = subprocess.Popen(
+                command,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C reaches the demo alone, which ends them in order
+                preexec_fn=_end_with_parent,
+                env=os.environ.copy(),
+            )
+
+    @property
+    def ids(self) -> dict[str, int]:
+        """Process id of every node."""
+        return {name: process.pid for name, process in self._running.items()}
+
+    def check(self) -> None:
+        """Raise RuntimeError if a node has ended by itself."""
+        for name, process in self._running.items():
+            if process.poll() is not None:
+                log = self._logs / f"{name}.log"
+                raise RuntimeError(f"{name} ended with code {process.returncode}; its last words are in {log}")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for process in reversed(self._running.values()):
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        for process in reversed(self._running.values()):
+            try:
+                process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
