@@ -25,6 +25,7 @@ Signals = Sequence[tuple[Samples, Samples]]
 
 BLOCK = 1 << 15
 """Rows of the regressor matrix held at a time."""
+_ALL = slice(None)
 LARGEST_POLE = 0.99999
 """Radius to which poles on or just outside the unit circle are drawn back."""
 
@@ -99,12 +100,13 @@ def _triangle(signals: Signals, orders: tuple[int, int], delay: int) -> NDArray[
     return r
 
 
-def _solve(r: NDArray[np.float64], count: int) -> tuple[Samples, float]:
-    """Least squares from the triangle: coefficients of the first `count` columns, and the norm of what is left."""
-    scale = np.linalg.norm(r[:, :count], axis=0)
+def _solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> tuple[Samples, float]:
+    """Least squares from the triangle: coefficients of some regressors, and the norm of what is left."""
+    regressors = r[:, :-1][:, columns]
+    scale = np.linalg.norm(regressors, axis=0)
     scale[scale == 0.0] = 1.0
-    theta = lstsq(r[:, :count] / scale, r[:, -1], check_finite=False)[0] / scale
-    return theta, float(np.linalg.norm(r[:, -1] - r[:, :count] @ theta))
+    theta = lstsq(regressors / scale, r[:, -1], check_finite=False)[0] / scale
+    return theta, float(np.linalg.norm(r[:, -1] - regressors @ theta))
 
 
 def _reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
@@ -164,14 +166,14 @@ def identify_arx(
         raise IdentificationError(f"ARX: got na = {na}, nb = {nb}, d = {delay}, expected na >= 0, nb >= 1, d >= 1")
     if not any(np.ptp(u) > 0.0 for u, _ in signals):
         raise IdentificationError("ARX: the input does not move; expected a record with excitation, e.g. noise")
-    theta, left = _solve(_triangle(signals, orders, delay), na + nb)
+    theta, left = _solve(_triangle(signals, orders, delay))
     one_step = left / float(np.sqrt(sum(y.size for _, y in signals)))
     candidates: list[Dynamics] = []
     for iteration in range(iterations + 1):
         if iteration:
             whitener = np.concatenate(([1.0], candidates[-1].arx.array("a")))
             whitened = [(lfilter([1.0], whitener, u - u[0]), lfilter([1.0], whitener, y - y[0])) for u, y in signals]
-            theta, _ = _solve(_triangle(whitened, orders, delay), na + nb)
+            theta, _ = _solve(_triangle(whitened, orders, delay))
         a, b, mirrored = _reflected(theta[:na], theta[na:])
         told = (Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),)
         arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
@@ -189,12 +191,19 @@ class OrderError:
     free_run_error: float
 
 
-def compare_orders(
-    signals: Signals, delay: int, sample_period: float, highest: int = 12, iterations: int = 4
-) -> tuple[OrderError, ...]:
+def compare_orders(signals: Signals, delay: int, sample_period: float, highest: int = 10) -> tuple[OrderError, ...]:
     """Error against order na = nb = 1 … `highest`: fitted to the first two thirds of every record, judged on the rest.
 
-    Parameters are those of `identify_arx`.
+    Parameters
+    ----------
+    signals : sequence of (u, y)
+        Input and output of every record.
+    delay : int
+        d, samples.
+    sample_period : float
+        Sample period [s].
+    highest : int
+        Highest order; the regressors of the lower ones are among its own.
 
     Returns
     -------
@@ -203,14 +212,15 @@ def compare_orders(
     """
     cuts = [2 * y.size // 3 for _, y in signals]
     early = [(u[:cut], y[:cut]) for (u, y), cut in zip(signals, cuts, strict=True)]
+    triangle = _triangle(early, (highest, highest), delay)
     table = []
     for order in range(1, highest + 1):
-        model = identify_arx(early, delay, sample_period, (order, order), iterations)
-        errors = []
-        for (u, y), cut in zip(signals, cuts, strict=True):
-            late = (y - model.simulate(u))[cut:]
-            errors.append(late - late.mean())
-        table.append(OrderError(order, model.one_step_error, float(np.std(np.concatenate(errors)))))
+        theta, left = _solve(triangle, np.r_[:order, highest : highest + order])
+        a, b, _ = _reflected(theta[:order], theta[order:])
+        model = Dynamics(Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay), sample_period)
+        late = [(y - model.simulate(u))[cut:] for (u, y), cut in zip(signals, cuts, strict=True)]
+        free_run = float(np.std(np.concatenate([e - e.mean() for e in late])))
+        table.append(OrderError(order, left / float(np.sqrt(sum(cuts))), free_run))
     return tuple(table)
 
 

@@ -10,7 +10,7 @@ is linear in p1, p2, A and the offsets. So only (β, γ/β) are searched, on a g
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from .fit import Fit, fit
 from .normal_equations import Nuisance
 
 LOSSES = np.geomspace(0.3, 100.0, 14)
-"""Grid of β times the range of v."""
+"""Grid of β for v on its range."""
 RATIOS = np.linspace(-0.9, 0.9, 7)
 """Grid of γ·sgn(A)/β; |γ| ≤ β keeps the loop bounded."""
 LOOP = ("A", "beta", "gamma", "p1", "p2")
@@ -160,18 +160,20 @@ def start_hysteresis(loops: Sequence[Loop]) -> BoucWen:
             f"hysteresis: got {len(weighted)} records whose drive moves by {span:g}, "
             "expected at least one with loops, e.g. a triangle of several amplitudes"
         )
-    search = _Search(loops)
-    grid = [(beta, ratio) for beta in LOSSES / span for ratio in RATIOS]
+    search = _Search([replace(loop, v=loop.v / span, start=loop.start / span) for loop in loops])
+    grid = [(beta, ratio) for beta in LOSSES for ratio in RATIOS]
     beta, ratio = min(grid, key=lambda at: float(np.sum(search.solve(*at)[1] ** 2)))
     found = least_squares(
         lambda x: search.solve(np.exp(x[0]), x[1])[1],
         [np.log(beta), ratio],
-        bounds=([np.log(LOSSES[0] / span / 10.0), -1.0], [np.log(LOSSES[-1] / span * 10.0), 1.0]),
+        bounds=([np.log(LOSSES[0] / 10.0), -1.0], [np.log(LOSSES[-1] * 10.0), 1.0]),
         x_scale=[1.0, 0.3],
     )
     beta, ratio = float(np.exp(found.x[0])), float(found.x[1])
     p1, p2, a = (float(c) for c in search.solve(beta, ratio)[0])
-    return BoucWen(A=a, beta=beta, gamma=beta * ratio * (-1.0 if a < 0.0 else 1.0), p1=p1, p2=p2)
+    return BoucWen(
+        A=a / span, beta=beta / span, gamma=beta * ratio * np.copysign(1.0, a) / span, p1=p1 / span**3, p2=p2 / span
+    )
 
 
 def fit_hysteresis(model: Model, records: Sequence[Record], loops: Collection[int]) -> Fit:

@@ -111,7 +111,7 @@ def identify(
         if delay is None:
             dead = delay_by_cost(signals, period, orders or (4, 4))
             notices.append(Notice("delay_from_fit", f"no step recorded: delay of {dead} samples from the fit"))
-        table = compare_orders(signals, round(dead), period, HIGHEST_ORDER, iterations=0)
+        table = compare_orders(signals, round(dead), period, HIGHEST_ORDER)
         chosen = orders or (choose_order(table),) * 2
         dynamics = dynamics_behind(start, records, roles.broadband, round(dead), chosen)
         # The loops again, now behind the lag that the dynamics show.

@@ -14,7 +14,7 @@ from .drive import DriveLimits, Samples
 SINES = (1.0, 50.0, 100.0, 200.0, 300.0, 400.0)
 """Frequencies of the paper, Table 1 [Hz]."""
 
-CORNERED = 2e-4
+CORNERED = 1e-4
 """Slowest stored period [s] of loops with sharp turning points, which averaging over a block flattens."""
 
 

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
+from benchmarks.published_plant import A_Z, B_Z, DELAY, SAMPLE_PERIOD, STROKE, hysteresis_output, linear_output
 from piezo_hysteresis.effects import Arx
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.identification import protocol
 from piezo_hysteresis.identification.dynamics import Dynamics, choose_order, compare_orders, identify_arx
 from piezo_hysteresis.identification.frequency_response import periodic, welch
-
-from .published_plant import A_Z, B_Z, DELAY, SAMPLE_PERIOD, STROKE, hysteresis_output, linear_output
 
 PUBLISHED = Dynamics(Arx(a=A_Z[1:], b=B_Z, delay=DELAY), SAMPLE_PERIOD)
 BAND = np.geomspace(1.0, 2000.0, 60)

@@ -1,0 +1,38 @@
+"""The joint identification returns the published model from its own noisy data; the plain three steps do not."""
+
+import numpy as np
+import pytest
+
+from benchmarks import recovery
+
+
+@pytest.fixture(scope="module")
+def results():
+    return [recovery.recover(seed) for seed in range(3)]
+
+
+def test_the_delay_is_exact(results):
+    assert [r.delay for r in results] == [3, 3, 3]
+
+
+def test_every_number_of_the_loop_is_found(results):
+    assert np.max(np.abs([r.parameters for r in results])) < 0.5
+
+
+def test_errors_are_as_large_as_the_uncertainties_say(results):
+    deviates = np.concatenate([r.deviates for r in results])
+    assert 0.5 < np.sqrt(np.mean(deviates**2)) < 1.6
+
+
+def test_the_frequency_response_is_found(results):
+    assert max(r.gain for r in results) < 0.3
+    assert max(r.phase for r in results) < 0.2
+
+
+def test_free_run_matches_the_noise_free_truth(results):
+    assert max(r.free_run for r in results) < 0.02
+
+
+def test_noise_bleaches_the_published_three_steps(results):
+    assert min(r.published_gain for r in results) > 20.0
+    assert min(r.published_free_run for r in results) > 10 * max(r.free_run for r in results)
