@@ -7,14 +7,21 @@ pictures. ``--check`` writes nothing and fails if a page differs from the code.
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
+from piezo_hysteresis.nodes.back_ends import BACK_ENDS
+from piezo_hysteresis.nodes.driver_settings import DRIVER, IN_FORCE
+from piezo_hysteresis.nodes.model_node import MODEL
+from piezo_hysteresis.nodes.parameters import Row, Setting
 from piezo_hysteresis.parameter import Parameter
+from piezo_hysteresis.stage.plant import PlantParameters
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures.py"
@@ -36,8 +43,8 @@ def table(head: str, rows: Iterable[Iterable[str]]) -> str:
 
 
 def number(value: float) -> str:
-    """Short, with a typographic minus."""
-    return f"{value:g}".replace("-", "−")
+    """Short."""
+    return f"{value:g}"
 
 
 def default(row: Parameter) -> str:
@@ -92,7 +99,38 @@ def catalogue() -> str:
     return HEAD + listed + "\n" + "\n".join(section(e) for e in CHAIN)
 
 
-TABLES: dict[str, Callable[[], str]] = {"parameters": parameters}
+def settings(rows: Iterable[Row]) -> str:
+    """ROS parameters of a node."""
+    lines = []
+    for row in rows:
+        if isinstance(row, Setting):
+            value = str(row.value).lower() if isinstance(row.value, bool) else str(row.value)
+            lines.append((f"`{row.name}`", value, "", ", ".join(row.choices), row.meaning))
+        else:
+            bounds = "" if math.isinf(row.upper) else f"{number(row.lower)} … {number(row.upper)}"
+            lines.append((f"`{row.name}`", default(row), row.unit, bounds, row.meaning))
+    return table("parameter | default | unit | range or choice | meaning", lines)
+
+
+def driver() -> str:
+    """Parameters of the driver and of its back ends; the plant has a page of its own."""
+    plant = {row.name for row in PlantParameters.table()}
+    behind = (
+        replace(row, name=f"{word}.{row.name}")
+        for word, back_end in BACK_ENDS.items()
+        for row in back_end.rows
+        if row.name not in plant
+    )
+    return settings((*DRIVER, *behind))
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "parameters": parameters,
+    "driver": driver,
+    "in_force": lambda: settings(replace(row, name=f"in_force.{row.name}") for row in IN_FORCE),
+    "model_node": lambda: settings(MODEL),
+    "plant": lambda: settings(PlantParameters.table()),
+}
 
 
 def filled(text: str) -> str:
