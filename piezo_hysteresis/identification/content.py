@@ -12,6 +12,8 @@ SLOW = 30.0
 """Drives below this [Hz] show the dynamics of a stage as a lag only."""
 MANY_LINES = 48
 """Spectral lines that a drive must hold to determine orders of dynamics."""
+MANY_MOMENTS = 12.0
+"""Samples over which its changes must be spread: one step is not enough."""
 MARKED = 0.95
 """Share of the power of dv/dt by which bandwidth and lines are counted."""
 
@@ -28,6 +30,8 @@ class Content:
         Frequency below which 95 % of the power of dv/dt lies [Hz].
     lines : int
         Number of spectral lines that hold 95 % of it.
+    moments : float
+        Over how many samples that power is spread, (Σ dv²)²/Σ dv⁴; 1 for a single step.
     noise : float
         Standard deviation of the sensor noise [m].
     """
@@ -35,12 +39,13 @@ class Content:
     span: float
     bandwidth: float
     lines: int
+    moments: float
     noise: float
 
     @property
     def is_broadband(self) -> bool:
         """True where the drive determines linear dynamics."""
-        return self.bandwidth > SLOW and self.lines >= MANY_LINES
+        return self.bandwidth > SLOW and self.lines >= MANY_LINES and self.moments >= MANY_MOMENTS
 
     @property
     def is_slow(self) -> bool:
@@ -50,16 +55,17 @@ class Content:
 
 def content_of(record: Record) -> Content:
     """Judge a record by the spectrum of its dv/dt and the noise of its displacement."""
-    drive = np.concatenate(([record.settled_voltage], record.voltage))
-    speed = np.diff(drive)
-    power = np.abs(np.fft.rfft(speed)) ** 2
+    span = float(np.ptp(np.append(record.voltage, record.settled_voltage)))
+    speed = np.diff(record.voltage)
+    power = np.abs(np.fft.rfft(speed)) ** 2 if speed.size else np.zeros(1)
     total = float(power.sum())
     if total == 0.0:
-        return Content(0.0, 0.0, 0, noise_of(record))
+        return Content(span, 0.0, 0, 0.0, noise_of(record))
     frequency = np.arange(power.size) / (speed.size * record.sample_period)
     bandwidth = float(frequency[np.searchsorted(np.cumsum(power), MARKED * total)])
     lines = int(np.searchsorted(np.cumsum(np.sort(power)[::-1]), MARKED * total)) + 1
-    return Content(float(np.ptp(drive)), bandwidth, lines, noise_of(record))
+    moments = float(np.sum(speed**2) ** 2 / np.sum(speed**4))
+    return Content(span, bandwidth, lines, moments, noise_of(record))
 
 
 def noise_of(record: Record, fewest: int = 64) -> float:
@@ -83,15 +89,13 @@ def noise_of(record: Record, fewest: int = 64) -> float:
     return float(1.4826 * np.median(np.abs(np.diff(y, 3))) / np.sqrt(20.0))
 
 
-def excited_part(record: Record) -> Record:
-    """The part of a broadband record between its ramps: where the drive is curved, not straight."""
-    curved = np.abs(np.diff(record.voltage, 2))
-    if not curved.size or curved.max() == 0.0:
+def excited_part(record: Record, window: int = 64) -> Record:
+    """The part of a broadband record between its ramps: where the drive is curved throughout, not straight."""
+    curvature = np.abs(np.diff(record.voltage, 2))
+    if curvature.size <= window or curvature.max() == 0.0:
         return record
-    inside = np.flatnonzero(curved > 0.1 * np.quantile(curved, 0.95))
-    start, stop = int(inside[0]), int(inside[-1]) + 2
-    # At the ends of ramps a single corner is curved too; the bulk begins where curvature is dense.
-    dense = np.convolve(curved > 0.1 * np.quantile(curved, 0.95), np.ones(64) / 64.0, mode="same") > 0.5
-    if dense.any():
-        start, stop = int(np.argmax(dense)), curved.size - int(np.argmax(dense[::-1]))
-    return record[start:stop]
+    curved = curvature > 0.1 * np.quantile(curvature, 0.95)
+    dense = np.convolve(curved, np.full(window, 1.0 / window), mode="same") > 0.5
+    if not dense.any():
+        return record
+    return record[int(np.argmax(dense)) : dense.size - int(np.argmax(dense[::-1]))]
