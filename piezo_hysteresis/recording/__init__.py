@@ -15,14 +15,26 @@ from ..errors import RecordingError
 from ..record import Experiment
 from .bag import Bag
 from .bag_writer import BagWriter
+from .csv import Csv
 from .format import Format, WritableFormat
+from .gcs_array import GcsArray
 from .layout import Column, Layout
+from .mat import Mat
 from .npz import Npz
 from .rosbag2 import Rosbag2, recorded_model
 
-__all__ = ["FORMATS", "Bag", "BagWriter", "Format", "Layout", "Npz", "Rosbag2", "read", "recorded_model", "write"]
+__all__ = [
+    "FORMATS", "Bag", "BagWriter", "Csv", "Format", "GcsArray", "Layout", "Mat", "Npz", "Rosbag2",
+    "read", "recorded_model", "write",
+]  # fmt: skip
 
-FORMATS: Mapping[str, Format] = {"npz": Npz(), "rosbag2": Rosbag2()}
+FORMATS: Mapping[str, Format] = {
+    "npz": Npz(),
+    "rosbag2": Rosbag2(),
+    "mat": Mat(),
+    "gcs_array": GcsArray(),
+    "csv": Csv(),
+}
 """Name of every format to its reader, in the order in which they are asked whether they know a path."""
 
 
@@ -86,9 +98,9 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     experiment : Experiment
         Records in order.
     path : path-like
-        ``.csv`` and ``.mat`` give a file, ``.mcap`` a bag, anything else a folder of NPZ files.
+        ``.csv`` and ``.mat`` give a file, anything else a folder of NPZ files.
     format : str, optional
-        Key of `FORMATS` instead of what the ending says.
+        Key of `FORMATS` instead of what the ending says; ``"rosbag2"`` gives a bag in that folder.
 
     Raises
     ------
@@ -102,7 +114,7 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     chosen.write(experiment, place)
 
 
-_BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
+_BY_SUFFIX = {".csv": "csv", ".mat": "mat"}
 
 
 def _named(format: str) -> Format:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -88,3 +88,7 @@ class Layout:
         if stop <= start:
             raise RecordingError(f"rows: got {self.rows}, expected a part of {size} rows that is not empty")
         return slice(start, stop)
+
+    def with_period(self, sample_period: float | None) -> Layout:
+        """The same layout with a sample period [s] that the file tells."""
+        return replace(self, sample_period=sample_period)

@@ -1,0 +1,107 @@
+"""CSV with a header that names units, and tables of other software: TSV, white space, no header."""
+
+from __future__ import annotations
+
+import io
+from csv import writer
+from pathlib import Path
+
+from ..errors import RecordingError
+from ..record import Experiment, Notice, Record
+from .damage import naming
+from .layout import CHANNELS, Layout
+from .table import LABELS, resolve, table_records
+from .text_cells import Dialect, read_cells
+from .time_base import TimeBase
+
+_ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
+_ROWS = 1 << 15
+
+
+class Csv:
+    """Text table, one row per sample.
+
+    Written with the header ``time_s,voltage_V,displacement_m,phase`` and, only where the records need them, the columns
+    `record` (between neighbours of one name), `continues`, `truncated`, `initial_voltage_V`, `sample_period_s`,
+    `other_displacement_m` and `temperature_K`. Numbers are written in full, so that reading gives the same ones.
+    """
+
+    def recognises(self, path: Path) -> bool:
+        """True for the endings of text tables."""
+        return path.is_file() and path.suffix.lower() in _ENDINGS
+
+    def read(self, path: Path, layout: Layout) -> Experiment:
+        """The table as phases: labelled ones, or else what the drive looks like."""
+        with naming(path, "a text table"):
+            dialect = Dialect.sniff(path)
+            places = resolve(dialect.header, dialect.width, layout)
+            numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
+            words = {name: at for name, (at, _) in places.items() if name in LABELS}
+            stop = layout.rows[1] if layout.rows else None
+            columns, marks, bad = read_cells(
+                path, dialect, numbers, words, stop if stop is not None and stop >= 0 else None
+            )
+            channels = {name: layout.in_si(name, values, places[name][1]) for name, values in columns.items()}
+            records, notices = table_records(channels, marks, layout)
+            if bad:
+                notices.append(Notice("not_a_number", f"{bad} cells are empty or no number"))
+            return Experiment(tuple(records), str(path), tuple(notices))
+
+    def write(self, experiment: Experiment, path: Path) -> None:
+        """Write all records into one table.
+
+        Raises
+        ------
+        RecordingError
+            If the file exists or cannot be written.
+        """
+        with naming(path, "a file that can be written"):
+            if path.exists():
+                raise RecordingError("exists already; choose another name")
+            labels = _labels(experiment)
+            channels = [c for c in CHANNELS[3:] if all(getattr(r, c) is not None for r in experiment)]
+            with path.open("w", encoding="utf-8", newline="") as file:
+                titles = [f"{c}_{'m' if 'displacement' in c else 'K'}" for c in channels]
+                units = {"initial_voltage": "initial_voltage_V", "sample_period": "sample_period_s"}
+                titles += [units.get(name, name) for name in labels]
+                file.write(",".join(["time_s", "voltage_V", "displacement_m", *titles]) + "\n")
+                for number, record in enumerate(experiment, 1):
+                    _write_record(file, record, channels, _row_end(number, record, labels))
+
+
+def _labels(experiment: Experiment) -> list[str]:
+    """Label columns without which the records would not come back as they are."""
+    labels = ["phase"]
+    pairs = list(zip(experiment.records, experiment.records[1:], strict=False))
+    if any(a.phase == b.phase for a, b in pairs):
+        labels.append("record")
+    inferred = [abs(b.start_time - a.start_time - a.duration) < 1.5 * b.sample_period for a, b in pairs]
+    if [False, *inferred] != [r.continues for r in experiment]:
+        labels.append("continues")
+    labels += [
+        n for n in ("truncated", "initial_voltage") if any(getattr(r, n) not in (False, None) for r in experiment)
+    ]
+    if any(r.size < 2 or TimeBase.of(r.time).period != r.sample_period for r in experiment):
+        labels.append("sample_period")
+    return labels
+
+
+def _row_end(number: int, record: Record, labels: list[str]) -> str:
+    values = {
+        "phase": record.phase,
+        "record": number,
+        "continues": int(record.continues),
+        "truncated": int(record.truncated),
+        "initial_voltage": "" if record.initial_voltage is None else repr(record.initial_voltage),
+        "sample_period": repr(record.sample_period),
+    }
+    text = io.StringIO()
+    writer(text, lineterminator="").writerow([values[name] for name in labels])
+    return text.getvalue().replace("\n", " ").replace("\r", " ") + "\n"
+
+
+def _write_record(file: io.TextIOBase, record: Record, channels: list[str], end: str) -> None:
+    columns = [record.time, record.voltage, record.displacement, *(getattr(record, c) for c in channels)]
+    for a in range(0, record.size, _ROWS):
+        rows = zip(*(column[a : a + _ROWS].tolist() for column in columns), strict=True)
+        file.write("".join(",".join(map(repr, row)) + "," + end for row in rows))
