@@ -1,0 +1,57 @@
+"""Pictures of docs/tour.md, made from the code they show; `make docs` runs this."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from piezo_hysteresis.identification.drive import DriveLimits
+from piezo_hysteresis.identification.excitation import hold, sine, steps, triangle
+from piezo_hysteresis.report.style import BLACK, BLUE, GREEN, ORANGE, SETTINGS, canvas
+from piezo_hysteresis.stage.plant import PlantParameters
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+IMAGES = Path(__file__).parent / "images"
+LIMITS = DriveLimits()
+
+
+def what_a_stage_does() -> Figure:
+    """Loops that depend on amplitude and on frequency, and creep: three reasons why volts are not micrometres."""
+    stage = SimulatedStage(PlantParameters().with_values({"creep.gamma": 0.015}), seed=1)
+    figure, ((loops, rate, creep),) = canvas(1, 3, 3.0)
+
+    record = stage.play(triangle(LIMITS, (1.0, 0.7, 0.4), 1.0), average=10)
+    loops.plot(record.voltage, record.displacement * 1e6, color=BLACK, linewidth=1.0)
+    loops.set(title="hysteresis", xlabel="drive u [V]", ylabel="displacement y [µm]")
+
+    for frequency, colour in ((1.0, BLUE), (100.0, GREEN), (400.0, ORANGE)):
+        record = stage.play(sine(LIMITS, frequency, 3.0 / frequency))
+        last = slice(-round(1.0 / frequency / record.sample_period) - 1, None)
+        rate.plot(record.voltage[last], record.displacement[last] * 1e6, color=colour, label=f"{frequency:g} Hz")
+    rate.set(title="rate dependence", xlabel="drive u [V]")
+    rate.legend()
+
+    record = stage.play(np.concatenate([hold(LIMITS, 0.0, 0.1), steps(LIMITS, (0.0, 0.5), 10.0)])[5000:], average=500)
+    onset = int(np.argmax(record.voltage > 4.9)) + 1
+    time = record.sample_period * np.arange(record.size - onset)
+    creep.semilogx(time[1:], record.displacement[onset + 1 :] * 1e6, color=BLACK, linewidth=1.0)
+    creep.set(title="creep after a step to 5 V", xlabel="time since the step [s]")
+    return figure
+
+
+PICTURES = {"what_a_stage_does": what_a_stage_does}
+
+
+def main() -> None:
+    """Draw all."""
+    IMAGES.mkdir(exist_ok=True)
+    for name, draw in PICTURES.items():
+        with mpl.rc_context(SETTINGS):
+            draw().savefig(IMAGES / f"{name}.png", dpi=110, metadata={"Software": None})
+
+
+if __name__ == "__main__":
+    main()
