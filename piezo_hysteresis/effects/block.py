@@ -24,7 +24,7 @@ class Block(ABC):
     Attributes
     ----------
     names : tuple of str
-        Own parameters, in the order of the own rows of `linearise`.
+        Own parameters, in the order of the own rows of `linearise`; the same at every sample period.
     keeps_state : bool
         True where the state does not depend on the sample period, so that it passes to a record at another period.
     """

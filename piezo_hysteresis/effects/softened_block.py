@@ -149,7 +149,7 @@ class SoftenedBlock(Block):
         self.mode_gain = 1.0 + mode.sum()
         self.rest_of_arx = ArxBlock((), rest, arx.b / self.mode_gain, delay)
         self.settled = StaticSoftening(k2, k3)
-        self.names = (*arx.names, *self.settled.names)
+        self.names = (*self.settled.names, *arx.names)
 
     def static(self, x0: float) -> float:
         return self.arx.gain * self.settled.static(x0)
@@ -157,7 +157,7 @@ class SoftenedBlock(Block):
     def static_slopes(self, x0: float) -> tuple[float, Array]:
         slope, own = self.settled.static_slopes(x0)
         by_arx = self.arx.gain_slopes() * self.settled.static(x0)
-        return self.arx.gain * slope, np.concatenate((by_arx, self.arx.gain * own))
+        return self.arx.gain * slope, np.concatenate((self.arx.gain * own, by_arx))
 
     def rest(self, x0: float, time: float) -> State:
         return self.arx.rest(x0, time), (x0, self.settled.static(x0)), np.zeros(4), self.rest_of_arx.zeros(1)
@@ -199,4 +199,4 @@ class SoftenedBlock(Block):
         by_stiffness = self.arx.gain * dx0[m + 2 :, None] + through[m + 2 :]
         y = y + (self.arx.gain * (x0 - w0) + added[0])
         tangent = (d_arx, dw0, dx0, dz, d_filtered, own)
-        return y, np.vstack((rows, by_stiffness)), (arx, (w0, x0), z, after), tangent
+        return y, np.vstack((rows[:m], by_stiffness, rows[m:])), (arx, (w0, x0), z, after), tangent

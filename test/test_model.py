@@ -1,0 +1,92 @@
+"""The model as a value: order, names, scales, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.effects import Arx, AsymmetricHysteresis, BoucWen, Creep, Offset, SensorNonlinearity, ThermalDrift
+from piezo_hysteresis.errors import ModelError, ParameterError
+from piezo_hysteresis.model import Model, effect_named
+from piezo_hysteresis.record import Record
+
+PERIOD = 1e-3
+MODEL = Model((Arx(a=[-0.5], b=[0.5]), BoucWen()), PERIOD, displacement_scale=1e-5)
+
+
+def test_effects_stand_in_the_order_of_physics() -> None:
+    model = MODEL
+    for effect in (Offset(), ThermalDrift(D=1e-7), SensorNonlinearity(), Creep(), AsymmetricHysteresis()):
+        model = model.with_effect(effect)
+    assert [e.name for e in model.effects] == [
+        "bouc_wen",
+        "asymmetric_hysteresis",
+        "creep",
+        "arx",
+        "sensor_nonlinearity",
+        "thermal_drift",
+        "offset",
+    ]
+
+
+def test_with_and_without_return_new_models() -> None:
+    more = MODEL.with_effect(Creep(gamma=0.01))
+    assert "creep" in more
+    assert "creep" not in MODEL
+    assert more.with_effect(Creep(gamma=0.02))["creep"]["gamma"] == 0.02
+    assert more.without("creep").values() == MODEL.values()
+
+
+def test_numbers_are_named_and_changed_by_name() -> None:
+    changed = MODEL.with_values({"arx.b[0]": 0.25, "bouc_wen.A": -0.5})
+    assert changed.values()["arx.b[0]"] == 0.25
+    assert changed["bouc_wen"]["A"] == -0.5
+    assert MODEL.values()["arx.b[0]"] == 0.5
+    assert MODEL.row("arx.b[0]").unit == "1"
+
+
+def test_the_scales_are_part_of_the_model() -> None:
+    u = 5.0 + np.sin(np.arange(100) / 9.0)
+    y, _ = MODEL.run(u, MODEL.rest(u[0]))
+    doubled = Model(MODEL.effects, PERIOD, voltage_scale=20.0, displacement_scale=3e-5)
+    np.testing.assert_allclose(doubled.run(2 * u, doubled.rest(2 * u[0]))[0], 3 * y, rtol=1e-12)
+
+
+def test_contributions_are_what_each_added_effect_brings() -> None:
+    model = MODEL.with_effect(ThermalDrift(D=1e-7, tau=1.0)).with_effect(SensorNonlinearity(s2=0.01))
+    data = Record(5.0 + np.sin(np.arange(100) / 9.0), np.zeros(100), PERIOD)
+    parts = model.contributions(data)
+    assert set(parts) == {"thermal_drift", "sensor_nonlinearity"}
+    np.testing.assert_allclose(parts["thermal_drift"], 1e-7 * (1 - np.exp(-data.time)), atol=1e-18)
+    np.testing.assert_allclose(sum(parts.values()), model.simulate(data)[0] - MODEL.simulate(data)[0], atol=1e-17)
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Model((BoucWen(), BoucWen()), PERIOD), "'bouc_wen' is in the chain twice"),
+        (lambda: Model((Arx(), AsymmetricHysteresis()), PERIOD), "'asymmetric_hysteresis' needs 'bouc_wen'"),
+        (lambda: Model((Arx(),), 0.0), "sample_period: got 0.0, expected a positive"),
+        (lambda: Model((Arx(),), PERIOD, voltage_scale=-1.0), "voltage_scale: got -1.0"),
+        (lambda: Model((Arx(),), PERIOD, displacement_scale=float("nan")), "displacement_scale: got nan"),
+        (lambda: MODEL["creep"], "no effect 'creep' in the chain bouc_wen, arx"),
+        (lambda: MODEL.at(PERIOD / 2), "expected 0.001 s .* or more; decimate"),
+        (lambda: MODEL.run([], MODEL.rest(0.0)), "voltage: got shape"),
+        (lambda: MODEL.run([[1.0]], MODEL.rest(0.0)), "voltage: got shape"),
+        (lambda: MODEL.run([1.0, float("inf")], MODEL.rest(0.0)), "voltage: sample 1 is not finite"),
+        (lambda: effect_named("crepe"), "unknown effect 'crepe', expected one of"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_one_line(build, message: str) -> None:
+    with pytest.raises(ModelError, match=message) as told:
+        build()
+    assert "\n" not in str(told.value)
+
+
+def test_unknown_and_impossible_numbers_are_refused() -> None:
+    with pytest.raises(ParameterError, match="unknown parameter 'gama'"):
+        Creep(gama=0.1)
+    with pytest.raises(ParameterError, match=r"creep\.gamma: got 3 1/decade, expected -0\.2 to 0\.2"):
+        Creep(gamma=3.0)
+    with pytest.raises(ParameterError, match="unknown parameter 'q'"):
+        MODEL.with_values({"bouc_wen.q": 1.0})
