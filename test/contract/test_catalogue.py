@@ -1,0 +1,57 @@
+"""The public vocabulary: identifiers and families that files, ROS parameters, the command and its answers use."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+from piezo_hysteresis.effects import BASELINE, BY_NAME, CATALOGUE, CHAIN
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+FAMILIES = {
+    "creep": "creep",
+    "creep_exponential": "creep",
+    "thermal_drift": "drift",
+    "thermal_expansion": "drift",
+    "gain_drift": "drift",
+    "even_input_polynomial": "static",
+    "sensor_nonlinearity": "static",
+    "asymmetric_hysteresis": "hysteresis",
+    "hysteresis_exponent": "hysteresis",
+    "hysteresis_memory": "hysteresis",
+    "rate_dependent_hysteresis": "hysteresis",
+    "initial_state": "hysteresis",
+    "backlash": "hysteresis",
+    "softening": "dynamics",
+    "extra_resonance": "dynamics",
+    "extra_delay": "lag",
+    "amplifier_bandwidth": "lag",
+    "sensor_bandwidth": "lag",
+    "amplifier_slew_limit": "amplifier",
+    "amplifier_saturation": "amplifier",
+    "mains_hum": "disturbance",
+    "axis_coupling": "disturbance",
+}
+
+
+def test_names_and_families_are_the_published_ones() -> None:
+    assert {e.name: e.family for e in CATALOGUE} == FAMILIES
+
+
+def test_every_effect_is_in_the_chain_once_and_in_order() -> None:
+    assert len(BY_NAME) == len(CHAIN)
+    assert set(BASELINE) | set(CATALOGUE) == set(CHAIN)
+    places = [e.place for e in CHAIN]
+    assert places == sorted(places)
+
+
+def test_file_class_and_identifier_are_one_word() -> None:
+    for effect in CHAIN:
+        assert effect.__module__.rpartition(".")[2] == effect.name
+        assert effect.__name__ == "".join(part.capitalize() for part in effect.name.split("_"))
+
+
+def test_the_page_is_what_the_classes_say() -> None:
+    generated = runpy.run_path(str(DOCS / "generate.py"))["catalogue"]()
+    assert (DOCS / "catalogue.md").read_text() == generated, "run make docs"
