@@ -37,7 +37,7 @@ def told(status: DiagnosticStatus) -> None:
     """Print what the driver says about our waveform."""
     state = {value.key: value.value for value in status.values}["state"]
     if status.name == "my_sine":
-        print(f"{status.name}: {state} {status.message}".rstrip())
+        print(f"{status.name}: {state}" + (f", {status.message}" if state == "refused" else ""))
         if state in ("refused", "done", "stopped"):
             finished.set_result(state)
 

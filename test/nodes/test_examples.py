@@ -1,0 +1,47 @@
+"""The ten lines with which other lab software drives a stage, against a real driver."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.nodes
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+NAMESPACE = "/stage_x"
+
+
+def run(lab, script, *arguments):
+    command = [sys.executable, EXAMPLES / script, *arguments, "--ros-args", "-r", f"__ns:={NAMESPACE}"]
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(lab.domain), "ROS_LOG_DIR": str(lab.folder)}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_a_voltage_is_set(lab):
+    lab.driver(namespace=NAMESPACE, ramp_rate=100.0, real_time_factor=5.0)
+    samples = lab.streaming(f"{NAMESPACE}/samples")
+    done = run(lab, "set_voltage.py", "3.5")
+    assert done.returncode == 0, done.stderr
+    lab.wait(lambda: abs(samples.newest.voltage[-1] - 3.5) < 1e-3, "3.5 V")
+
+
+def test_a_waveform_is_played(lab):
+    lab.driver(namespace=NAMESPACE, real_time_factor=5.0)
+    samples = lab.streaming(f"{NAMESPACE}/samples")
+    done = run(lab, "send_waveform.py")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-1] == "my_sine: done"
+    lab.wait(
+        lambda: samples.newest.phase[-1] != samples.blocks[0].phase[0] and samples.newest.voltage[-1] < 0.01, "its end"
+    )
+    assert samples.voltage.max() == pytest.approx(5.0, abs=1e-3)
+
+
+def test_a_refused_waveform_is_told(lab):
+    lab.driver(namespace=NAMESPACE, voltage_max=4.0)
+    done = run(lab, "send_waveform.py")
+    assert done.returncode == 1
+    assert "my_sine: refused, " in done.stdout
+    assert "expected 0 to 4 V" in done.stdout

@@ -1,0 +1,38 @@
+"""The examples that need no stage."""
+
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import yaml
+
+from piezo_hysteresis import recording
+from piezo_hysteresis.record import Experiment, Record
+from piezo_hysteresis.stage.hidden import hidden_effect
+from piezo_hysteresis.stage.plant import PlantParameters
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def test_simulate(capsys):
+    runpy.run_path(str(EXAMPLES / "simulate.py"))
+    assert capsys.readouterr().out == "25000 samples, stroke 20.392 µm\n"
+
+
+def test_read_experiment(tmp_path, capsys, monkeypatch):
+    record = Record([0.0, 1.0, 2.0], [0.0, 1e-6, 2.5e-6], 1e-3, phase="triangle")
+    recording.write(Experiment((record,)), tmp_path / "experiment")
+    monkeypatch.setattr(sys, "argv", ["read_experiment.py", str(tmp_path / "experiment")])
+    runpy.run_path(str(EXAMPLES / "read_experiment.py"))
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.split(maxsplit=1)[0] == "triangle"
+    assert line.endswith("3 samples of 1000 µs, 0.00 to 2.00 V, 0.000 to 2.500 µm")
+
+
+def test_hide_effect_says_nothing_and_writes_the_plant_that_the_seed_draws(tmp_path):
+    command = [sys.executable, EXAMPLES / "hide_effect.py", "3", tmp_path / "plant.yaml"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout + done.stderr == ""
+    written = PlantParameters.from_mapping(yaml.safe_load((tmp_path / "plant.yaml").read_text()))
+    assert written == hidden_effect(3, highest_voltage=10.0).parameters
