@@ -9,7 +9,8 @@ from ..identification.edges import find_edges
 from ..record import Record
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BEFORE, MEASURED, PREDICTED, canvas, duration, plain_log, styled
+from .style import BEFORE, MEASURED, PREDICTED, canvas, plain_log, styled
+from .words import duration
 
 Array = NDArray[np.float64]
 

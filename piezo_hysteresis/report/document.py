@@ -9,9 +9,9 @@ from importlib.resources import files
 
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import nanometre
 from .table import Table
 from .verdict import Verdict
+from .words import nanometre
 
 
 def document(

@@ -39,8 +39,8 @@ def error_table(comparison: Comparison) -> Table | None:
         header,
         tuple(rows),
         f"Per cent of range; the range is {1e6 * now.range:.4g} µm, peak to peak over the experiment. Every phase "
-        "counts the same in the last row. Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase; it means little where the "
-        "stage hardly moves.",
+        "counts the same in the last row. Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase; it means little where "
+        "the stage hardly moves.",
         frozenset(range(1, len(header))),
     )
 

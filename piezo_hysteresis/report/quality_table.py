@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..record import Experiment
-from .style import duration
 from .table import Table
+from .words import duration
 
 
 def record_table(experiment: Experiment, noise: np.ndarray) -> Table:

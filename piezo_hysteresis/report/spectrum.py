@@ -8,7 +8,8 @@ from scipy.signal import welch
 
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BEFORE, FLOOR, MEASURED, PREDICTED, canvas, duration, legend_above, styled
+from .style import BEFORE, FLOOR, MEASURED, PREDICTED, canvas, legend_above, styled
+from .words import duration
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,8 @@ from ..errors import IdentificationError
 from ..identification.delay import StepResponse, identify_delay, step_response
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BLUE, GREEN, MEASURED, PREDICTED, canvas, duration, styled
+from .style import BLUE, GREEN, MEASURED, PREDICTED, canvas, styled
+from .words import duration
 
 ZOOM = 24
 """Samples drawn around the onset."""

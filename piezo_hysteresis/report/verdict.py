@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .comparison import Comparison
-from .style import nanometre
+from .words import nanometre
 
 ENOUGH = 1.5
 """Mean square of error over floor up to which nothing is missing."""

@@ -1,0 +1,101 @@
+"""``piezo identify``: delay, dynamics and hysteresis from whatever was recorded, with uncertainties."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from .. import model_file
+from ..effects import BoucWen, PublishedBoucWen
+from ..identification.identification import Identification
+from ..identification.identify import identify
+from ..identification.roles import HELD_OUT
+from ..report.parameter_table import correlation_table, parameter_table
+from ..report.table import Table
+from . import reading
+from .json_file import write_json
+from .terminal import console, progress, show, show_notices
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("identify", description=__doc__)
+    reading.add_arguments(parser)
+    parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
+    parser.add_argument("--json", metavar="FILE", help="result for machines")
+    parser.add_argument(
+        "--orders", metavar=("NA", "NB"), nargs=2, type=int, help="orders of the ARX (default: 8 8, as published)"
+    )
+    parser.add_argument("--choose-orders", action="store_true", help="lowest orders that are as good as any")
+    parser.add_argument("--published", action="store_true", help="Bouc-Wen in the discrete form of the paper, Eq. (7)")
+    parser.add_argument(
+        "--held-out", metavar="PHASE", action="append", help=f"not fitted but judged (default: {', '.join(HELD_OUT)})"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Identify, print and save; returns 0, or 1 where the fit did not converge.
+
+    Raises
+    ------
+    PiezoError
+        On bad input, or data that do not determine the model.
+    """
+    experiment = reading.read(args)
+    orders = None if args.choose_orders else tuple(args.orders or (8, 8))
+    with progress("identify") as tell:
+        found = identify(
+            experiment,
+            orders=orders,
+            hysteresis=PublishedBoucWen if args.published else BoucWen,
+            held_out=HELD_OUT if args.held_out is None else tuple(args.held_out),
+            progress=tell,
+        )
+    show(parameter_table(found.model, found.fit), correlation_table(found.fit), _phases(found))
+    out = console()
+    if found.delay is not None:
+        out.print(str(found.delay))
+    for comparison in found.comparisons:
+        out.print(str(comparison))
+    show_notices(found.notices)
+    path = model_file.save(found.model, args.output)
+    out.print(f"wrote {path}")
+    if args.json is not None:
+        write_json(args.json, answer(found, str(path)))
+    return 0 if found.fit.converged else 1
+
+
+def answer(found: Identification, path: str) -> dict[str, Any]:
+    """The result for machines."""
+    fit = found.fit
+    return {
+        "schema": 1,
+        "model": path,
+        "converged": fit.converged,
+        "effects": [e.name for e in found.model.effects],
+        "parameters": {
+            name: {"value": value, "interval_95": fit.interval(name), "at_bound": name in fit.at_bounds}
+            for name, value in fit.values.items()
+        },
+        "delay_s": None if found.delay is None else found.delay.time,
+        "correlated": [list(pair) for pair in found.correlated],
+        "free_run_error_m": found.free_run_error,
+        "free_run_error_percent_of_range": found.free_run_percent,
+        "phases": [
+            {"phase": p.phase, "rms_m": p.rms, "percent_of_range": p.percent, "fitted": p.is_fitted}
+            for p in found.phases
+        ],
+        "notices": [
+            {"kind": n.kind, "phase": n.phase, "message": n.message, "severe": n.severe} for n in found.notices
+        ],
+    }
+
+
+def _phases(found: Identification) -> Table:
+    rows = tuple(
+        (p.phase, f"{p.percent:.3f}", f"{1e9 * p.rms:.1f}", "fitted" if p.is_fitted else "held out")
+        for p in found.phases
+    )
+    note = f"Zero of the sensor free per phase. {found.free_run_percent:.3g} % of range on what judges the model."
+    return Table("Free-run error", ("phase", "% of range", "nm", "data"), rows, note, frozenset({1, 2}))

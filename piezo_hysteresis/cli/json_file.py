@@ -1,0 +1,61 @@
+"""Results for machines: one JSON file, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import RecordingError
+
+
+def write_json(path: str, answer: Mapping[str, Any]) -> None:
+    """Write `answer`; numbers that are not finite become null.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be written.
+    """
+    place = Path(path).expanduser()
+    text = json.dumps(_plain(answer), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    try:
+        if place.exists() and not place.is_file():  # a pipe or /dev/stdout cannot be replaced
+            place.write_text(text, encoding="utf-8")
+            return
+        draft = place.with_name(place.name + ".tmp")
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(place)
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}, expected a file that can be written") from None
+
+
+def read_json(path: str) -> dict[str, Any]:
+    """Read an answer.
+
+    Raises
+    ------
+    RecordingError
+        If there is no such file, or it holds no JSON object.
+    """
+    try:
+        answer = json.loads(Path(path).expanduser().read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}, expected a JSON file") from None
+    except (ValueError, RecursionError):
+        raise RecordingError(f"{path}: damaged or no JSON, expected the answer of `piezo diagnose --json`") from None
+    if not isinstance(answer, dict):
+        raise RecordingError(f"{path}: got a {type(answer).__name__}, expected the answer of `piezo diagnose --json`")
+    return answer
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value.item() if hasattr(value, "item") else value

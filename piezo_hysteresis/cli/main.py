@@ -1,0 +1,78 @@
+"""`piezo`: one command for everything that needs no ROS.
+
+Exit status: 0 done (also for every verdict of ``piezo diagnose``), 1 not converged or not identifiable, 2 bad input.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from ..errors import IdentificationError, PiezoError
+
+COMMANDS = {
+    "simulate": "play a protocol to a simulated stage and record it",
+    "identify": "identify a model from an experiment",
+    "validate": "judge a model in free run on an experiment",
+    "diagnose": "say where a model is wrong and which effect is missing",
+    "report": "write one page about an experiment and its models",
+    "import": "turn a foreign recording into an experiment folder",
+    "effects": "the catalogue of physical effects",
+}
+"""Subcommand to what it does; each lives in a file of its own, loaded only when it is asked for."""
+
+DONE, NOT_IDENTIFIABLE, BAD_INPUT, INTERRUPTED, BROKEN_PIPE = 0, 1, 2, 130, 141
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit status.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments without the program name; default those of the process.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    chosen = next((a for a in arguments if not a.startswith("-")), None)
+    try:
+        args = _parser(chosen).parse_args(arguments)
+        status = int(args.run(args))
+        sys.stdout.flush()
+        return status
+    except IdentificationError as error:
+        return _told(error, NOT_IDENTIFIABLE)
+    except (PiezoError, OSError) as error:
+        if isinstance(error, BrokenPipeError):
+            # the reader of our output has gone: leave nothing for the interpreter to flush
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return BROKEN_PIPE
+        return _told(error, BAD_INPUT)
+    except MemoryError:
+        return _told("the recording does not fit into memory; decimate it or give fewer rows", BAD_INPUT)
+    except KeyboardInterrupt:
+        return _told("interrupted", INTERRUPTED)
+
+
+def _parser(chosen: str | None) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="piezo", description="Hysteresis and dynamics of piezo stages: models, identification, what is missing."
+    )
+    subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
+    for name, summary in COMMANDS.items():
+        if name == chosen:
+            import_module(f".{'import_' if name == 'import' else name}", __package__).add_parser(subparsers)
+        else:
+            subparsers.add_parser(name, help=summary)
+    return parser
+
+
+def _told(message: object, status: int) -> int:
+    print(f"piezo: {' '.join(str(message).split())}", file=sys.stderr)
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,112 @@
+"""How a recording is to be read: the options that all subcommands with an experiment share."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from .. import recording
+from ..errors import RecordingError
+from ..record import Experiment
+
+T = TypeVar("T")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the experiment and what the file may not say about itself."""
+    parser.add_argument("experiment", metavar="EXPERIMENT", help="recording: folder of .npz, bag, .csv, .mat, …")
+    group = parser.add_argument_group("reading, where the recording does not say it")
+    group.add_argument("--format", choices=tuple(recording.FORMATS), help="default: what the path looks like")
+    group.add_argument("--axis", metavar="NS", help="namespace of one stage in a bag of several, e.g. /stage_x")
+    group.add_argument(
+        "--column",
+        metavar="CHANNEL=PLACE",
+        action="append",
+        default=[],
+        help="column number from 1, name, or /topic.field; e.g. displacement=5 (repeatable)",
+    )
+    group.add_argument(
+        "--unit", metavar="CHANNEL=UNIT", action="append", default=[], help="e.g. displacement=um (repeatable)"
+    )
+    group.add_argument("--sample-period", metavar="S", type=float, help="time between samples [s]")
+    group.add_argument(
+        "--initial-voltage", metavar="V", type=float, help="drive at which the stage had settled before every phase [V]"
+    )
+    group.add_argument("--rows", metavar="FROM:TO", help="part of a record in one piece, as a Python slice")
+    group.add_argument(
+        "--phase",
+        metavar="[TIME=]NAME",
+        action="append",
+        default=[],
+        help="name of the only phase, or start time [s] and name of each (repeatable)",
+    )
+    group.add_argument(
+        "--include", metavar="NAME", action="append", default=[], help="keep phases left out otherwise: idle, hold"
+    )
+    group.add_argument(
+        "--decimate",
+        metavar="PHASE=N",
+        action="append",
+        default=[],
+        help="average N samples into one in phases of that name (repeatable)",
+    )
+
+
+def read(args: argparse.Namespace) -> Experiment:
+    """The experiment that the arguments name.
+
+    Raises
+    ------
+    RecordingError, RecordError
+        If it cannot be read, or an option makes no sense.
+    """
+    return recording.read(
+        args.experiment,
+        format=args.format,
+        axis=args.axis,
+        columns=_pairs("--column", args.column, str),
+        units=_pairs("--unit", args.unit, str),
+        sample_period=args.sample_period,
+        initial_voltage=args.initial_voltage,
+        rows=_rows(args.rows),
+        phases=_phases(args.phase),
+        include=args.include,
+        decimate=_pairs("--decimate", args.decimate, int),
+    )
+
+
+def _pairs(option: str, texts: Sequence[str], kind: Callable[[str], T]) -> dict[str, T]:
+    pairs = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        try:
+            pairs[name] = kind(value)
+        except ValueError:
+            equals = ""
+        if not (name and equals and value):
+            raise RecordingError(f"{option}: got '{text}', expected NAME=VALUE")
+    return pairs
+
+
+def _rows(text: str | None) -> tuple[int | None, int | None] | None:
+    if text is None:
+        return None
+    start, colon, stop = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return (int(start) if start else None, int(stop) if stop else None)
+    except ValueError:
+        raise RecordingError(f"--rows: got '{text}', expected FROM:TO, e.g. 0:7000") from None
+
+
+def _phases(texts: Sequence[str]) -> str | list[tuple[float, str]] | None:
+    if not texts:
+        return None
+    if len(texts) == 1 and "=" not in texts[0]:
+        return texts[0]
+    try:
+        return [(float(time), name) for time, _, name in (text.partition("=") for text in texts)]
+    except ValueError:
+        raise RecordingError(f"--phase: got {', '.join(texts)}, expected one NAME, or TIME=NAME for each") from None

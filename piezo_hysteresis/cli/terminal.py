@@ -1,0 +1,70 @@
+"""What a person sees: tables on standard output, progress on standard error."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table as RichTable
+
+from ..record import Notice
+from ..report.table import Table
+
+WIDTH = 140
+"""Columns where standard output is no terminal."""
+
+
+def console() -> Console:
+    """Standard output; plain text where it is no terminal."""
+    width = None if sys.stdout.isatty() else max(WIDTH, shutil.get_terminal_size().columns)
+    return Console(file=sys.stdout, highlight=False, markup=False, width=width, soft_wrap=True)
+
+
+def show(*tables: Table | None) -> None:
+    """Print tables; None is skipped."""
+    for table in tables:
+        if table is None:
+            continue
+        drawn = RichTable(title=table.title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+        for column, heading in enumerate(table.header):
+            drawn.add_column(heading, justify="right" if column in table.numeric else "left", header_style="underline")
+        for row in table.rows:
+            drawn.add_row(*row)
+        out = console()
+        out.print(drawn)
+        if table.note:
+            out.print(table.note, style="dim")
+        out.print()
+
+
+def show_notices(notices: Iterable[Notice]) -> None:
+    """Print findings about the data, one line each."""
+    out = console()
+    for notice in notices:
+        where = f" [{notice.phase}]" if notice.phase else ""
+        out.print(f"{'caution' if notice.severe else 'note'}{where}: {notice.message}")
+
+
+@contextmanager
+def progress(task: str) -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error while something takes long; gives the function to call with a word and a fraction."""
+    bar = Progress(
+        TextColumn("{task.description:32s}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+        console=Console(file=sys.stderr),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+    )
+    with bar:
+        number = bar.add_task(task, total=1.0)
+
+        def tell(word: str, fraction: float) -> None:
+            bar.update(number, description=f"{task}: {word}", completed=min(max(fraction, 0.0), 1.0))
+
+        yield tell

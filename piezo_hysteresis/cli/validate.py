@@ -1,0 +1,131 @@
+"""``piezo validate``: how well a model predicts an experiment in free run, and whether the residual knows the drive."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from .. import model_file
+from ..discrepancy.correlation import CAPTION, correlate
+from ..errors import RecordError
+from ..identification.normal_equations import Nuisance
+from ..report.comparison import Comparison, compare
+from ..report.error_table import error_table, frequency_table
+from ..report.table import Table
+from . import reading
+from .json_file import write_json
+from .terminal import console, show, show_notices
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("validate", description=__doc__)
+    parser.add_argument("model", metavar="MODEL", help="model file")
+    reading.add_arguments(parser)
+    parser.add_argument("--zero-per-phase", action="store_true", help="sensor zero free in every phase, not only once")
+    parser.add_argument("--figures", metavar="FOLDER", help="write the figures with their data")
+    parser.add_argument("--json", metavar="FILE", help="result for machines")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the errors and the residual tests; returns 0.
+
+    Raises
+    ------
+    PiezoError
+        On a model or an experiment that cannot be read, or that do not fit each other.
+    """
+    model = model_file.load(args.model)
+    experiment = reading.read(args)
+    nuisance = Nuisance(offset=True) if args.zero_per_phase else None
+    comparison = compare(experiment, {"error": model}, nuisance)
+    tests = _tests(comparison)
+    show(error_table(comparison), frequency_table(comparison), _test_table(tests))
+    show_notices(experiment.notices)
+    if args.json is not None:
+        write_json(args.json, answer(comparison, tests))
+    if args.figures is not None:
+        _draw(comparison, Path(args.figures).expanduser())
+        console().print(f"wrote figures to {args.figures}")
+    return 0
+
+
+def answer(comparison: Comparison, tests: list[dict[str, Any]]) -> dict[str, Any]:
+    """The result for machines."""
+    now = comparison.now
+    assert now is not None
+    return {
+        "schema": 1,
+        "range_m": now.range,
+        "zero_m": now.zero,
+        "rms_m": now.rms,
+        "percent_of_range": now.percent,
+        "phases": [
+            {
+                "phase": row.phase,
+                "frequency_hz": row.frequency,
+                "samples": row.size,
+                "rms_m": row.rms,
+                "percent_of_range": row.percent,
+                "largest_m": row.largest,
+                "fit_percent": row.fit,
+                "floor_m": float(comparison.floors[row.index]),
+            }
+            for row in now.rows
+        ],
+        "percent_of_range_by_frequency": {f"{f:g}": percent for f, percent in now.by_frequency.items()},
+        "residual_tests": tests,
+    }
+
+
+def _tests(comparison: Comparison) -> list[dict[str, Any]]:
+    assert comparison.now is not None
+    tests = []
+    for record, residual in zip(comparison.experiment, comparison.now.residuals, strict=True):
+        try:
+            found = correlate(residual, record.voltage, record.sample_period)
+        except RecordError:
+            continue
+        tests.append(
+            {
+                "phase": record.phase,
+                "auto": float(abs(found.auto[1:]).max()),
+                "auto_bound": float(found.auto_bound),
+                "white": found.is_white,
+                "cross": float(abs(found.cross).max()),
+                "cross_bound": found.cross_bound,
+                "independent_of_drive": found.is_independent,
+            }
+        )
+    return tests
+
+
+def _test_table(tests: list[dict[str, Any]]) -> Table:
+    rows = tuple(
+        (
+            t["phase"],
+            f"{t['auto']:.3f}",
+            f"{t['auto_bound']:.3f}",
+            f"{t['cross']:.3f}",
+            f"{t['cross_bound']:.3f}",
+            "undecided" if t["cross_bound"] >= 1 else "passed" if t["independent_of_drive"] else "depends on the drive",
+        )
+        for t in tests
+    )
+    header = ("phase", "auto", "bound", "cross", "bound", "verdict")
+    title = "Residual tests: largest correlation over 50 lags, 99 % bounds"
+    return Table(title, header, rows, CAPTION, frozenset(range(1, 5)))
+
+
+def _draw(comparison: Comparison, folder: Path) -> None:
+    from ..report.gap import gap
+    from ..report.time_series import time_series
+    from ..report.whiteness import whiteness
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for figure in (gap, time_series, whiteness):
+        drawing = figure(comparison)
+        if drawing is not None:
+            drawing.save(folder)
