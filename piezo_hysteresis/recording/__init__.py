@@ -21,11 +21,12 @@ from .gcs_array import GcsArray
 from .layout import Column, Layout
 from .mat import Mat
 from .npz import Npz
+from .quality import inspect
 from .rosbag2 import Rosbag2, recorded_model
 
 __all__ = [
     "FORMATS", "Bag", "BagWriter", "Csv", "Format", "GcsArray", "Layout", "Mat", "Npz", "Rosbag2",
-    "read", "recorded_model", "write",
+    "inspect", "read", "recorded_model", "write",
 ]  # fmt: skip
 
 FORMATS: Mapping[str, Format] = {
@@ -87,7 +88,8 @@ def read(
         )
     if decimate:
         records = tuple(r.decimate(decimate.get(r.phase, decimate.get(r.phase.split("_")[0], 1))) for r in records)
-    return replace(experiment, records=records)
+    experiment = replace(experiment, records=records)
+    return replace(experiment, notices=(*experiment.notices, *inspect(experiment)))
 
 
 def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str | None = None) -> None:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import io
 
 from ..errors import RecordingError
 from ..record import Experiment, Notice, Record, Samples
@@ -57,6 +56,8 @@ class Mat:
         RecordingError
             If the file exists or cannot be written.
         """
+        from scipy import io  # slow to import, and only needed here
+
         structs = {}
         for number, record in enumerate(experiment, 1):
             fields: dict[str, Any] = {"voltage": record.voltage, "displacement": record.displacement}
@@ -75,6 +76,8 @@ def _opened(path: Path, layout: Layout) -> AbstractContextManager[Variables]:
     """Dotted name to array, of every variable and field that may matter."""
     if is_hdf5(path):
         return Hdf5Variables(path)
+    from scipy import io  # slow to import, and only needed here
+
     named = {re.split(r"[.\[]", str(place))[0] for place in layout.columns.values()}
     wanted = [
         name

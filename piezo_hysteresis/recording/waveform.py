@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from ..record import Samples
 
@@ -133,8 +132,8 @@ def _crossings(voltage: Samples) -> int:
 def _repeats(voltage: Samples) -> bool:
     """True where the autocorrelation comes back, for odd multisines also with the other sign."""
     x = voltage[: 1 << 20] - voltage[: 1 << 20].mean()
-    size = fft.next_fast_len(2 * x.size, real=True)
-    overlap = fft.irfft(np.abs(fft.rfft(x, size)) ** 2, size)[: x.size // 2 + 1]
+    size = 1 << (2 * x.size - 1).bit_length()
+    overlap = np.fft.irfft(np.abs(np.fft.rfft(x, size)) ** 2, size)[: x.size // 2 + 1]
     energy = np.cumsum(x**2)
     lags = np.arange(overlap.size)
     head = energy[x.size - 1 - lags]

@@ -18,12 +18,12 @@ names = st.sampled_from(["rest", "step", "sine_50hz", "my phase", 'a "b", c', "Â
 
 
 @st.composite
-def experiments(draw, periods=periods, names=names, continues=st.booleans()):
+def experiments(draw, periods=periods, names=names):
     records = []
     end = 0.0
     for k in range(draw(st.integers(1, 3))):
         n = draw(st.integers(1, 30))
-        follows = bool(records) and draw(continues)
+        follows = bool(records) and draw(st.booleans())
         records.append(
             Record(
                 draw(arrays(float, n, elements=numbers)),

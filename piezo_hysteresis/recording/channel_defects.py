@@ -1,0 +1,110 @@
+"""Defects of one recorded phase: clipped, stuck, interrupted or coarse channels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record import Notice, Record, Samples
+from .finite import stretches
+
+FEWEST_LEVELS = 1000
+"""Quantisation is told where a channel uses fewer levels than this; below a sixteenth of it nothing rests on it."""
+
+_DRIVE_MOVES = 0.05
+_RETURN = 0.03
+_SEVERE_SHARE = 0.05
+
+
+def channel_defects(record: Record) -> list[Notice]:
+    """Notices ``clipped``, ``stuck``, ``dropout`` and ``quantisation`` about a phase in which the drive moves."""
+    if record.size < 16:
+        return []
+    return [*_stuck(record), *_clipped_voltage(record), *_dropouts(record), *_quantised(record)]
+
+
+def _runs_of_equal(values: Samples, shortest: int) -> NDArray[np.int64]:
+    """Start and stop of every run of at least `shortest` equal samples, shape (k, 2)."""
+    same = np.diff(values) == 0.0
+    runs = np.array(stretches(same), np.int64).reshape(-1, 2)
+    runs[:, 1] += 1
+    return np.asarray(runs[runs[:, 1] - runs[:, 0] >= shortest])
+
+
+def _ranges(values: Samples, runs: NDArray[np.int64]) -> Samples:
+    return np.array([np.ptp(values[a:b]) for a, b in runs.tolist()])
+
+
+def _stuck(record: Record) -> list[Notice]:
+    """Displacement that stands still while the drive moves: at its extremes it is clipped, elsewhere stuck."""
+    y, u = record.displacement, record.voltage
+    runs = _runs_of_equal(y, 5)
+    if not len(runs):
+        return []
+    runs = runs[_ranges(u, runs) > _DRIVE_MOVES * np.ptp(u)]
+    at_rail = np.isin(y[runs[:, 0]], (y.min(), y.max()))
+    notices = []
+    for kind, part, text in (
+        ("clipped", runs[at_rail], "the displacement is cut off at {:.4g} m"),
+        ("stuck", runs[~at_rail], "the displacement stands still at {:.4g} m"),
+    ):
+        if len(part):
+            samples = int((part[:, 1] - part[:, 0]).sum())
+            told = text.format(float(y[part[0, 0]])) + f" for {samples} samples while the drive moves"
+            notices.append(Notice(kind, told, record.phase, severe=samples > _SEVERE_SHARE * record.size))
+    return notices
+
+
+def _clipped_voltage(record: Record) -> list[Notice]:
+    """Voltage that stands at its extreme while the displacement goes on and comes back: its recording is cut off."""
+    y, u = record.displacement, record.voltage
+    samples = 0
+    for rail, sign in ((u.max(), 1.0), (u.min(), -1.0)):
+        runs = _runs_of_equal(np.where(u == rail, rail, np.arange(u.size)), 5)
+        for a, b in runs.tolist():
+            way = sign * y[a:b] * np.sign(np.dot(u - u.mean(), y - y.mean()) or 1.0)
+            if way.max() - max(way[0], way[-1]) > _RETURN * np.ptp(y):
+                samples += b - a
+    if not samples:
+        return []
+    text = f"the voltage is cut off for {samples} samples while the displacement goes on"
+    return [Notice("clipped", text, record.phase, severe=samples > _SEVERE_SHARE * record.size)]
+
+
+def _dropouts(record: Record) -> list[Notice]:
+    """Displacement that jumps away and back within a few samples while the drive is smooth."""
+    y, u = record.displacement, record.voltage
+    longest = max(1, min(1000, record.size // 100))
+    steps = np.diff(y)
+    large = np.flatnonzero(np.abs(steps) > max(0.1 * float(np.ptp(y)), 8.0 * float(np.quantile(np.abs(steps), 0.99))))
+    count = samples = 0
+    k = 0
+    while k + 1 < large.size:
+        a, b = int(large[k]), int(large[k + 1])
+        back = abs(y[b + 1] - y[a]) < 0.25 * abs(steps[a])
+        around = u[max(0, a - 20) : b + 20]
+        if back and steps[a] * steps[b] < 0 and b - a <= longest and np.ptp(around) < 0.25 * np.ptp(u):
+            count, samples, k = count + 1, samples + b - a, k + 2
+        else:
+            k += 1
+    if not count:
+        return []
+    text = f"the displacement drops out {count} times, {samples} samples in all"
+    return [Notice("dropout", text, record.phase, severe=samples > 0.001 * record.size)]
+
+
+def _quantised(record: Record) -> list[Notice]:
+    """Channels whose values lie on few levels."""
+    notices = []
+    for name, unit, values in (("voltage", "V", record.voltage), ("displacement", "m", record.displacement)):
+        levels = np.unique(values[:200_000])
+        if levels.size < 3 or (name == "voltage" and levels.size < 16):  # a drive of steps has few levels
+            continue
+        gaps = np.diff(levels)
+        step = float(gaps[gaps > 1e-9 * np.ptp(values)].min(initial=np.inf))
+        count = float(np.ptp(values)) / step
+        on_grid = np.abs(gaps / step - np.rint(gaps / step)).max() < 0.05
+        if count < FEWEST_LEVELS and on_grid and values[:200_000].size > 2 * levels.size:
+            text = f"the {name} is quantised in steps of {step:.3g} {unit}: {count:.0f} levels in its range"
+            notices.append(Notice("quantisation", text, record.phase, severe=count < FEWEST_LEVELS / 16))
+    return notices

@@ -1,0 +1,42 @@
+"""How a phase begins: whether its first samples agree with a stage that had settled before."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..record import Notice, Record
+
+_OPENING = 0.1
+_NOISE = 8.0
+
+
+def onset(record: Record) -> list[Notice]:
+    """Notice ``not_at_rest`` where the displacement moves at the start although the drive hardly does.
+
+    A record that continues another one, or whose beginning is missing, claims no rest and is not judged; nor is one
+    whose drive leaves its settled voltage with the first sample, because the stage then rightly answers.
+    """
+    if record.continues or record.truncated or record.size < 20:
+        return []
+    u, y = record.voltage, record.displacement
+    u_span, y_span = float(np.ptp(u)), float(np.ptp(y))
+    if y_span == 0.0 or abs(u[0] - record.settled_voltage) > 0.02 * max(u_span, abs(record.settled_voltage)):
+        return []
+    moved = np.flatnonzero(np.abs(u - u[0]) > _OPENING * u_span) if u_span > 0.0 else np.array([], int)
+    opening = int(moved[0]) if moved.size else record.size
+    if opening < 4:
+        return []
+    opening = min(opening, max(20, record.size // 20))
+    noise = float(np.median(np.abs(np.diff(y, 2)))) / 2.4
+    few = max(1, opening // 8)
+    drift = abs(float(y[opening - few : opening].mean() - y[:few].mean()))
+    explained = 3.0 * float(np.abs(u[:opening] - u[0]).max()) * (y_span / u_span if u_span > 0.0 else 0.0)
+    # creep and drift move a resting stage too: only what is large against the phase contradicts rest
+    if drift <= explained + _NOISE * noise / np.sqrt(few) + (0.05 * y_span if u_span > 0.0 else np.inf):
+        return []
+    text = (
+        f"the displacement moves by {drift:.3g} m in the first {opening} samples, the drive by "
+        f"{float(np.abs(u[:opening] - u[0]).max()):.3g} V: not settled at {record.settled_voltage:.4g} V before; "
+        "give initial_voltage"
+    )
+    return [Notice("not_at_rest", text, record.phase)]
