@@ -13,7 +13,8 @@ import numpy as np
 from ..errors import PiezoError, StageError
 from ..stage.stage import Acquired, Samples, Stage, StreamingStage
 from .conversions import SampleBlock
-from .playback import Drive, Event, Phase, Playback
+from .drive import Drive, Event, Phase
+from .playback import Playback
 from .recorded_playback import RecordedPlayback
 from .time_base import TimeBase
 

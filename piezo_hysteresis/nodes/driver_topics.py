@@ -10,7 +10,7 @@ from std_msgs.msg import Float64, String
 
 from .acquisition import Delivery
 from .conversions import SampleBlock, diagnostic, live, samples_to_cloud, to_stamp
-from .playback import Event, Happening, Phase
+from .drive import Event, Happening, Phase
 from .quality import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
 
 _STATES = {Happening.BEGAN: "playing", Happening.DONE: "done", Happening.STOPPED: "stopped"}

@@ -4,78 +4,13 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import StageError
-
-Samples = NDArray[np.float64]
+from .drive import Drive, Event, Happening, Phase, Samples
 
 _ENDLESS = 1 << 62
-
-
-@dataclass(frozen=True, slots=True)
-class Phase:
-    """A numbered stretch of the stream: the label of its samples.
-
-    Parameters
-    ----------
-    number : int
-        Counts up from 0 while the driver is active.
-    name : str
-        Phase name.
-    commanded : bool
-        True where a waveform opened it.
-    stamp : int
-        Stamp of that command [ns].
-    """
-
-    number: int
-    name: str
-    commanded: bool = False
-    stamp: int = 0
-
-    def __str__(self) -> str:
-        return f"{self.number} {self.name}"
-
-
-class Happening(Enum):
-    """What can happen to a phase within a block."""
-
-    BEGAN = "began"
-    DONE = "done"
-    STOPPED = "stopped"
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """A phase began, was played to its end, or was stopped, before sample `offset` of the block."""
-
-    offset: int
-    happening: Happening
-    phase: Phase
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Drive:
-    """The next samples to apply.
-
-    Parameters
-    ----------
-    voltage : (n,) ndarray of float64
-        Drive voltage [V].
-    phase : (n,) ndarray of uint32
-        Number of the phase of every sample.
-    events : tuple of Event
-        In order.
-    """
-
-    voltage: Samples
-    phase: NDArray[np.uint32]
-    events: tuple[Event, ...]
 
 
 class Playback:
@@ -217,7 +152,8 @@ class Playback:
             stretch = np.clip(ramp, min(self.voltage, self._target), max(self.voltage, self._target))
             self.voltage, self._held = float(stretch[-1]), 0
             if not self.pending:
-                self.voltage, self._stopping = self._target, False
+                self.voltage = stretch[-1] = self._target
+                self._stopping = False
             return stretch
         self.voltage, self._stopping = self._target, False
         stretch = np.full(min(count, self._hold_limit - self._held), self.voltage)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import StageError
 from ..record import Record
-from .playback import Drive, Event, Happening, Phase
+from .drive import Drive, Event, Happening, Phase
 
 
 class RecordedPlayback:

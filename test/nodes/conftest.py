@@ -82,6 +82,11 @@ class Samples:
         return np.concatenate([getattr(block, name) for block in list(self.blocks)])
 
     @property
+    def newest(self) -> SampleBlock:
+        """The last block."""
+        return self.blocks[-1]
+
+    @property
     def lost(self) -> int:
         """Samples that the jumps of the index tell of, never measured or lost on the way."""
         return int((np.diff(self.index.astype(np.int64)) - 1).sum())

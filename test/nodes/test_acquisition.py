@@ -8,8 +8,9 @@ import pytest
 
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.nodes.acquisition import Acquisition
+from piezo_hysteresis.nodes.drive import Happening
 from piezo_hysteresis.nodes.memory_acquisition import MemoryAcquisition
-from piezo_hysteresis.nodes.playback import Happening, Playback
+from piezo_hysteresis.nodes.playback import Playback
 from piezo_hysteresis.nodes.time_base import TimeBase
 from piezo_hysteresis.stage.simulated import SimulatedMemoryStage
 from piezo_hysteresis.stage.stage import Acquired, Description

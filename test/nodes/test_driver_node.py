@@ -36,7 +36,7 @@ def test_every_sample_of_a_command_arrives_or_is_told_lost(lab):
     lab.wait(lambda: lab.states(statuses, "noise") == ["accepted", "playing", "done"], "the end of the command")
     values = values_of(next(s for s in statuses if values_of(s)["state"] == "done"))
     number, first = int(values["phase"]), int(values["first_index"])
-    lab.wait(lambda: samples.index[-1] > first + wave.size, "the samples after it")
+    lab.wait(lambda: samples.newest.index[-1] > first + wave.size, "the samples after it")
     assert samples.index[0] + samples.index.size + samples.lost == samples.index[-1] + 1
     inside = samples.phase == number
     assert np.array_equal(samples.voltage[inside], wave[samples.index[inside].astype(int) - first])
@@ -89,7 +89,7 @@ def test_a_second_command_is_refused_and_the_first_played_whole(lab):
     lab.send(np.zeros(10), "second")
     lab.wait(lambda: "done" in lab.states(statuses, "first"), "the first command")
     assert lab.states(statuses, "second") == ["refused"]
-    lab.wait(lambda: samples.phase[-1] == 2, "the hold after it")
+    lab.wait(lambda: samples.newest.phase[-1] == 2, "the hold after it")
     assert np.array_equal(samples.of_phase(1), wave)
 
 
@@ -98,7 +98,7 @@ def test_set_voltage_ramps_and_holds(lab):
     samples, statuses, live = lab.streaming(), lab.statuses(), lab.listen(JointState, "live")
     ask = lab.publisher(Float64, "set_voltage")
     ask.publish(Float64(data=4.0))
-    lab.wait(lambda: samples.voltage[-1] == 4.0, "the set-point")
+    lab.wait(lambda: samples.newest.voltage[-1] == 4.0, "the set-point")
     assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
     for wrong in (10.5, -0.5, float("nan")):
         ask.publish(Float64(data=wrong))
@@ -112,7 +112,7 @@ def test_hold_timeout_leads_to_the_safe_voltage(lab):
     lab.driver(**IDEAL, hold_timeout=0.3)
     samples = lab.streaming()
     lab.send(np.linspace(0, 1, 1000), "step")
-    lab.wait(lambda: samples.phase[-1] == 2 and samples.voltage[-1] == 0.0, "the way back")
+    lab.wait(lambda: samples.newest.phase[-1] == 2 and samples.newest.voltage[-1] == 0.0, "the way back")
     held = samples.of_phase(2)
     assert (held == 1.0).sum() + 1 == pytest.approx(0.3 / PERIOD, abs=2)
     assert steepest(samples) <= 1 / (999 * PERIOD) * (1 + 1e-6)
@@ -122,9 +122,9 @@ def test_stop_ramps_a_playing_waveform_down(lab):
     lab.driver(**IDEAL)
     samples, statuses = lab.streaming(), lab.statuses()
     lab.send(np.concatenate((np.linspace(0, 3, 10_000), np.full(500_000, 3.0))), "long")
-    lab.wait(lambda: samples.voltage[-1] == 3.0, "the top")
+    lab.wait(lambda: samples.newest.voltage[-1] == 3.0, "the top")
     assert lab.call(Trigger, "driver_node/stop").success
-    lab.wait(lambda: samples.voltage[-1] == 0.0, "the safe voltage")
+    lab.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
     assert lab.states(statuses, "long") == ["accepted", "playing", "stopped"]
     assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
     lab.send(np.zeros(10), "next")
@@ -136,10 +136,10 @@ def test_a_signal_ramps_to_the_safe_voltage(lab, number):
     driver = lab.driver(**IDEAL)
     samples = lab.streaming()
     lab.send(np.concatenate((np.linspace(0, 4, 20_000), np.full(500_000, 4.0))), "long")
-    lab.wait(lambda: samples.voltage[-1] == 4.0, "the top")
+    lab.wait(lambda: samples.newest.voltage[-1] == 4.0, "the top")
     driver.signal(number)
     assert driver.wait() == 0, driver.output
-    lab.wait(lambda: samples.voltage[-1] == 0.0, "the safe voltage")
+    lab.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
     assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
 
 
@@ -147,10 +147,10 @@ def test_deactivate_ramps_down_and_activate_streams_again(lab):
     lab.driver(**IDEAL)
     samples = lab.streaming()
     lab.publisher(Float64, "set_voltage").publish(Float64(data=2.0))
-    lab.wait(lambda: samples.voltage[-1] == 2.0, "the set-point")
+    lab.wait(lambda: samples.newest.voltage[-1] == 2.0, "the set-point")
     assert lab.transition("deactivate")
     assert lab.state() == "inactive"
-    lab.wait(lambda: samples.voltage[-1] == 0.0, "the safe voltage")
+    lab.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
     assert steepest(samples) <= RAMP_RATE * (1 + 1e-6)
     blocks = len(samples.blocks)
     assert lab.transition("activate")
@@ -195,12 +195,12 @@ def test_further_signals_do_not_cut_the_ramp(lab):
     driver = lab.driver(**{**IDEAL, "ramp_rate": 4.0})
     samples = lab.streaming()
     lab.send(np.linspace(0, 4, 20_000), "up")
-    lab.wait(lambda: samples.voltage[-1] == 4.0, "the top")
+    lab.wait(lambda: samples.newest.voltage[-1] == 4.0, "the top")
     for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM):
         driver.signal(number)
-        lab.wait(lambda top=samples.voltage[-1]: samples.voltage[-1] < top, "the way down")
+        lab.wait(lambda top=samples.newest.voltage[-1]: samples.newest.voltage[-1] < top, "the way down")
     assert driver.wait() == 0
-    lab.wait(lambda: samples.voltage[-1] == 0.0, "the safe voltage")
+    lab.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
     assert steepest(samples) <= 4 / (19_999 * PERIOD) * (1 + 1e-6)
 
 
@@ -232,7 +232,7 @@ def test_two_axes_do_not_meet(lab):
         lab.driver(namespace=axis, **IDEAL)
     x, y = lab.streaming("/stage_x/samples"), lab.streaming("/stage_y/samples")
     lab.publisher(Float64, "/stage_y/set_voltage").publish(Float64(data=1.0))
-    lab.wait(lambda: y.voltage[-1] == 1.0, "the set-point of y")
+    lab.wait(lambda: y.newest.voltage[-1] == 1.0, "the set-point of y")
     assert not x.voltage.any()
 
 
@@ -245,7 +245,7 @@ def test_a_recording_is_replayed_sample_by_sample(lab, tmp_path):
     write(Experiment(tuple(records)), tmp_path / "experiment")
     samples, phases = lab.samples(), lab.phases()
     lab.driver(stage="replay", replay__experiment=str(tmp_path / "experiment"), replay__subscribers=1)
-    lab.wait(lambda: samples.blocks and samples.phase[-1] == 3, "the end of the recording")
+    lab.wait(lambda: samples.blocks and samples.newest.phase[-1] == 3, "the end of the recording")
     assert samples.index[0] == 0
     assert samples.lost == 0
     for number, record in enumerate(records, 1):
@@ -261,7 +261,7 @@ def test_a_stage_with_memory_plays_blocks_and_tells_the_dead_time(lab):
     wave = np.sin(np.linspace(0, np.pi, 25_000)) * 5
     lab.send(wave, "sine")
     lab.wait(lambda: "done" in lab.states(statuses, "sine"), "the end of the command")
-    lab.wait(lambda: samples.phase[-1] == 2, "the hold after it")
+    lab.wait(lambda: samples.newest.phase[-1] == 2, "the hold after it")
     assert np.array_equal(samples.of_phase(1), wave)
     played = [b for b in samples.blocks if b.phase[0] == 1]
     assert [b.size for b in played] == [10_000, 10_000, 5_000]

@@ -1,0 +1,72 @@
+"""`Drive`: the next samples to apply, with the phases that begin and end in them. No ROS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Samples = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """A numbered stretch of the stream: the label of its samples.
+
+    Parameters
+    ----------
+    number : int
+        Counts up from 0 while the driver is active.
+    name : str
+        Phase name.
+    commanded : bool
+        True where a waveform opened it.
+    stamp : int
+        Stamp of that command [ns].
+    """
+
+    number: int
+    name: str
+    commanded: bool = False
+    stamp: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.number} {self.name}"
+
+
+class Happening(Enum):
+    """What can happen to a phase within a block."""
+
+    BEGAN = "began"
+    DONE = "done"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A phase began, was played to its end, or was stopped, before sample `offset` of the block."""
+
+    offset: int
+    happening: Happening
+    phase: Phase
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Drive:
+    """The next samples to apply.
+
+    Parameters
+    ----------
+    voltage : (n,) ndarray of float64
+        Drive voltage [V].
+    phase : (n,) ndarray of uint32
+        Number of the phase of every sample.
+    events : tuple of Event
+        In order.
+    """
+
+    voltage: Samples
+    phase: NDArray[np.uint32]
+    events: tuple[Event, ...]
