@@ -6,7 +6,7 @@ RUN := scripts/run
 .PHONY: setup demo test lint bench bench-naming soak docs
 
 setup: install/.built                 ## .venv with ROS 2 and all dependencies, and the colcon build
-demo: setup ; @$(RUN) python examples/demo.py $(DEMO)
+demo: setup ; @$(RUN) python examples/demo $(DEMO)
 test: setup ; @$(RUN) python -m pytest $(TEST)
 lint: setup ; @$(RUN) scripts/lint
 bench: setup ; @$(RUN) python -m benchmarks $(BENCH)

@@ -116,6 +116,11 @@ class Bench:
         for _ in self.until(done, what, timeout):
             pass
 
+    def pause(self, duration: float) -> None:
+        """Spin for `duration` [s]."""
+        end = time.monotonic() + duration
+        self.wait(lambda: time.monotonic() > end, "the end of a pause", 2.0 * duration + 10.0)
+
     def call(self, service: str) -> Trigger.Response:
         """Call a service of the identification node, which answers at once."""
         client = self._services[service]

@@ -1,0 +1,194 @@
+"""`make demo`: a stage with something hidden in it, identified, followed live, and found out, over real ROS 2.
+
+Driver, model node and identification node run as processes of their own. The effect is drawn by a seed and written to
+a plant file that only the driver reads; it is shown here after the verdict.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import picture
+import rclpy
+from bench import Bench, Trace
+from numpy.typing import NDArray
+from probe import probe
+from processes import Processes
+from rclpy.signals import SignalHandlerOptions
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from piezo_hysteresis.identification.drive import DriveLimits
+from piezo_hysteresis.model_file import load, loads
+from piezo_hysteresis.nodes.conversions import values_of
+
+ROOT = Path(__file__).parents[2]
+NAMESPACE = "/demo"
+LIMITS = DriveLimits()
+PATIENCE = 600.0
+"""Longest wait for a campaign or a fit [s]."""
+
+
+class Demo:
+    """The steps of the demonstration, in order.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Where everything is written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.console = Console(highlight=False, soft_wrap=True)
+        self.begin = time.monotonic()
+        self.voltage: NDArray = probe(LIMITS)
+        self.traces: dict[str, Trace] = {}
+
+    def say(self, text: str) -> None:
+        """Print a line with the time since the start."""
+        self.console.print(f"[dim]{time.monotonic() - self.begin:6.1f} s[/dim]  {text}")
+
+    def start(self, processes: Processes, speed: float, protocol: str, seed: int) -> Bench:
+        """Start the three nodes; the model node begins with the numbers of the paper."""
+        plant = self.folder / "plant.yaml"
+        processes.start(
+            "driver_node",
+            real_time_factor=speed,
+            block_duration=0.01 * speed,  # 100 messages a second, as in real time
+            simulated__plant_file=plant,
+            simulated__seed=seed,
+        )
+        processes.start("model_node", model_file=ROOT / "config" / "published_stage.yaml")
+        processes.start("identification_node", protocol=protocol, experiment_root=self.folder / "experiments")
+        ids = ", ".join(f"{name} {number}" for name, number in processes.ids.items())
+        self.say(f"three processes in {NAMESPACE}, ROS domain {os.environ['ROS_DOMAIN_ID']}: {ids}")
+        return Bench(NAMESPACE, LIMITS.sample_period, processes.check)
+
+    def look(self, bench: Bench, name: str, chain: str) -> None:
+        """Play the probe and show what the model node leaves of it."""
+        trace = bench.play(self.voltage, "probe")
+        self.traces[name] = trace
+        before = next(iter(self.traces.values())).rms
+        bar = "█" * max(1, round(40 * trace.rms / before))
+        self.say(f"[bold]live residual {trace.rms * 1e9:7.1f} nm[/bold] rms  {bar}  {name}: {chain}")
+
+    def plan(self, bench: Bench) -> str:
+        """What the identification node is going to play; nothing moves."""
+        while not (answer := bench.call("plan")).success:
+            self.say(answer.message)
+            bench.pause(1.0)
+        return str(answer.message)
+
+    def run_job(self, bench: Bench, service: str) -> dict[str, str]:
+        """Call a service of the identification node and show its progress until it is done."""
+        answer = bench.call(service)
+        if not answer.success:
+            raise RuntimeError(f"{service}: {answer.message}")
+        columns = (TextColumn("          {task.description:44.44s}"), BarColumn(24), TimeElapsedColumn())
+        told: dict[str, str] = {}
+
+        def finished() -> bool:
+            nonlocal told
+            told = {} if bench.status is None else values_of(bench.status)
+            return told.get("state") in ("done", "failed", "aborted")
+
+        bench.status = None
+        with Progress(*columns, console=self.console, transient=True) as shown:
+            task = shown.add_task(service, total=100.0)
+            for _ in bench.until(finished, service, PATIENCE):
+                if bench.status is not None:
+                    doing = told.get("phase") or bench.status.message
+                    percent = float(told.get("percent", 0))
+                    shown.update(task, description=f"{told.get('state')}: {doing}", completed=percent)
+        assert bench.status is not None
+        if told["state"] != "done":
+            raise RuntimeError(f"{service} {told['state']}: {bench.status.message}")
+        return {**told, "verdict": bench.status.message}
+
+    def follow(self, bench: Bench, name: str, models_before: int) -> None:
+        """Wait for the new model on the topic, then look at the live residual under it."""
+        bench.wait(lambda: len(bench.models) > models_before, "the new model", 30.0)
+        self.look(bench, name, ", ".join(e.name for e in loads(bench.models[-1]).effects))
+
+    def run(self, bench: Bench) -> Path:
+        """From the published numbers to the verdict; returns the path of the experiment."""
+        paper = load(ROOT / "config" / "published_stage.yaml")
+        self.look(bench, "paper", ", ".join(e.name for e in paper.effects))
+        self.say(f"plan: {self.plan(bench)}")
+
+        count = len(bench.models)
+        told = self.run_job(bench, "identify")
+        experiment = Path(told["experiment"])
+        self.say(f"identified: {told['verdict']}; recorded in {os.path.relpath(experiment)}")
+        self.follow(bench, "identified", count)
+
+        count = len(bench.models)
+        told = self.run_job(bench, "diagnose")
+        self.say(f"[bold]verdict: {told['verdict']}[/bold]")
+        self.follow(bench, "extended", count)
+        return experiment
+
+    def report(self, experiment: Path) -> None:
+        """Figures and the page."""
+        picture.save(self.folder / "residual.png", self.voltage, LIMITS.sample_period, self.traces)
+        command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "report", experiment]
+        for label, file in (("identified", "identification.yaml"), ("extended", "diagnosis.yaml")):
+            command += ["--model", f"{label}={experiment / file}"]
+        if (experiment / "answer.json").exists():
+            command += ["--answer", experiment / "answer.json"]
+        subprocess.run([*command, "-o", self.folder / "report.html"], check=True, stdout=subprocess.DEVNULL)
+        self.say(f"written: {os.path.relpath(self.folder)}/report.html, residual.png")
+
+    def reveal(self) -> None:
+        """What the stage was hiding."""
+        with (self.folder / "plant.yaml").open() as plant:
+            self.say(f"[bold]the plant file opens: {plant.readline().removeprefix('# ').strip()}[/bold]")
+
+
+def main() -> int:
+    """Run the demo; 0 when it went through, whatever the verdict."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=1, help="draws the hidden effect (default: 1)")
+    parser.add_argument("--effect", help="hide this effect; the seed then draws its size only")
+    parser.add_argument("--protocol", default="rich", help="paper, short or rich (default: rich, 175 s of stage time)")
+    parser.add_argument("--speed", type=float, default=5.0, help="seconds of the simulated stage per second")
+    parser.add_argument("-o", "--output", type=Path, default=ROOT / "demo", help="folder (default: demo)")
+    arguments = parser.parse_args()
+
+    folder = arguments.output.resolve()
+    shutil.rmtree(folder / "experiments", ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    hide = [sys.executable, ROOT / "examples" / "hide_effect.py", str(arguments.seed), folder / "plant.yaml"]
+    subprocess.run([*hide, *(["--name", arguments.effect] if arguments.effect else [])], check=True)
+
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the nodes first
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    demo = Demo(folder)
+    with ExitStack() as stack:
+        stack.callback(rclpy.try_shutdown)
+        processes = stack.enter_context(Processes(NAMESPACE, folder / "log"))
+        bench = demo.start(processes, arguments.speed, arguments.protocol, arguments.seed)
+        experiment = demo.run(bench)
+    demo.say("the nodes have ended, the stage is at its safe voltage")
+    demo.report(experiment)
+    demo.reveal()
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit("demo: interrupted; the nodes have ended")
+    except (RuntimeError, TimeoutError) as error:
+        sys.exit(f"demo: {error}")

@@ -1,0 +1,21 @@
+"""The waveform on which the live residual is compared, the same before and after every new model."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from piezo_hysteresis.identification.drive import DriveLimits
+from piezo_hysteresis.identification.excitation import hold, mixture, sine, steps, triangle
+
+
+def probe(limits: DriveLimits) -> NDArray[np.float64]:
+    """Slow loops, a fast sine, levels held, and a random mixture [V]: 8 s that no fit has seen."""
+    parts = (
+        triangle(limits, (1.0, 0.6), 1.0),
+        sine(limits, 200.0, 0.3, centre=0.5, amplitude=0.4),
+        steps(limits, (0.2, 0.8, 0.4), 1.0, slew_rate=limits.ramp_rate),
+        hold(limits, 0.0, 0.5),
+        mixture(limits, 1.5, seed=12345),
+    )
+    return np.concatenate([limits.from_safe_to_safe(part) for part in parts])
