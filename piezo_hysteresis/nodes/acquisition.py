@@ -164,6 +164,7 @@ class Acquisition:
                     self._safe.set()
         except Exception as error:  # whatever it is, the stage must not stay energised
             self._fail(self._abandon(error))
+            self._safe.set()
 
     def _abandon(self, error: Exception) -> PiezoError:
         try:

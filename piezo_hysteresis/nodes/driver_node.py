@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
@@ -29,10 +30,16 @@ _SILENCE = 1.0
 
 
 class DriverNode(LifecycleNode):
-    """Driver of one axis: topics, services and parameters stand in docs/ros."""
+    """Driver of one axis: topics, services and parameters stand in docs/ros.
 
-    def __init__(self) -> None:
-        super().__init__("driver_node")
+    Parameters
+    ----------
+    **options
+        As for `rclpy.node.Node`.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("driver_node", **options)
         declare(self, DRIVER)
         for word, back_end in BACK_ENDS.items():
             declare(self, back_end.rows, f"{word}.")
@@ -40,6 +47,7 @@ class DriverNode(LifecycleNode):
         self._session: DriverSession | None = None
         self._topics: DriverTopics | None = None
         self._failure: PiezoError | None = None
+        self._telling = False
         self._diagnostics = DriverDiagnostics(self)
         self.add_on_set_parameters_callback(self._refuse_while_configured)
         self._commands = DriverCommands(self, self._diagnostics)
@@ -68,11 +76,11 @@ class DriverNode(LifecycleNode):
             except StageError:
                 session.close()
                 raise
-        except PiezoError as error:
+        except Exception as error:  # rclpy would end the transition without a word
             self._tell_failure(error)
             return TransitionCallbackReturn.FAILURE
         name = session.limits.name
-        self.set_parameters([Parameter(f"in_force.{k}", value=v) for k, v in session.in_force().items()])
+        self._tell_in_force(session.in_force())
         self._session = session
         self._topics = DriverTopics(self, name, session.sample_period, settings.live_rate)
         self._commands.attach(session, self._topics)
@@ -125,11 +133,12 @@ class DriverNode(LifecycleNode):
         if self._session is not None:
             try:
                 self._session.make_safe()
-            except PiezoError as error:
+            except Exception as error:
                 self._tell_failure(error)
 
     def _release(self) -> None:
         self._commands.detach()
+        self._tell_in_force({row.name: row.value for row in IN_FORCE})
         session, self._session = self._session, None
         topics, self._topics = self._topics, None
         if topics is not None:
@@ -137,18 +146,28 @@ class DriverNode(LifecycleNode):
         if session is not None:
             try:
                 session.close()
-            except PiezoError as error:
+            except Exception as error:
                 self._tell_failure(error)
 
     def _fail(self, error: PiezoError) -> None:
         """The acquisition has ended by itself, in its thread: leave the active state from the executor's."""
         self._failure = error
         self._tell_failure(error)
-        self.executor.create_task(self.trigger_deactivate)
+        self.executor.create_task(self._give_up)
 
-    def _tell_failure(self, error: PiezoError) -> None:
-        self.get_logger().error(str(error))
-        self._diagnostics.state(DiagnosticStatus.ERROR, str(error))
+    def _give_up(self) -> None:
+        if self._state_machine.current_state[1] == "active":
+            self.trigger_deactivate()
+
+    def _tell_failure(self, error: Exception) -> None:
+        reason = str(error) if isinstance(error, PiezoError) else f"fault of the driver: {error!r}"
+        self.get_logger().error(reason)
+        self._diagnostics.state(DiagnosticStatus.ERROR, reason)
+
+    def _tell_in_force(self, values: Mapping[str, object]) -> None:
+        self._telling = True
+        self.set_parameters([Parameter(f"in_force.{name}", value=value) for name, value in values.items()])
+        self._telling = False
 
     def _refuse_second_driver(self, discovery_time: float) -> None:
         """A publisher of samples that really sends is another driver, on this machine or another one."""
@@ -165,11 +184,14 @@ class DriverNode(LifecycleNode):
 
     def _refuse_while_configured(self, parameters: list[Parameter]) -> SetParametersResult:
         """Parameters are read at configure; a change that would have no effect is not accepted."""
-        ours = {row.name for row in DRIVER} | {f"in_force.{row.name}" for row in IN_FORCE}
-        for parameter in parameters:
-            own = parameter.name in ours or parameter.name.split(".")[0] in BACK_ENDS
-            if own and self._session is not None:
-                reason = f"{parameter.name} is read at configure; deactivate and clean up the driver, set it, configure"
+        ours = {row.name for row in DRIVER}
+        for name in (parameter.name for parameter in parameters):
+            reason = ""
+            if name.startswith("in_force."):
+                reason = "" if self._telling else f"{name} tells what holds; set {name.removeprefix('in_force.')}"
+            elif self._session is not None and (name in ours or name.split(".")[0] in BACK_ENDS):
+                reason = f"{name} is read at configure; deactivate and clean up the driver, set it, configure"
+            if reason:
                 return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 

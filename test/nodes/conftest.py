@@ -102,6 +102,7 @@ class Lab:
     def __init__(self, domain: int, folder: Path) -> None:
         self.domain, self.folder = domain, folder
         self.processes: list[NodeProcess] = []
+        self._added: list[Any] = []
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
         self.node = Node("lab", context=self._context)
@@ -141,6 +142,14 @@ class Lab:
     def driver(self, *arguments: str, namespace: str = "", **parameters: Any) -> NodeProcess:
         """Start a driver that does not wait long for another one."""
         return self.start("driver_node", *arguments, namespace=namespace, **{"discovery_time": 0.1, **parameters})
+
+    def add(self, kind: type[Node], **parameters: Any) -> Any:
+        """A node with `end`, in the process and the thread of the test's own."""
+        overrides = [rclpy.Parameter(name.replace("__", "."), value=value) for name, value in parameters.items()]
+        node = kind(context=self._context, parameter_overrides=overrides)
+        self._executor.add_node(node)
+        self._added.append(node)
+        return node
 
     def wait(self, condition: Callable[[], Any], what: str, timeout: float = PATIENCE) -> Any:
         """Wait until a condition holds and return its value; fail with the logs of the processes otherwise."""
@@ -223,8 +232,12 @@ class Lab:
     def close(self) -> None:
         for process in self.processes:
             process.end()
+        for node in self._added:
+            node.end()
         self._executor.shutdown()
         self._thread.join(10.0)
+        for node in self._added:
+            node.destroy_node()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
 

@@ -6,42 +6,17 @@ import time
 import numpy as np
 import pytest
 
-from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.nodes.acquisition import Acquisition
 from piezo_hysteresis.nodes.drive import Happening
 from piezo_hysteresis.nodes.memory_acquisition import MemoryAcquisition
 from piezo_hysteresis.nodes.playback import Playback
 from piezo_hysteresis.nodes.time_base import TimeBase
 from piezo_hysteresis.stage.simulated import SimulatedMemoryStage
-from piezo_hysteresis.stage.stage import Acquired, Description
+
+from .witness import Witness
 
 PERIOD = 1e-4
 RAMP_RATE = 200.0
-
-
-class Witness:
-    """A stage whose displacement is its voltage, which refuses what it should not be given, and fails when told to."""
-
-    def __init__(self, *, fails_at=None, unsafe=False):
-        self.description = Description("witness", True, PERIOD, PERIOD, 0.0, 10.0, max_slew_rate=RAMP_RATE)
-        self.sample_period = PERIOD
-        self.voltage = 0.0
-        self.made_safe = 0
-        self._fails_at, self._unsafe, self._calls = fails_at, unsafe, 0
-
-    def exchange(self, voltage):
-        self._calls += 1
-        if self._calls == self._fails_at:
-            raise StageError("witness: link lost")
-        block = self.description.check_voltage(voltage, self.voltage, PERIOD)
-        self.voltage = float(block[-1])
-        return Acquired(block, block)
-
-    def safe(self):
-        self.made_safe += 1
-        if self._unsafe:
-            raise StageError("witness: no link")
-        self.voltage = 0.0
 
 
 class Listener:
@@ -87,7 +62,7 @@ def play(acquisition, waveform, name):
 
 
 def test_make_safe_ramps_down_and_tells_every_sample_of_it():
-    acquisition, listener = started(Witness())
+    acquisition, listener = started(Witness(PERIOD, RAMP_RATE))
     play(acquisition, np.linspace(0, 5, 300), "up")
     listener.wait(lambda heard: "up" in heard.events(Happening.DONE))
     assert acquisition.make_safe(30.0)
@@ -100,7 +75,7 @@ def test_make_safe_ramps_down_and_tells_every_sample_of_it():
 
 
 def test_a_failing_stage_is_made_safe_and_told_once():
-    stage = Witness(fails_at=3)
+    stage = Witness(PERIOD, RAMP_RATE, fails_at=3)
     acquisition, listener = started(stage)
     listener.wait(lambda heard: heard.failures)
     assert [str(e) for e in listener.failures] == ["witness: link lost"]
@@ -110,14 +85,14 @@ def test_a_failing_stage_is_made_safe_and_told_once():
 
 
 def test_a_stage_that_cannot_be_made_safe_is_told():
-    _, listener = started(Witness(fails_at=2, unsafe=True))
+    _, listener = started(Witness(PERIOD, RAMP_RATE, fails_at=2, unsafe=True))
     listener.wait(lambda heard: heard.failures)
     assert "could not be brought to its safe voltage: witness: no link" in str(listener.failures[0])
 
 
 def test_the_stage_is_the_last_line_of_defence():
     """A waveform that got past every check is not played, and the driver tells."""
-    stage = Witness()
+    stage = Witness(PERIOD, RAMP_RATE)
     acquisition, listener = started(stage)
     play(acquisition, [0.0, 11.0], "too_high")
     listener.wait(lambda heard: heard.failures)
@@ -127,7 +102,7 @@ def test_the_stage_is_the_last_line_of_defence():
 
 
 def test_a_fault_of_the_program_leaves_the_stage_safe_too():
-    stage = Witness()
+    stage = Witness(PERIOD, RAMP_RATE)
     stage.exchange = lambda voltage: 1 / 0
     _, listener = started(stage)
     listener.wait(lambda heard: heard.failures)
@@ -136,7 +111,7 @@ def test_a_fault_of_the_program_leaves_the_stage_safe_too():
 
 
 def test_a_stall_is_caught_up_with_by_count():
-    stage = Witness()
+    stage = Witness(PERIOD, RAMP_RATE)
     acquisition, listener = started(stage, rate=1.0)
     exchange, stalled = stage.exchange, threading.Event()
 
@@ -157,7 +132,7 @@ def test_a_stall_is_caught_up_with_by_count():
 
 
 def test_after_a_long_stall_stamps_move_and_samples_do_not():
-    acquisition, listener = started(Witness(), rate=1.0)
+    acquisition, listener = started(Witness(PERIOD, RAMP_RATE), rate=1.0)
     acquisition.patience = -1.0
     before = len(listener.deliveries)
     listener.wait(lambda heard: len(heard.deliveries) > before + 3)

@@ -10,9 +10,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from piezo_hysteresis.nodes import back_ends
 from piezo_hysteresis.nodes.conversions import phase_from_text, values_of
+from piezo_hysteresis.nodes.driver_node import DriverNode
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import write
+
+from .witness import Witness
 
 pytestmark = pytest.mark.nodes
 
@@ -206,7 +210,9 @@ def test_further_signals_do_not_cut_the_ramp(lab):
 
 def _set(**values):
     request = SetParametersAtomically.Request()
-    request.parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+    request.parameters = [
+        Parameter(name.replace("__", "."), value=value).to_parameter_msg() for name, value in values.items()
+    ]
     return request
 
 
@@ -223,8 +229,30 @@ def test_a_failed_configure_tells_why_and_can_be_tried_again(lab):
     answer = lab.call(SetParametersAtomically, "driver_node/set_parameters_atomically", _set(ramp_rate=1.0)).result
     assert not answer.successful
     assert "read at configure" in answer.reason
+    answer = lab.call(
+        SetParametersAtomically, "driver_node/set_parameters_atomically", _set(in_force__voltage_max=99.0)
+    )
+    assert not answer.result.successful
     assert lab.transition("activate")
     lab.streaming()
+
+
+def test_a_failing_stage_is_made_safe_told_and_can_be_tried_again(lab, monkeypatch):
+    """In the process of the test, since no real stage fails when asked to."""
+    stages = [Witness(1e-3, 100.0, fails_at=5), Witness(1e-3, 100.0)]
+    opened = iter(stages)
+    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", back_ends.BackEnd((), lambda *_: next(opened), True))
+    told = lab.diagnostics()
+    node = lab.add(DriverNode, discovery_time=0.0, ramp_rate=50.0)
+    node.begin()
+    lab.wait(lambda: lab.state() == "unconfigured", "the end of the failed stage")
+    assert (stages[0].made_safe, stages[0].closed) == (1, 1)
+    lab.wait(lambda: any("link lost" in s.message for a in told for s in a.status), "the reason")
+    assert lab.transition("configure")
+    assert lab.transition("activate")
+    lab.streaming()
+    assert lab.transition("deactivate")
+    assert stages[1].made_safe == 0
 
 
 def test_two_axes_do_not_meet(lab):

@@ -1,0 +1,37 @@
+"""`Witness`: a stage that refuses what it should not be given, keeps what it was given, and can fail."""
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.stage import Acquired, Description
+
+
+class Witness:
+    """A streaming stage whose displacement is its voltage."""
+
+    def __init__(self, sample_period, max_slew_rate, *, fails_at=None, unsafe=False):
+        self.description = Description(
+            "witness", True, sample_period, sample_period, 0.0, 10.0, max_slew_rate=max_slew_rate
+        )
+        self.sample_period = sample_period
+        self.voltage = 0.0
+        self.made_safe = self.closed = 0
+        self._fails_at, self._unsafe, self._calls = fails_at, unsafe, 0
+
+    def configure(self, sample_period):
+        self.description.check_sample_period(sample_period)
+
+    def exchange(self, voltage):
+        self._calls += 1
+        if self._calls == self._fails_at:
+            raise StageError("witness: link lost")
+        block = self.description.check_voltage(voltage, self.voltage, self.sample_period)
+        self.voltage = float(block[-1])
+        return Acquired(block, block)
+
+    def safe(self):
+        self.made_safe += 1
+        if self._unsafe:
+            raise StageError("witness: no link")
+        self.voltage = 0.0
+
+    def close(self):
+        self.closed += 1
