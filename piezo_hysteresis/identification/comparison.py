@@ -82,7 +82,7 @@ def compare_inputs(
     comparisons : tuple of Comparison
         In rising order of amplitude; records within 20 % of one another count as one amplitude.
     notices : tuple of Notice
-        ``bleaching`` where v and w disagree, ``amplitude_dependent`` where two amplitudes do.
+        ``inputs_disagree`` where v and w do, ``amplitude_dependent`` where two amplitudes of the noise do.
     """
     rms = {i: float(np.std(excited_part(records[i]).voltage)) for i in noise}
     groups: list[list[int]] = []
@@ -100,7 +100,7 @@ def compare_inputs(
     notices = []
     worst = max(comparisons, key=lambda c: abs(c.from_v / c.from_w - 1.0), default=None)
     if worst is not None and abs(worst.from_v / worst.from_w - 1.0) > TOLERANCE:
-        notices.append(Notice("bleaching", f"G differs as seen from v and from w; {worst}", "noise"))
+        notices.append(Notice("inputs_disagree", f"G differs as seen from v and from w; {worst}", "noise"))
     gains = [c.gain_from_w for c in comparisons]
     if len(gains) > 1 and max(gains) > (1.0 + TOLERANCE) * min(gains):
         told = ", ".join(f"{c.gain_from_w:.4g} at {c.amplitude:.3g} V" for c in comparisons)

@@ -182,6 +182,27 @@ def identify_arx(
     return min(candidates, key=lambda model: model.free_run_error)
 
 
+def delay_of(signals: Signals, longest: int = 16, order: int = 8, sure: float = 5.0) -> int:
+    """Delay in samples where no step shows it: the first coefficient of a long B(z) that is not zero.
+
+    Parameters
+    ----------
+    signals : sequence of (u, y)
+        Input and output of every record.
+    longest : int
+        Longest delay sought.
+    order : int
+        na, and coefficients of B(z) behind the longest delay.
+    sure : float
+        Standard errors beyond which a coefficient counts.
+    """
+    triangle = _triangle(signals, (order, longest + order), 1)
+    theta, left = _solve(triangle)
+    error = left / np.sqrt(sum(y.size for _, y in signals)) * np.linalg.norm(np.linalg.pinv(triangle[:, :-1]), axis=1)
+    onset = np.flatnonzero(np.abs(theta[order:]) > sure * error[order:])
+    return min(1 + int(onset[0]), longest) if onset.size else 1
+
+
 @dataclass(frozen=True, slots=True)
 class OrderError:
     """Errors of one order na = nb: on the data it was fitted to (one step), and free-run on the records held out."""

@@ -6,7 +6,7 @@ held as the gauge between hysteresis and dynamics.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -15,19 +15,17 @@ from ..effects import Arx, BoucWen, Effect, Offset
 from ..errors import IdentificationError
 from ..model import Model
 from ..record import Experiment, Notice
-from .carried import select
 from .comparison import Comparison, compare_inputs
 from .delay import Delay, identify_delay
-from .dynamics import Dynamics, OrderError, choose_order, compare_orders
-from .fit import Fit, fit
-from .hysteresis import LOOP, fit_hysteresis, hysteresis_name
+from .dynamics import Dynamics, OrderError, choose_order, compare_orders, delay_of
+from .fit import Fit, Progress
+from .hysteresis import fit_hysteresis
 from .identification import Identification, PhaseError
-from .linear_start import delay_by_cost, dynamics_behind, fit_lag, hysteresis_signals, with_dynamics
+from .joint import fit_dynamics, fit_lag
+from .linear_start import hysteresis_signals
 from .normal_equations import Nuisance, residuals
 from .roles import HELD_OUT, Roles, roles_of
 from .three_steps import ThreeSteps, three_steps
-
-Progress = Callable[[str, float], None]
 
 ADEQUATE = 3e-4
 """Share of the range below which a residual does not decide: no lab needs better."""
@@ -87,7 +85,7 @@ def identify(
     roles = roles_of(experiment, held_out)
     if not any(roles.contents[i].span > 0.0 for i in roles.fitted):
         raise IdentificationError("identify: the drive does not move in any record; expected loops, steps or noise")
-    reach = max(float(np.max(r.displacement)) for r in records) - min(float(np.min(r.displacement)) for r in records)
+    reach = max(float(np.ptp(r.displacement)) for r in records)
     scale_v = voltage_scale or max(float(np.max(np.abs(r.voltage))) for r in records)
     scale_y = displacement_scale or reach
     floors = [max(c.noise, ADEQUATE * reach) for c in roles.contents]
@@ -96,10 +94,10 @@ def identify(
 
     tell("step 1: delay", 0.0)
     delay = _delay(experiment, roles, notices)
-    dead = 1.0 if delay is None else max(1.0, delay.time / period)
     published = _published(experiment, scale_v, scale_y, orders or (8, 8), hysteresis, notices)
 
     tell("step 3: hysteresis", 0.1)
+    dead = 1.0 if delay is None else max(1.0, delay.time / period)
     frame = Model((hysteresis(), Arx(a=(), b=(gain,), delay=dead)), period, scale_v, scale_y)
     start = fit_hysteresis(frame, records, roles.loops).model
     dynamics: Dynamics | None = None
@@ -108,28 +106,34 @@ def identify(
     if roles.broadband:
         tell("step 2: dynamics", 0.2)
         signals = hysteresis_signals(start, records, roles.broadband)
-        if delay is None:
-            dead = delay_by_cost(signals, period, orders or (4, 4))
-            notices.append(Notice("delay_from_fit", f"no step recorded: delay of {dead} samples from the fit"))
-        table = compare_orders(signals, round(dead), period, HIGHEST_ORDER)
+        samples = delay_of(signals) if delay is None else round(dead)
+        table = compare_orders(signals, samples, period, HIGHEST_ORDER)
         chosen = orders or (choose_order(table),) * 2
-        dynamics = dynamics_behind(start, records, roles.broadband, round(dead), chosen)
-        # The loops again, now behind the lag that the dynamics show.
-        start = fit_hysteresis(with_dynamics(start, dynamics.arx), records, roles.loops).model
-        dynamics = dynamics_behind(start, records, roles.broadband, round(dead), chosen)
-        start = with_dynamics(start, dynamics.arx)
-        notices += dynamics.notices
-        noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
-        comparisons, told = compare_inputs(start, records, noise, round(dead), chosen)
-        notices += told
-        tell("joint fit", 0.4)
-        joint = _joint(start, experiment, floors, roles, lambda word, part: tell(word, 0.4 + 0.5 * part))
-    else:
-        tell("joint fit", 0.4)
-        notices.append(
-            Notice(
-                "lag_only", "no record excites the dynamics: they are reported as a lag, dead time and at most a pole"
+
+        def joint_progress(word: str, part: float) -> None:
+            tell(word, 0.3 + 0.6 * part)
+
+        def fit_behind(model: Model, samples: int) -> tuple[Fit, Dynamics, tuple[Notice, ...]]:
+            return fit_dynamics(
+                model, records, floors, roles.fitted, roles.loops, roles.broadband, samples, chosen, joint_progress
             )
+
+        joint, dynamics, told = fit_behind(start, samples)
+        if delay is None:
+            # A better hysteresis shows the onset better.
+            again = delay_of(hysteresis_signals(joint.model, records, roles.broadband))
+            if again != samples:
+                samples = again
+                joint, dynamics, told = fit_behind(joint.model, samples)
+            notices.append(Notice("delay_from_fit", f"no step recorded: delay of {samples} samples from the dynamics"))
+        notices += told
+        noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
+        comparisons, told = compare_inputs(joint.model, records, noise, samples, chosen)
+        notices += told
+    else:
+        tell("joint fit", 0.3)
+        notices.append(
+            Notice("lag_only", "no broadband record: the dynamics are reported as a lag, dead time and at most a pole")
         )
         joint = fit_lag(start, records, floors, roles.fitted)
     tell("free run", 0.95)
@@ -176,13 +180,6 @@ def _published(
     except IdentificationError as error:
         notices.append(Notice("no_three_steps", str(error)))
         return None
-
-
-def _joint(start: Model, experiment: Experiment, floors: list[float], roles: Roles, progress: Progress) -> Fit:
-    kept, sizes = select(experiment.records, floors, roles.fitted)
-    arx, name = start["arx"], hysteresis_name(start)
-    free = [f"{name}.{n}" for n in LOOP] + [f"arx.{n}" for n in arx.free_names() if n != "delay"]
-    return fit(start, kept, free, floors=sizes, nuisance=Nuisance(offset=True), progress=progress)
 
 
 def _free_run(model: Model, experiment: Experiment, roles: Roles, reach: float) -> tuple[PhaseError, ...]:
