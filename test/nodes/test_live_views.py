@@ -1,0 +1,126 @@
+"""The shipped layouts of PlotJuggler and Foxglove show topics and fields that the nodes really publish."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "SHM")
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy")
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.nodes.acquisition import Delivery
+from piezo_hysteresis.nodes.bag_recorder import TOPICS
+from piezo_hysteresis.nodes.conversions import SampleBlock
+from piezo_hysteresis.nodes.driver_topics import DriverTopics
+from piezo_hysteresis.nodes.model_topics import ModelTopics
+from piezo_hysteresis.predictor import Predictor
+
+CONFIG = Path(__file__).parents[2] / "config"
+AXIS = "/stage_x/"
+PERIOD = 1e-3
+
+
+@pytest.fixture(scope="module")
+def published():
+    """One message of every live topic with several fields, from the publishers of the nodes themselves."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=61)
+    node = LifecycleNode("live_views", namespace="/stage_x", context=context)
+    node.declare_parameter("live_rate", 50.0)
+    driver, model = DriverTopics(node, "stage", PERIOD, 50.0), ModelTopics(node)
+    heard: dict[str, JointState] = {}
+    for topic in ("live", "predicted_live"):
+        node.create_subscription(JointState, topic, lambda message, topic=topic: heard.setdefault(topic, message), 10)
+    node.trigger_configure()
+    node.trigger_activate()
+    n = 100
+    u = np.linspace(0.0, 1.0, n)
+    index = np.arange(n, dtype=np.uint32)
+    block = SampleBlock(0, PERIOD * index, u, 1e-6 * u, index, np.zeros(n, dtype=np.uint32), "stage")
+    predictor = Predictor(PERIOD, Model((BoucWen(), Arx(b=[0.2])), PERIOD, displacement_scale=1e-4))
+    driver.deliver(Delivery(block, 0, ()))
+    model.publish(block, predictor.predict(0, 0, block.voltage, block.displacement), predictor)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    for _ in range(200):
+        if len(heard) == 2:
+            break
+        executor.spin_once(timeout_sec=0.1)
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+    return heard
+
+
+def check(topic: str, field: str, published: dict[str, JointState]) -> None:
+    """`field` as ``data``, ``position[i]`` or ``name/position``."""
+    assert topic.startswith(AXIS)
+    kind = TOPICS[topic.removeprefix(AXIS)][0]
+    if kind is Float64:
+        assert field == "data"
+        return
+    assert kind is JointState
+    message = published[topic.removeprefix(AXIS)]
+    named, by_number = re.fullmatch(r"(\w+)/position", field), re.fullmatch(r"position\[(\d+)\]", field)
+    assert named or by_number
+    assert len(message.position) == len(message.name)
+    assert named[1] in message.name if named else int(by_number[1]) < len(message.name)
+
+
+def test_plotjuggler_shows_what_is_published(published):
+    root = ET.parse(CONFIG / "plotjuggler.xml").getroot()
+    curves = [c.get(key) for c in root.iter("curve") for key in ("curve_x", "curve_y") if c.get(key)]
+    curves += [c.get("name") for c in root.iter("curve") if not c.get("curve_x")]
+    assert len(curves) >= 10
+    topics = {t.get("name") for t in root.iter("topic")}
+    for curve in curves:
+        topic, field = re.fullmatch(r"(/stage_x/\w+)/(.+)", curve).groups()
+        assert topic in topics
+        check(topic, field, published)
+
+
+def test_foxglove_shows_what_is_published(published):
+    layout = json.loads((CONFIG / "foxglove.json").read_text())
+    panels = layout["configById"]
+    paths = [p["value"] for panel in panels.values() for p in panel.get("paths", [])]
+    paths += [panel["xAxisPath"]["value"] for panel in panels.values() if "xAxisPath" in panel]
+    assert len(paths) >= 8
+    for path in paths:
+        topic, _, field = path.partition(".")
+        check(topic, field, published)
+    assert panels["RawMessages!status"]["topicPath"].removeprefix(AXIS) in TOPICS
+    assert panels["DiagnosticSummary!all"]["topicToRender"] in TOPICS
+
+
+def test_foxglove_numbers_mean_what_their_labels_say(published):
+    layout = json.loads((CONFIG / "foxglove.json").read_text())
+    meant = {"drive": "voltage", "measured": "displacement", "predicted": "prediction", "residual": "residual"}
+    for panel in layout["configById"].values():
+        for path in panel.get("paths", []):
+            topic, _, field = path["value"].partition(".")
+            number = re.fullmatch(r"position\[(\d+)\]", field)
+            if number:
+                assert published[topic.removeprefix(AXIS)].name[int(number[1])] == meant[path["label"]]
+
+
+def test_every_panel_of_foxglove_is_in_its_layout():
+    layout = json.loads((CONFIG / "foxglove.json").read_text())
+
+    def leaves(tree):
+        return [tree] if isinstance(tree, str) else leaves(tree["first"]) + leaves(tree["second"])
+
+    assert sorted(leaves(layout["layout"])) == sorted(layout["configById"])
