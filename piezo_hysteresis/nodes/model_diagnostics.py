@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
@@ -91,28 +92,30 @@ class ModelDiagnostics:
                 **({} if rms is None else {"residual_rms": rms}),
                 **({} if self._promised is None else {"free_run_error": self._promised}),
             }
-        level, message = self._state(received, lost, repeated)
+        findings = list(self._findings(received, lost, repeated)) or [(DiagnosticStatus.OK, "predicting")]
+        level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
         self._problem, self._latency = "", 0.0
         array = DiagnosticArray(status=[diagnostic(level, self._name, message, self._stage, **values)])
         array.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(array)
 
-    def _state(self, received: bool, lost: int, repeated: int) -> tuple[bytes, str]:
+    def _findings(self, received: bool, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
         predictor, promised = self._predictor, self._promised
         if self._problem:
-            return DiagnosticStatus.ERROR, self._problem
-        if not received or predictor is None:
-            return DiagnosticStatus.STALE, "no samples"
+            yield DiagnosticStatus.ERROR, self._problem
+        if predictor is None or not received:
+            yield DiagnosticStatus.STALE, "no samples"
+            return
+        if lost:
+            yield DiagnosticStatus.WARN, f"{lost} samples lost, bridged by holding the voltage"
+        if repeated:
+            yield DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late, dropped"
         if predictor.model is None:
-            return DiagnosticStatus.WARN, "no model: give model_file, or identify the stage"
-        rms = predictor.residual_rms
+            yield DiagnosticStatus.WARN, "no model: give model_file, or identify the stage"
+            return
         if predictor.warming_up:
-            return DiagnosticStatus.WARN, "warming up: joined in motion, the state before is unknown"
+            yield DiagnosticStatus.WARN, "warming up: joined in motion, what was before is unknown"
+        rms = predictor.residual_rms
         if rms is not None and promised is not None and rms > self._warn * promised:
             level = DiagnosticStatus.ERROR if rms > self._error * promised else DiagnosticStatus.WARN
-            return level, f"residual {rms / promised:.3g} times the model's free-run error"
-        if lost:
-            return DiagnosticStatus.WARN, f"{lost} samples lost, bridged by holding the voltage"
-        if repeated:
-            return DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late, dropped"
-        return DiagnosticStatus.OK, "predicting"
+            yield level, f"residual {rms / promised:.3g} times the model's free-run error"

@@ -1,0 +1,16 @@
+"""The files in config/ give every parameter of a node its default, no more and no fewer."""
+
+from pathlib import Path
+
+import pytest
+
+from piezo_hysteresis.nodes.identification_node import IDENTIFICATION
+from piezo_hysteresis.nodes.model_node import MODEL
+from piezo_hysteresis.parameter_file import parameters
+
+CONFIG = Path(__file__).parents[2] / "config"
+
+
+@pytest.mark.parametrize(("file", "rows"), [("model.yaml", MODEL), ("identification.yaml", IDENTIFICATION)])
+def test_config_files_hold_the_defaults(file, rows):
+    assert parameters((CONFIG / file).read_text()) == {"/**": {row.name: row.value for row in rows}}
