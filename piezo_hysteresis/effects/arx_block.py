@@ -8,6 +8,9 @@ from ..kernel import kernel
 from .block import Array, State
 from .linear_block import LinearBlock
 
+ORDER = 8
+"""Taps and feedback go in groups of this many, padded with zeros: eight numbers stay in registers."""
+
 
 def lagrange(fraction: float) -> tuple[Array, Array]:
     """Third-order interpolation at delay 1 + fraction over taps 0 … 3, and its derivative, each shape (4,).
@@ -25,73 +28,127 @@ def lagrange(fraction: float) -> tuple[Array, Array]:
     return taps + 0.0, slopes
 
 
+def padded(coefficients: Array) -> Array:
+    """With zeros to a multiple of `ORDER`."""
+    return np.pad(coefficients, (0, -coefficients.size % ORDER))
+
+
+@kernel
+def weigh(x, taps, y):
+    """y_i = Σ_k taps_k x_(i + K − k) with K + 1 taps, a multiple of `ORDER`; x (n + K,), y (n,)."""
+    last = taps.size - 1
+    for k in range(0, taps.size, 8):
+        t0, t1, t2, t3 = taps[k], taps[k + 1], taps[k + 2], taps[k + 3]
+        t4, t5, t6, t7 = taps[k + 4], taps[k + 5], taps[k + 6], taps[k + 7]
+        j = last - k
+        for i in range(y.size):
+            near = (t0 * x[i + j] + t1 * x[i + j - 1]) + (t2 * x[i + j - 2] + t3 * x[i + j - 3])
+            far = (t4 * x[i + j - 4] + t5 * x[i + j - 5]) + (t6 * x[i + j - 6] + t7 * x[i + j - 7])
+            y[i] = near + far if k == 0 else y[i] + (near + far)
+
+
+@kernel
+def recur(a, z, y):
+    """y_i −= Σ_k a_k y_(i − k) in place; z (a.size,) = outputs before, newest first, updated; `ORDER` or more of a."""
+    a1, a2, a3, a4, a5, a6, a7, a8 = a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7]
+    y1, y2, y3, y4, y5, y6, y7, y8 = z[0], z[1], z[2], z[3], z[4], z[5], z[6], z[7]
+    for i in range(y.size):
+        total = y[i]
+        for k in range(a.size - 1, 7, -1):
+            total -= a[k] * z[k]
+        # the newest output comes last: everything else is ready before it
+        total = total - a8 * y8
+        total = total - a7 * y7
+        total = total - a6 * y6
+        total = total - a5 * y5
+        total = total - a4 * y4
+        total = total - a3 * y3
+        total = total - a2 * y2
+        total = total - a1 * y1
+        if a.size > 8:
+            for k in range(a.size - 1, 8, -1):
+                z[k] = z[k - 1]
+            z[8] = y8
+        y8, y7, y6, y5, y4, y3, y2, y1 = y7, y6, y5, y4, y3, y2, y1, total
+        y[i] = total
+    z[0], z[1], z[2], z[3], z[4], z[5], z[6], z[7] = y1, y2, y3, y4, y5, y6, y7, y8
+
+
 @kernel
 def arx_filter(x, taps, offset, a, z, y):
-    """Rows of x (r, n) through taps delayed by offset and 1/A; z (r, inputs + na) is updated, y (r, n) filled."""
-    inputs = offset + taps.size - 1
-    n = x.shape[1]
+    """Rows of x (r, n) through taps delayed by offset and 1/A; z (r, inputs + a.size) is updated, y (r, n) filled."""
+    inputs, n = offset + taps.size - 1, x.shape[1]
     held = np.empty(inputs + n)
-    out = np.empty(a.size + n)
-    na = a.size
     for r in range(x.shape[0]):
         held[:inputs] = z[r, :inputs]
         held[inputs:] = x[r]
-        out[:na] = z[r, inputs:]
-        for i in range(n):
-            out[na + i] = taps[0] * held[inputs - offset + i]
-        for k in range(1, taps.size):
-            for i in range(n):
-                out[na + i] += taps[k] * held[inputs - offset - k + i]
-        for i in range(na, na + n):
-            total = out[i]
-            for j in range(na, 0, -1):
-                total -= a[j - 1] * out[i - j]
-            out[i] = total
-        y[r] = out[na:]
+        weigh(held[: inputs + n - offset], taps, y[r])
+        if a.size:
+            recur(a, z[r, inputs:], y[r])
         z[r, :inputs] = held[n:]
-        z[r, inputs:] = out[n:]
+
+
+@kernel
+def arx_slopes(by_x, by_y, na, taps_slope, interpolation, rows):
+    """Rows ∂y/∂a, ∂y/∂b, ∂y/∂d (na + nb + 1, n) from x/A and y/A with their histories at the front.
+
+    by_x holds x/A from `taps_slope.size` − 1 samples before the newest tap on, by_y holds y/A from na samples before.
+    """
+    n, last = rows.shape[1], taps_slope.size - 1
+    for j in range(na):
+        for i in range(n):
+            rows[j, i] = -by_y[na - 1 - j + i]
+    for j in range(rows.shape[0] - na - 1):
+        row = rows[na + j]
+        if interpolation[0] == 0.0 and interpolation[1] == 1.0:
+            for i in range(n):
+                row[i] = by_x[last - 1 - j + i]
+        else:
+            for i in range(n):
+                near = interpolation[0] * by_x[last - j + i] + interpolation[1] * by_x[last - j - 1 + i]
+                far = interpolation[2] * by_x[last - j - 2 + i] + interpolation[3] * by_x[last - j - 3 + i]
+                row[i] = near + far
+    weigh(by_x, taps_slope, rows[rows.shape[0] - 1])
 
 
 class ArxBlock(LinearBlock):
-    """The difference equation at the model's own sample period; history of inputs and outputs as state."""
+    """State: history of inputs, oldest first, and of outputs, newest first."""
 
     def __init__(self, names: tuple[str, ...], a: Array, b: Array, delay: float) -> None:
         self.names, self.a, self.b = names, a, b
         self.gain = b.sum() / (1.0 + a.sum())
         whole = int(delay)
-        self.interpolation, self.interpolation_slopes = lagrange(delay - whole)
+        self.interpolation, slopes = lagrange(delay - whole)
         self.first = whole - 1
-        self.taps, self.offset = (b, whole) if delay == whole else (np.convolve(b, self.interpolation), whole - 1)
+        exact = delay == whole
+        self.offset = whole if exact else self.first
+        self.taps = padded(b if exact else np.convolve(b, self.interpolation))
+        self.taps_slope = padded(np.convolve(b, slopes))
+        self.feedback = padded(a)
 
     def zeros(self, rows: int) -> Array:
-        return np.zeros((rows, self.offset + self.taps.size - 1 + self.a.size))
+        return np.zeros((rows, self.offset + self.taps.size - 1 + self.feedback.size))
 
-    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
-        y, z = np.empty(x.shape), z.copy()
-        arx_filter(np.ascontiguousarray(x), self.taps, self.offset, self.a, z, y)
-        return y, z
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        z = z.copy()
+        arx_filter(x, self.taps, self.offset, self.feedback, z, y)
+        return z
 
     def gain_slopes(self) -> Array:
         at_a = 1.0 + self.a.sum()
         return np.concatenate((np.full(self.a.size, -self.b.sum() / at_a**2), np.full(self.b.size, 1.0 / at_a), [0.0]))
 
     def own_rest(self) -> State:
-        return np.zeros((2, self.a.size)), np.zeros(self.first + self.b.size + 3), np.zeros(self.a.size)
+        before = self.first + self.taps_slope.size - 1
+        return np.zeros((2, self.feedback.size)), np.zeros(before), np.zeros(self.a.size)
 
-    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
         poles, before_x, before_y = own
-        na, nb, n = self.a.size, self.b.size, x.size
-        filtered, poles = np.empty((2, n)), poles.copy()
-        arx_filter(np.vstack((x, y)), np.ones(1), 0, self.a, poles, filtered)
-        by_x = np.concatenate((before_x, filtered[0]))
-        by_y = np.concatenate((before_y, filtered[1]))
-        rows = np.empty((na + nb + 1, n))
-        for j in range(na):
-            rows[j] = -by_y[na - j - 1 : na - j - 1 + n]
-        size = before_x.size
-        delayed = [by_x[size - self.first - k : size - self.first - k + n] for k in range(nb + 3)]
-        for j in range(nb):
-            rows[na + j] = sum(t * delayed[j + k] for k, t in enumerate(self.interpolation) if t != 0.0)
-        slopes = np.convolve(self.b, self.interpolation_slopes)
-        rows[-1] = sum(t * delayed[k] for k, t in enumerate(slopes))
-        return rows, (poles, by_x[n:].copy(), by_y[n:].copy())
+        poles, n = poles.copy(), x.size
+        by_x, by_y = np.concatenate((before_x, x)), np.concatenate((before_y, y))
+        if self.a.size:
+            recur(self.feedback, poles[0], by_x[before_x.size :])
+            recur(self.feedback, poles[1], by_y[before_y.size :])
+        seen = by_x[: by_x.size - self.first]
+        arx_slopes(seen, by_y, self.a.size, self.taps_slope, self.interpolation, rows)
+        return poles, by_x[n:].copy(), by_y[n:].copy()

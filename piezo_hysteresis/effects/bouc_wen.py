@@ -8,7 +8,8 @@ from ..errors import ParameterError
 from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
-from .loop import LOOP, linearise_general, run_general, run_plain
+from .loop import LOOP, run_general, run_plain
+from .loop_slopes import START, linearise_general
 
 LOOP_OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5])
 
@@ -81,64 +82,43 @@ class BoucWenBlock(Block):
         self.loop = LOOP_OFF.copy()
         self.start = 0.0
         owners = dict.fromkeys(("A", "beta", "gamma"), effect.name)
+        for term in terms:
+            owners |= dict.fromkeys(term.values, term.name)
         for member in (effect, *terms):
-            for name, value in member.values.items():
-                if name == "h0":
-                    self.start = float(value)  # type: ignore[arg-type]
-                elif name in LOOP:
-                    self.loop[LOOP.index(name)] = value
-                    owners[name] = member.name
-        self.own = np.array([LOOP.index(n) for n in owners], dtype=np.int64)
-        starts = [t.name for t in terms if "h0" in t.values]
-        self.has_start = bool(starts)
-        self.names = (
-            *(f"{owner}.{n}" for n, owner in owners.items()),
-            *(f"{t}.h0" for t in starts),
-            f"{effect.name}.p1",
-            f"{effect.name}.p2",
-        )
+            for name in member.values:
+                if name in LOOP:
+                    self.loop[LOOP.index(name)] = member[name]
+                elif name == "h0":
+                    self.start = member[name]
+        self.own = np.array([LOOP.index(n) if n in LOOP else START for n in owners], dtype=np.int64)
+        self.names = (*(f"{owner}.{n}" for n, owner in owners.items()), f"{effect.name}.p1", f"{effect.name}.p2")
         self.is_plain = bool(np.array_equal(self.loop[3:7], LOOP_OFF[3:7]))
 
     def static(self, x0: float) -> float:
-        return self.p1 * x0**3 + self.p2 * x0 + self.start
+        return self.p1 * x0 * x0 * x0 + self.p2 * x0 + self.start
 
     def static_slopes(self, x0: float) -> tuple[float, Array]:
-        loop = np.zeros(len(self.names) - 2)
-        if self.has_start:
-            loop[-1] = 1.0
-        return 3 * self.p1 * x0**2 + self.p2, np.concatenate((loop, [x0**3, x0]))
+        return 3.0 * self.p1 * x0 * x0 + self.p2, np.append(self.own == START, [x0**3, x0])
 
     def rest(self, x0: float, time: float) -> State:
         return np.array([self.start, x0])
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
-        h, state = np.empty_like(x), state.copy()
+        w, state = np.empty_like(x), state.copy()
         if self.is_plain:
-            run_plain(x, self.loop, state, h)
+            run_plain(x, self.loop, self.p1, self.p2, state, w)
         else:
-            run_general(x, self.loop, self.sample_period, state, h)
-        return self.p1 * x * x * x + self.p2 * x + h, state
+            run_general(x, self.loop, self.p1, self.p2, self.sample_period, state, w)
+        return w, state
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
-        slopes = np.zeros(len(dx0) + len(self.own) + self.has_start)
-        if self.has_start:
-            slopes[-1] = 1.0
-        return slopes, np.array(dx0)
+        return np.append(np.zeros(len(dx0)), self.own == START), np.array(dx0)
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        m = len(dx)
-        h, state = np.empty_like(x), state.copy()
+        w, state = np.empty_like(x), state.copy()
         slopes, last = tangent[0].copy(), tangent[1].copy()
-        # the initial state is a row without forcing: it rides as an incoming row that does not move v
-        forced = np.vstack((dx, np.zeros((1, x.size)))) if self.has_start else np.ascontiguousarray(dx)
-        order = np.r_[:m, m + len(self.own) : len(slopes), m : m + len(self.own)]
-        moving = slopes[order]
-        lasts = np.append(last, 0.0) if self.has_start else last
-        rows = np.empty((len(slopes), x.size))
-        linearise_general(x, forced, self.loop, self.own, self.sample_period, state, moving, lasts, h, rows)
-        slopes[order] = moving
-        mine = np.empty_like(rows)
-        mine[order] = rows
-        mine[:m] += (3 * self.p1 * x * x + self.p2) * dx
-        y = self.p1 * x * x * x + self.p2 * x + h
-        return y, np.vstack((mine, x * x * x, x)), state, (slopes, lasts[:m])
+        rows = np.empty((len(slopes) + 2, x.size))
+        linearise_general(
+            x, dx, self.loop, self.p1, self.p2, self.own, self.sample_period, state, slopes, last, w, rows
+        )
+        return w, rows, state, (slopes, last)

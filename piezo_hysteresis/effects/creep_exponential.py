@@ -59,16 +59,13 @@ class CreepExponentialBlock(AddedBlock):
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, 2 * self.c.size))
 
-    def _relaxed(self, x: Array, z: Array) -> tuple[list[Array], Array]:
-        parts = [p.filter(x, z[:, 2 * k : 2 * k + 2]) for k, p in enumerate(self.poles)]
-        return [x + y for y, _ in parts], np.hstack([s for _, s in parts]) if parts else z
-
-    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
-        relaxed, z = self._relaxed(x, z)
-        y = np.zeros(x.shape)
-        for c, part in zip(self.c, relaxed, strict=True):
-            y += c * part
-        return y, z
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        parts = np.empty((self.c.size, *x.shape))
+        after = [pole.filter(x, z[:, 2 * k : 2 * k + 2], parts[k]) for k, pole in enumerate(self.poles)]
+        y[:] = 0.0
+        for c, part in zip(self.c, parts, strict=True):
+            y += c * (x + part)
+        return np.hstack(after) if after else z
 
     def gain_slopes(self) -> Array:
         return np.repeat([1.0, 0.0], self.c.size)
@@ -76,11 +73,12 @@ class CreepExponentialBlock(AddedBlock):
     def own_rest(self) -> State:
         return np.zeros((self.c.size, 2))
 
-    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
-        relaxed, _ = self._relaxed(x[None, :], z[None, :])
-        by_tau, states = [], []
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
+        states = []
         for k, pole in enumerate(self.poles):
-            row, state = pole.by_parameter(x, y, z[2 * k : 2 * k + 2], own[k])
-            by_tau.append(self.c[k] * row)
-            states.append(state)
-        return np.vstack((*relaxed, *by_tau)), np.array(states)
+            here, by_share, by_tau = z[2 * k : 2 * k + 2], rows[k], rows[self.c.size + k]
+            pole.filter(x[None, :], here[None, :], by_share[None, :])
+            by_share += x
+            states.append(pole.by_parameter(x, y, here, own[k], by_tau[None, :]))
+            by_tau *= self.c[k]
+        return np.array(states)

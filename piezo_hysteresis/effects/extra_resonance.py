@@ -120,18 +120,20 @@ class ModeBlock(AddedBlock):
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, 3))
 
-    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
-        q, z = np.empty(x.shape), z.copy()
-        run_mode(np.ascontiguousarray(x), self.step, z, q)
-        return self.r * (q - x), z
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        z = z.copy()
+        run_mode(x, self.step, z, y)
+        y -= x
+        y *= self.r
+        return z
 
     def own_rest(self) -> State:
         return np.zeros((2, 2))
 
-    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
-        rows, own = np.empty((3, x.size)), own.copy()
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
+        own = own.copy()
         run_mode(x[None, :], self.step, z[None, :].copy(), rows[:1])
         rows[0] -= x
         mode_slopes(x, self.step, self.slopes, z.copy(), own, rows[1:])
         rows[1:] *= self.r
-        return rows, own
+        return own

@@ -36,9 +36,10 @@ class LagBlock(LinearBlock):
         whole = np.concatenate((z, x), axis=1)
         return whole[:, 1 : 1 + x.shape[1]], whole[:, : x.shape[1]], whole[:, x.shape[1] :].copy()
 
-    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
         near, far, z = self._two_taps(x, z)
-        return self.gain * ((1.0 - self.part) * near + self.part * far), z
+        y[:] = self.gain * ((1.0 - self.part) * near + self.part * far)
+        return z
 
     def gain_slopes(self) -> Array:
         return self._gain_slopes
@@ -46,8 +47,8 @@ class LagBlock(LinearBlock):
     def own_rest(self) -> State:
         return None
 
-    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
         near, far, _ = self._two_taps(x[None, :], z[None, :])
         by_lag = self.gain * (far[0] - near[0])
         by_gain = (1.0 - self.part) * near[0] + self.part * far[0]
-        return np.outer(self._gain_slopes, by_gain) + np.outer(self._lag_slopes, by_lag), None
+        rows[:] = np.outer(self._gain_slopes, by_gain) + np.outer(self._lag_slopes, by_lag)

@@ -22,16 +22,16 @@ class LinearBlock(Block):
         """Filter state of `rows` parallel signals at rest, shape (rows, s)."""
 
     @abstractmethod
-    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
-        """Filter `rows` signals (rows, n) from state (rows, s); returns the outputs and a new state."""
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        """Filter `rows` signals x (rows, n) from state z (rows, s) to y (rows, n); returns a new state."""
 
     @abstractmethod
     def own_rest(self) -> State:
         """Tangent state of the own parameters at rest."""
 
     @abstractmethod
-    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
-        """∂ filter/∂θ, shape (p, n), for deviations x, outputs y (both (n,)), state z (s,) before the block."""
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
+        """∂ filter/∂θ to rows (p, n), for deviations x, outputs y (both (n,)), state z (s,) before the block."""
 
     def gain_slopes(self) -> Array:
         """∂K/∂θ, shape (p,)."""
@@ -48,7 +48,8 @@ class LinearBlock(Block):
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         x0, z = state
-        y, z = self.filter((x - x0)[None, :], z)
+        y = np.empty((1, x.size))
+        z = self.filter((x - x0)[None, :], z, y)
         return self.gain * x0 + y[0], (x0, z)
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
@@ -57,13 +58,13 @@ class LinearBlock(Block):
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         x0, z = state
         dx0, dz, own = tangent
+        m, y, rows = len(dx), np.empty((1, x.size)), np.empty((len(dx) + len(self.names), x.size))
         deviation = x - x0
-        y, z_next = self.filter(deviation[None, :], z)
-        mapped, dz = self.filter(dx - dx0[:, None], dz)
-        mapped += (self.gain * dx0)[:, None]
-        mine, own = self.by_parameter(deviation, y[0], z[0], own)
-        mine += (self.gain_slopes() * x0)[:, None]
-        return self.gain * x0 + y[0], np.vstack((mapped, mine)), (x0, z_next), (dx0, dz, own)
+        z_next = self.filter(deviation[None, :], z, y)
+        dz = self.filter(dx - dx0[:, None], dz, rows[:m])
+        own = self.by_parameter(deviation, y[0], z[0], own, rows[m:])
+        rows += np.concatenate((self.gain * dx0, self.gain_slopes() * x0))[:, None]
+        return self.gain * x0 + y[0], rows, (x0, z_next), (dx0, dz, own)
 
 
 class AddedBlock(LinearBlock):

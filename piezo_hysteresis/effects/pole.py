@@ -66,15 +66,16 @@ class PoleBlock(AddedBlock):
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, 1 + self.count))
 
-    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
-        x, y, z = np.ascontiguousarray(x), np.empty(x.shape), z.copy()
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        z = z.copy()
         run_poles(x, *self.step, z, y)
-        return y - x, z
+        y -= x
+        return z
 
     def own_rest(self) -> State:
         return np.zeros(1 + self.count)
 
-    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
-        slopes, own = np.empty((1, x.size)), own.copy()
-        poles_by_tau(x, *self.step, *self.slopes, z.copy(), own, slopes[0])
-        return slopes, own
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
+        own = own.copy()
+        poles_by_tau(x, *self.step, *self.slopes, z.copy(), own, rows[0])
+        return own

@@ -46,54 +46,59 @@ class PublishedBoucWen(Effect):
 
 
 @kernel
-def run_published(v, p, n, state, h_out):
-    """Eq. (7); p = [A, beta, gamma], state = [h, v_last] is updated, h_out (n,) filled."""
-    a, beta, gamma = p[0], p[1], p[2]
+def run_published(v, p, state, w):
+    """Eq. (6) and (7); p = [A, beta, gamma, n, p1, p2], state = [h, v_last] is updated, w (n,) filled."""
+    a, beta, gamma, n, p1, p2 = p[0], p[1], p[2], p[3], p[4], p[5]
     h, last = state[0], state[1]
-    if n == 1.0:
-        for i in range(v.size):
-            dv = v[i] - last
-            last = v[i]
-            h = h + (a * dv - (beta * abs(dv) * h + gamma * dv * abs(h)))
-            h_out[i] = h
-    else:
-        for i in range(v.size):
-            dv = v[i] - last
-            last = v[i]
-            power = abs(h) ** (n - 1.0)
-            h = h + (a * dv - power * (beta * abs(dv) * h + gamma * dv * abs(h)))
-            h_out[i] = h
+    for i in range(v.size):
+        x = v[i]
+        dv = x - last
+        last = x
+        damp, turn = beta * abs(dv), gamma * dv
+        loss = (damp + turn if h >= 0.0 else damp - turn) * h
+        if n != 1.0:
+            loss *= abs(h) ** (n - 1.0)
+        h = h + (a * dv - loss)
+        w[i] = p1 * x * x * x + p2 * x + h
     state[0], state[1] = h, last
 
 
 @kernel
-def linearise_published(v, dv_in, p, n, state, tangent, last_in, h_out, dh_out):
-    """`run_published` with rows: m incoming, then A, beta, gamma, n; tangent (m + 4,) and last_in (m,) are updated."""
-    a, beta, gamma = p[0], p[1], p[2]
+def linearise_published(v, dv_in, p, state, tangent, last_in, w, dw):
+    """`run_published` with rows dw (m + 6, n): m incoming, then p; tangent (m + 4,) and last_in (m,) are updated."""
+    a, beta, gamma, n, p1, p2 = p[0], p[1], p[2], p[3], p[4], p[5]
     m = dv_in.shape[0]
     h, last = state[0], state[1]
     for i in range(v.size):
-        dv = v[i] - last
-        last = v[i]
-        size = abs(h)
-        power = 1.0 if n == 1.0 else size ** (n - 1.0)
-        loss = beta * abs(dv) * h + gamma * dv * size
-        sign = np.sign(h)
-        keep = 1.0 - power * (beta * abs(dv) + gamma * dv * sign) * n
+        x = v[i]
+        dv = x - last
+        last = x
+        damp, turn = beta * abs(dv), gamma * dv
+        factor = damp + turn if h >= 0.0 else damp - turn
+        loss, size, power, by_n = factor * h, abs(h), 1.0, 0.0
+        if n != 1.0:
+            power = size ** (n - 1.0)
+            loss *= power
+        if size > 0.0:
+            by_n = -loss * np.log(size)
+        keep = 1.0 - n * power * factor
+        by_v = 3.0 * p1 * x * x + p2
         for j in range(m):
             move = dv_in[j, i] - last_in[j]
             direction = np.sign(dv if dv != 0.0 else move)
             tangent[j] = keep * tangent[j] + (a - power * (beta * direction * h + gamma * size)) * move
             last_in[j] = dv_in[j, i]
+            dw[j, i] = tangent[j] + by_v * dv_in[j, i]
         tangent[m] = keep * tangent[m] + dv
         tangent[m + 1] = keep * tangent[m + 1] - power * abs(dv) * h
         tangent[m + 2] = keep * tangent[m + 2] - power * dv * size
-        by_n = -power * np.log(size) * loss if size > 0.0 else 0.0
         tangent[m + 3] = keep * tangent[m + 3] + by_n
-        h = h + (a * dv - power * loss)
-        h_out[i] = h
-        for j in range(m + 4):
-            dh_out[j, i] = tangent[j]
+        for j in range(m, m + 4):
+            dw[j, i] = tangent[j]
+        dw[m + 4, i] = x * x * x
+        dw[m + 5, i] = x
+        h = h + (a * dv - loss)
+        w[i] = p1 * x * x * x + p2 * x + h
     state[0], state[1] = h, last
 
 
@@ -104,31 +109,28 @@ class PublishedBlock(Block):
     names = tuple(f"published_bouc_wen.{n}" for n in ("A", "beta", "gamma", "n", "p1", "p2"))
 
     def __init__(self, effect: PublishedBoucWen) -> None:
-        self.p1, self.p2, self.n = effect["p1"], effect["p2"], effect["n"]
-        self.loop = np.array([effect["A"], effect["beta"], effect["gamma"]])
+        self.p = np.array([effect[n] for n in ("A", "beta", "gamma", "n", "p1", "p2")])
 
     def static(self, x0: float) -> float:
-        return self.p1 * x0 * x0 * x0 + self.p2 * x0
+        return float(self.p[4] * x0 * x0 * x0 + self.p[5] * x0)
 
     def static_slopes(self, x0: float) -> tuple[float, Array]:
-        return 3 * self.p1 * x0 * x0 + self.p2, np.array([0.0, 0.0, 0.0, 0.0, x0**3, x0])
+        return float(3.0 * self.p[4] * x0 * x0 + self.p[5]), np.array([0.0, 0.0, 0.0, 0.0, x0**3, x0])
 
     def rest(self, x0: float, time: float) -> State:
         return np.array([0.0, x0])
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
-        h, state = np.empty_like(x), state.copy()
-        run_published(x, self.loop, self.n, state, h)
-        return self.p1 * x * x * x + self.p2 * x + h, state
+        w, state = np.empty_like(x), state.copy()
+        run_published(x, self.p, state, w)
+        return w, state
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
         return np.zeros(len(dx0) + 4), np.array(dx0)
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        h, state = np.empty_like(x), state.copy()
+        w, state = np.empty_like(x), state.copy()
         slopes, last = tangent[0].copy(), tangent[1].copy()
-        rows = np.empty((len(slopes), x.size))
-        linearise_published(x, np.ascontiguousarray(dx), self.loop, self.n, state, slopes, last, h, rows)
-        rows[: len(dx)] += (3 * self.p1 * x * x + self.p2) * dx
-        y = self.p1 * x * x * x + self.p2 * x + h
-        return y, np.vstack((rows, x * x * x, x)), state, (slopes, last)
+        rows = np.empty((len(dx) + 6, x.size))
+        linearise_published(x, dx, self.p, state, slopes, last, w, rows)
+        return w, rows, state, (slopes, last)

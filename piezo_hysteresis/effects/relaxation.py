@@ -95,13 +95,14 @@ class RelaxationBlock(AddedBlock):
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.mix.size))
 
-    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
-        return self._mixed(np.ascontiguousarray(x), z, self.mix)
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        return self._mix(x, z, self.mix, y)
 
-    def _mixed(self, x: Array, z: Array, mix: Array) -> tuple[Array, Array]:
-        y, z = np.empty(x.shape), z.copy()
+    def _mix(self, x: Array, z: Array, mix: Array, y: Array) -> Array:
+        z = z.copy()
         relax(x, self.hold.fade, self.hold.lead, mix[1:].copy(), z, y)
-        return y + mix[0] * x, z
+        y += mix[0] * x
+        return z
 
     def gain_slopes(self) -> Array:
         return self.mix_slopes.sum(axis=1)
@@ -109,5 +110,6 @@ class RelaxationBlock(AddedBlock):
     def own_rest(self) -> None:
         return None
 
-    def by_parameter(self, x: Array, y: Array, z: Array, own: None) -> tuple[Array, None]:
-        return np.vstack([self._mixed(x[None, :], z[None, :], mix)[0] for mix in self.mix_slopes]), None
+    def by_parameter(self, x: Array, y: Array, z: Array, own: None, rows: Array) -> None:
+        for k, mix in enumerate(self.mix_slopes):
+            self._mix(x[None, :], z[None, :], mix, rows[k : k + 1])

@@ -167,7 +167,8 @@ class SoftenedBlock(Block):
         y, arx = self.arx.run(x, arx)
         xi, z = np.empty(x.shape), z.copy()
         run_mode_deviation(x - w0, x0, self.loop, z, xi)
-        added, filtered = self.rest_of_arx.filter(xi[None, :], filtered)
+        added = np.empty((1, x.size))
+        filtered = self.rest_of_arx.filter(xi[None, :], filtered, added)
         return y + (self.arx.gain * (x0 - w0) + added[0]), (arx, (w0, x0), z, filtered)
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
@@ -187,9 +188,10 @@ class SoftenedBlock(Block):
         z = z.copy()
         run_mode_deviation(x - w0, x0, self.loop, z, xi)
         y, rows, arx, d_arx = self.arx.linearise(x, dx, arx, d_arx)
-        added, after = self.rest_of_arx.filter(xi[None, :], filtered)
-        by_rest, own = self.rest_of_arx.by_parameter(xi, added[0], filtered[0], own)
-        through, d_filtered = self.rest_of_arx.filter(d_xi, d_filtered)
+        added, through, by_rest = np.empty((1, x.size)), np.empty(d_xi.shape), np.empty((na - 1 + nb, x.size))
+        after = self.rest_of_arx.filter(xi[None, :], filtered, added)
+        own = self.rest_of_arx.by_parameter(xi, added[0], filtered[0], own, by_rest)
+        d_filtered = self.rest_of_arx.filter(d_xi, d_filtered, through)
         rows[:m] += self.arx.gain * (dx0[:m] - dw0)[:, None] + through[:m]
         rows[m:] += (self.arx.gain_slopes() * (x0 - w0))[:, None]
         by_mode = through[m : m + 2] - added / self.mode_gain

@@ -32,19 +32,20 @@ class TapsBlock(AddedBlock):
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.added.size - 1))
 
-    def filter(self, x: Array, z: Array) -> tuple[Array, Array]:
-        return self._weighted(x, z, self.added)
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        return self._weigh(x, z, self.added, y)
 
     def own_rest(self) -> State:
         return None
 
-    def by_parameter(self, x: Array, y: Array, z: Array, own: State) -> tuple[Array, State]:
-        return np.vstack([self._weighted(x[None, :], z[None, :], row)[0] for row in self.slopes]), None
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
+        for k, weights in enumerate(self.slopes):
+            self._weigh(x[None, :], z[None, :], weights, rows[k : k + 1])
 
-    def _weighted(self, x: Array, z: Array, weights: Array) -> tuple[Array, Array]:
+    def _weigh(self, x: Array, z: Array, weights: Array, y: Array) -> Array:
         past, n = np.concatenate((z, x), axis=1), x.shape[1]
-        y = np.zeros(x.shape)
+        y[:] = 0.0
         for k in np.flatnonzero(weights):
             start = z.shape[1] - k
             y += weights[k] * past[:, start : start + n]
-        return y, past[:, n:].copy()
+        return past[:, n:].copy()
