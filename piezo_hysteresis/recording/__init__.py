@@ -100,9 +100,9 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     experiment : Experiment
         Records in order.
     path : path-like
-        ``.csv`` and ``.mat`` give a file, anything else a folder of NPZ files.
+        ``run.csv`` and ``run.mat`` give that file, ``run.mcap`` the bag folder ``run``, anything else a folder of NPZ.
     format : str, optional
-        Key of `FORMATS` instead of what the ending says; ``"rosbag2"`` gives a bag in that folder.
+        Key of `FORMATS` instead of what the ending says.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     chosen.write(experiment, place)
 
 
-_BY_SUFFIX = {".csv": "csv", ".mat": "mat"}
+_BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
 
 
 def _named(format: str) -> Format:

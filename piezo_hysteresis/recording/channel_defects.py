@@ -63,7 +63,8 @@ def _clipped_voltage(record: Record) -> list[Notice]:
         runs = _runs_of_equal(np.where(u == rail, rail, np.arange(u.size)), 5)
         for a, b in runs.tolist():
             way = sign * y[a:b] * np.sign(np.dot(u - u.mean(), y - y.mean()) or 1.0)
-            if way.max() - max(way[0], way[-1]) > _RETURN * np.ptp(y):
+            # a stage that rings after a step also goes on and comes back, but ends far from where it was
+            if way.max() - max(way[0], way[-1]) > max(_RETURN * np.ptp(y), abs(way[0] - way[-1])):
                 samples += b - a
     if not samples:
         return []

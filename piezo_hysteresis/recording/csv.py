@@ -78,9 +78,10 @@ def _labels(experiment: Experiment) -> list[str]:
     inferred = [abs(b.start_time - a.start_time - a.duration) < 1.5 * b.sample_period for a, b in pairs]
     if [False, *inferred] != [r.continues for r in experiment]:
         labels.append("continues")
-    labels += [
-        n for n in ("truncated", "initial_voltage") if any(getattr(r, n) not in (False, None) for r in experiment)
-    ]
+    if any(r.truncated for r in experiment):
+        labels.append("truncated")
+    if any(r.initial_voltage is not None for r in experiment):
+        labels.append("initial_voltage")
     if any(r.size < 2 or TimeBase.of(r.time).period != r.sample_period for r in experiment):
         labels.append("sample_period")
     return labels

@@ -15,6 +15,13 @@ SHORTEST_SHARE = 1 / 64
 """A piece between two holes is kept when it is at least this share of the phase."""
 
 
+LARGEST = 1e30
+"""Numbers beyond this are damage, in whatever unit [V, m]."""
+
+PERIODS = (1e-9, 1e6)
+"""Sample periods that a recording can have [s]."""
+
+
 def stretches(good: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Start and stop of every run of True.
 
@@ -64,11 +71,13 @@ def finite_records(
     notices = []
     kept = {}
     for name in channels.keys() - {"voltage", "displacement"}:
-        if np.isfinite(channels[name]).all():
+        if (np.abs(channels[name]) < LARGEST).all():
             kept[name] = channels[name]
         else:
             notices.append(Notice("non_finite", f"{name} has non-finite samples: the channel is left out", phase))
-    good = np.isfinite(voltage) & np.isfinite(displacement)
+    if not PERIODS[0] <= sample_period <= PERIODS[1]:
+        raise RecordError(f"sample_period: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
+    good = (np.abs(voltage) < LARGEST) & (np.abs(displacement) < LARGEST)
     edges = sorted(breaks or {})
     pieces = [(a + i, a + j) for a, b in _between(edges, good.size) for i, j in stretches(good[a:b])]
     if not pieces:

@@ -16,6 +16,7 @@ from ..record import Experiment, Notice, Record, Samples
 from .damage import naming
 from .hdf5_variables import Hdf5Variables, is_hdf5
 from .layout import CHANNELS, Layout
+from .mat5_sizes import check_sizes
 from .table import LABELS, table_records
 
 _PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
@@ -78,6 +79,7 @@ def _opened(path: Path, layout: Layout) -> AbstractContextManager[Variables]:
         return Hdf5Variables(path)
     from scipy import io  # slow to import, and only needed here
 
+    check_sizes(path)
     named = {re.split(r"[.\[]", str(place))[0] for place in layout.columns.values()}
     wanted = [
         name

@@ -80,7 +80,11 @@ def _named(parts: Sequence[Record], phases: Sequence[tuple[float, str]]) -> list
 class _Piece:
     start: int
     stop: int
-    level: float | None  # None where the drive moves
+    level: float = np.nan  # NaN where the drive moves
+
+    @property
+    def moves(self) -> bool:
+        return self.level != self.level
 
     @property
     def size(self) -> int:
@@ -115,10 +119,10 @@ def propose(voltage: Samples, sample_period: float) -> list[tuple[int, str]]:
             proposal.append((piece.start - lead, _levels(pieces[max(i - 1, 0) : end], voltage)))
             i = end
             continue
-        if piece.level is None:
+        if piece.moves:
             name = phase_name(voltage[piece.start : piece.stop], sample_period)
         else:
-            near = first_level is not None and abs(piece.level - first_level) <= _LARGEST_NOISE * np.ptp(voltage)
+            near = abs(piece.level - first_level) <= _LARGEST_NOISE * np.ptp(voltage)
             name = "rest" if near else "hold"
         proposal.append((piece.start, name))
         i += 1
@@ -136,18 +140,23 @@ def _pieces(voltage: Samples) -> list[_Piece]:
     noise = float(np.quantile(np.ptp(_blocks(voltage, length), axis=1), 0.05))
     tolerance = min(max(1.5 * noise, 1e-6 * span), _LARGEST_NOISE * span)
     length = max(length, int(4 * voltage.size * tolerance / span) if tolerance > 1e-5 * span else 0)
-    levels = _levels_of(voltage, _blocks(voltage, length), length, tolerance)
+    levels = _joined(voltage, _levels_of(voltage, _blocks(voltage, length), length, tolerance), 4 * tolerance)
     turns = turning_points(voltage, max(4 * tolerance, 0.01 * span))
     levels = [level for level in levels if not _is_peak(level, turns, voltage.size)]
     pieces: list[_Piece] = []
     end = 0
     for level in levels:
         if level.start > 0:
-            pieces.append(_Piece(end, level.start, None))  # of no size where the drive jumps
+            pieces.append(_Piece(end, level.start))  # of no size where the drive jumps
         pieces.append(level)
         end = level.stop
     if end < voltage.size:
-        pieces.append(_Piece(end, voltage.size, None))
+        pieces.append(
+            _Piece(
+                end,
+                voltage.size,
+            )
+        )
     return pieces
 
 
@@ -182,6 +191,18 @@ def _levels_of(voltage: Samples, blocks: Samples, length: int, tolerance: float)
     return found
 
 
+def _joined(voltage: Samples, levels: list[_Piece], tolerance: float) -> list[_Piece]:
+    """Levels with nothing but a level between them, as on the flat top of a wave."""
+    joined: list[_Piece] = []
+    for level in levels:
+        if joined and float(np.ptp(voltage[joined[-1].stop - 1 : level.start + 1])) <= tolerance:
+            start = joined.pop().start
+            joined.append(_Piece(start, level.stop, float(voltage[start : level.stop].mean())))
+        else:
+            joined.append(level)
+    return joined
+
+
 def _is_peak(level: _Piece, turns: np.ndarray[tuple[int], np.dtype[np.int64]], size: int) -> bool:
     """True where a level is short against the swings beside it."""
     if level.start == 0 or level.stop == size:
@@ -196,7 +217,7 @@ def _is_peak(level: _Piece, turns: np.ndarray[tuple[int], np.dtype[np.int64]], s
 
 def _chain_end(pieces: list[_Piece], i: int, voltage: Samples) -> int:
     """One behind the last piece of the chain movement, level, movement, level … that begins at `i`."""
-    while i + 1 < len(pieces) and pieces[i].level is None and _monotone(voltage, pieces[i]):
+    while i + 1 < len(pieces) and pieces[i].moves and _monotone(voltage, pieces[i]):
         i += 2
     return i
 
@@ -209,12 +230,12 @@ def _monotone(voltage: Samples, piece: _Piece) -> bool:
 
 def _levels(pieces: list[_Piece], voltage: Samples) -> str:
     """Name of levels with transitions between them."""
-    levels = [piece for piece in pieces if piece.level is not None]
-    moves = [piece for piece in pieces if piece.level is None]
-    if sum(m.size for m in moves) > max(2 * len(moves), _JUMP * sum(p.size for p in levels)):
+    levels = [piece for piece in pieces if not piece.moves]
+    moves = [piece for piece in pieces if piece.moves]
+    if np.median([m.size for m in moves]) > max(2, _JUMP * np.median([p.size for p in levels])):
         return "trapezoid" if len(moves) > 1 else "ramp"
     if len(moves) == 1:
         return "step"
     near = 2 * _LARGEST_NOISE * float(np.ptp(voltage))
-    distinct = sorted(piece.level for piece in levels if piece.level is not None)
+    distinct = sorted(piece.level for piece in levels)
     return "steps" if sum(b - a > near for a, b in itertools.pairwise(distinct)) <= 1 else "staircase"

@@ -9,6 +9,7 @@ import numpy as np
 from ..record import Experiment, Notice, Record, Samples
 from .channel_defects import channel_defects
 from .onset import onset
+from .waveform import phase_name
 
 DISPLACEMENT_RANGE = (1e-9, 2e-3)
 """Range of displacement that a piezo stage can have [m]."""
@@ -18,6 +19,7 @@ VOLTAGE_RANGE = (1e-3, 1.2e3)
 _SCALE_MISMATCH = 100.0
 _FREQUENCY_MISMATCH = 0.1
 _MOVING = 0.05
+_SINE = re.compile(r"sine_(\d+(?:\.\d+)?(?:e[+-]?\d+)?)hz")
 
 
 def inspect(experiment: Experiment) -> tuple[Notice, ...]:
@@ -103,17 +105,10 @@ def _order(experiment: Experiment) -> list[Notice]:
 
 def _named_frequency(record: Record) -> list[Notice]:
     """A phase called sine of a frequency that moves at another one has a wrong name or a wrong sample period."""
-    named = re.fullmatch(r"sine_([\d.]+(?:e[+-]?\d+)?)hz", record.phase)
-    if named is None:
+    named, found = _SINE.fullmatch(record.phase), _SINE.fullmatch(phase_name(record.voltage, record.sample_period))
+    if named is None or found is None or abs(float(found[1]) / float(named[1]) - 1) < _FREQUENCY_MISMATCH:
         return []
-    found, resolution = _fundamental(record)
-    expected = float(named[1])
-    if (
-        resolution > _FREQUENCY_MISMATCH * expected
-        or abs(found - expected) <= _FREQUENCY_MISMATCH * expected + resolution
-    ):
-        return []
-    text = f"the drive moves at {found:.4g} Hz: the name, or the sample period {record.sample_period:g} s, is wrong"
+    text = f"the drive moves at {found[1]} Hz: the name, or the sample period {record.sample_period:g} s, is wrong"
     return [Notice("sample_period", text, record.phase, severe=True)]
 
 

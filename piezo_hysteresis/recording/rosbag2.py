@@ -55,7 +55,7 @@ class Rosbag2:
             return Experiment(tuple(records), str(path), (*bag.notices, *notices))
 
     def write(self, experiment: Experiment, path: Path) -> None:
-        """Write the records as the driver would send them, in blocks of 10 ms, to the folder `path`.
+        """Write the records as the driver would send them, in blocks of 10 ms, to the folder `path` without its ending.
 
         A record that does not continue the one before it is preceded by one idle sample at its settled voltage, as from
         a driver that was started again. Other channels than voltage and displacement are not written.
@@ -65,7 +65,7 @@ class Rosbag2:
         RecordingError
             If the folder exists or cannot be written.
         """
-        with BagWriter(path) as bag:
+        with BagWriter(path.with_suffix("") if path.suffix == ".mcap" else path) as bag:
             bag.add_topic("/samples", TYPE)
             bag.add_topic("/phase", STRING, depth=1, transient_local=True)
             clock_ns, index = 1_000_000_000, 0

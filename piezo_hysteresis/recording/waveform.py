@@ -30,7 +30,7 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     Returns
     -------
     str
-        One of rest, step, ramp, chirp, triangle, minor_loops, ``sine_<f>hz``, multisine, noise.
+        One of rest, step, ramp, steps, chirp, triangle, minor_loops, ``sine_<f>hz``, multisine, noise.
 
     Examples
     --------
@@ -44,23 +44,26 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     turns = turning_points(voltage, _LEAST_SWING * span)
     if turns.size <= 2:
         return _transition(voltage)
-    if _is_chirp(voltage):
+    if _has_levels(voltage):
+        return "steps"
+    wave = voltage[turns[1] : turns[-2] + 1]  # without what leads into it and out of it
+    if _is_chirp(wave):
         return "chirp"
-    part = voltage
     if np.median(np.diff(turns)) < 8 * max(1, voltage.size // _POINTS):  # too fast for the coarse turning points
-        middle = voltage.size // 2
-        part = voltage[max(0, middle - _POINTS // 2) : middle + _POINTS // 2]
-        turns = turning_points(part, _LEAST_SWING * span)
-    straight, cosine = _shape(part, turns)
+        middle = wave.size // 2
+        voltage = wave[max(0, middle - _POINTS // 2) : middle + _POINTS // 2]
+        turns = turning_points(voltage, _LEAST_SWING * span)
+    straight, cosine = _shape(voltage, turns)
     reversals = turns[1:-1]  # the ends of the record are none
     periods = reversals[2:] - reversals[:-2]
-    regular = periods.size < 2 or float(np.std(periods)) < _REGULAR * float(np.mean(periods))
+    usual = float(np.median(periods)) if periods.size else 2.0 * float(turns[1] - turns[0])
+    like = periods[np.abs(periods - usual) <= _REGULAR * usual]
+    regular = like.size >= 0.8 * periods.size - 1  # one may belong to what leads in or out
     if straight < _LIKE:
         return "triangle" if regular else "minor_loops"
     if cosine < _LIKE and regular:
-        swing = float(np.mean(np.diff(reversals if reversals.size > 1 else turns)))
-        return f"sine_{0.5 / (swing * sample_period):.3g}hz"
-    return "multisine" if _repeats(part if part.size < voltage.size else voltage) else "noise"
+        return f"sine_{1 / (float(np.mean(like)) if like.size else usual) / sample_period:.3g}hz"
+    return "multisine" if _repeats(wave) else "noise"
 
 
 def turning_points(voltage: Samples, least_swing: float) -> NDArray[np.int64]:
@@ -93,6 +96,12 @@ def _transition(voltage: Samples) -> str:
     way = np.abs(voltage - voltage[0]) / np.ptp(voltage)
     moving = np.count_nonzero((way > 0.1) & (way < 0.9))
     return "step" if moving <= max(2, voltage.size // 20) else "ramp"
+
+
+def _has_levels(voltage: Samples) -> bool:
+    """True where the drive is nearly always at one of a few voltages."""
+    counts = np.sort(np.histogram(voltage, 200)[0])
+    return bool(counts[-8:].sum() > 0.7 * voltage.size and counts[-1] < 0.8 * voltage.size)
 
 
 def _shape(voltage: Samples, turns: NDArray[np.int64]) -> tuple[float, float]:
@@ -138,6 +147,6 @@ def _repeats(voltage: Samples) -> bool:
     lags = np.arange(overlap.size)
     head = energy[x.size - 1 - lags]
     tail = energy[-1] - np.concatenate(([0.0], energy))[lags]
-    similarity = np.abs(overlap) / np.sqrt(head * tail)
+    similarity = np.abs(overlap) / np.sqrt(np.maximum(head * tail, 1e-12 * energy[-1] ** 2 + 1e-300))
     first = np.flatnonzero(similarity < 0.5)
     return bool(first.size and similarity[first[0] :].max() > _PERIODIC)

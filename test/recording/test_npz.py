@@ -43,7 +43,7 @@ def test_phase_may_be_any_numpy_text(tmp_path, phase):
     [
         ({"sample_period": None}, "sample_period"),
         ({"voltage": None}, "voltage"),
-        ({"sample_period": 0.0}, "positive"),
+        ({"sample_period": 0.0}, "got 0 s"),
         ({"sample_period": [1.0, 2.0]}, "one number"),
         ({"displacement": np.arange(3.0)}, "3 samples"),
         ({"voltage": np.ones((2, 2)), "displacement": np.ones((2, 2))}, "one dimension"),
