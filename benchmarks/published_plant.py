@@ -11,7 +11,7 @@ A_Z = np.array([1.0, -0.05847, 0.2423, -0.05833, -0.4917, 0.4170, -0.1945, 0.077
 B_Z = np.array([0.004481, 0.04629, 0.1320, 0.1154, -0.02198, -0.06236, -0.0007691, 0.01408])
 GAIN = 0.24641
 LOOP = {"A": -0.7691, "beta": 4.6075, "gamma": -0.8725, "p1": -0.1085, "p2": 2.1925}
-STROKE = 0.46
+STROKE = 0.479
 """Output at 10 V from rest, normalised, which is what a percentage of noise refers to."""
 
 

@@ -228,33 +228,23 @@ def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 
     response = step_response(fine)
     samples, first, last, doubts = _onset(response)
     onsets = [Onset(finest, samples, first * finest, last * finest)]
-    slow = [(step_response, fine, factor) for factor in factors if factor > 1]
-    slow += [(step_response, [r], 1) for r in records if r.sample_period >= 1.001 * finest]
-    for make, part, factor in slow:
+    others = [(fine, factor) for factor in factors if factor > 1]
+    others += [([r], 1) for r in records if r.sample_period >= 1.001 * finest]
+    for part, factor in others:
         try:
-            at = make(part, factor)
+            at = step_response(part, factor)
             n, low, high, _ = _onset(at)
         except IdentificationError:
             continue
         onsets.append(Onset(at.sample_period, n, low * at.sample_period, high * at.sample_period))
-    notices = []
-    if "delay_ambiguous" in doubts:
-        notices.append(
-            Notice(
-                "delay_ambiguous", f"onset at sample {samples} or {int(first)}: noise hides the first response", "step"
-            )
-        )
-    if "delay_unresolved" in doubts:
-        notices.append(
-            Notice(
-                "delay_unresolved",
-                f"the response begins within one sample period of {finest:.3g} s: only a bound on the delay is known",
-                "step",
-            )
-        )
+    told = {
+        "delay_ambiguous": f"onset at sample {samples} or {int(first)}: noise hides the first response",
+        "delay_unresolved": f"the response begins within one sample period of {finest:.3g} s: only a bound is known",
+    }
+    notices = [Notice(kind, message, "step") for kind, message in told.items() if kind in doubts]
     if max(o.earliest for o in onsets) >= min(o.latest for o in onsets) + 1e-12:
-        told = ", ".join(
+        answers = ", ".join(
             f"{o.earliest * 1e6:.4g} to {o.latest * 1e6:.4g} µs at {o.sample_period:.3g} s" for o in onsets
         )
-        notices.append(Notice("delay_inconsistent", f"sample times disagree on the delay: {told}", "step"))
+        notices.append(Notice("delay_inconsistent", f"sample times disagree on the delay: {answers}", "step"))
     return Delay(samples, tuple(onsets), response, tuple(notices))

@@ -84,6 +84,30 @@ class DriveLimits:
             raise IdentificationError(f"waveform: got {low:.4g} to {high:.4g} of the voltage range, expected 0 to 1")
         return np.asarray(np.clip(self.voltage_min + self.span * fraction, self.voltage_min, self.voltage_max))
 
+    def check(self, voltage: Samples, name: str) -> None:
+        """Refuse a waveform that leaves the limits or does not start and end at the safe voltage.
+
+        Raises
+        ------
+        IdentificationError
+            Naming the waveform, what was got and what was expected.
+        """
+        low, high = float(voltage.min()), float(voltage.max())
+        if low < self.voltage_min or high > self.voltage_max:
+            raise IdentificationError(
+                f"{name}: got {low:g} to {high:g} V, expected {self.voltage_min:g} to {self.voltage_max:g} V"
+            )
+        slew = float(np.max(np.abs(np.diff(voltage)), initial=0.0)) / self.sample_period
+        if slew > self.max_slew_rate * (1.0 + 1e-6):
+            raise IdentificationError(
+                f"{name}: got a slew of {slew:g} V/s, expected at most {self.max_slew_rate:g} V/s"
+            )
+        if voltage[0] != self.safe_voltage or voltage[-1] != self.safe_voltage:
+            raise IdentificationError(
+                f"{name}: got {voltage[0]:g} V first and {voltage[-1]:g} V last, "
+                f"expected the safe voltage {self.safe_voltage:g} V"
+            )
+
     def path(self, corners: Samples, rate: float) -> Samples:
         """Straight lines through `corners` at one rate; no steeper than the slew limit, every corner met exactly.
 

@@ -105,24 +105,8 @@ class Protocol:
         object.__setattr__(self, "phases", tuple(self.phases))
         if not self.phases:
             raise IdentificationError(f"protocol '{self.name}' holds no phase; expected at least one")
-        limits = self.limits
         for phase in self.phases:
-            low, high = float(phase.voltage.min()), float(phase.voltage.max())
-            if low < limits.voltage_min or high > limits.voltage_max:
-                raise IdentificationError(
-                    f"phase '{phase.name}': got {low:g} to {high:g} V, "
-                    f"expected {limits.voltage_min:g} to {limits.voltage_max:g} V"
-                )
-            if phase.largest_slew > limits.max_slew_rate * (1.0 + 1e-6):
-                raise IdentificationError(
-                    f"phase '{phase.name}': got a slew of {phase.largest_slew:g} V/s, "
-                    f"expected at most {limits.max_slew_rate:g} V/s"
-                )
-            if phase.voltage[0] != limits.safe_voltage or phase.voltage[-1] != limits.safe_voltage:
-                raise IdentificationError(
-                    f"phase '{phase.name}': got {phase.voltage[0]:g} V first and {phase.voltage[-1]:g} V last, "
-                    f"expected the safe voltage {limits.safe_voltage:g} V"
-                )
+            self.limits.check(phase.voltage, f"phase '{phase.name}'")
 
     def __iter__(self) -> Iterator[Phase]:
         return iter(self.phases)

@@ -88,3 +88,8 @@ def test_edges_are_found_with_their_heights():
     )
     edges = find_edges(voltage, 8, 4)
     assert [(e.start, e.height) for e in edges] == [(50, 2.0), (350, -1.0)]
+
+
+def test_percentages_of_noise_refer_to_the_full_stroke():
+    rise = displacement(np.linspace(0.0, 10.0, 50_000))
+    assert rise[-1] == pytest.approx(STROKE, rel=1e-3)

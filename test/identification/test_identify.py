@@ -1,0 +1,155 @@
+"""Any mix of records gives a model that predicts data it has not seen, and says what it could not know."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.errors import IdentificationError
+from piezo_hysteresis.identification import DriveLimits, excitation, identify
+from piezo_hysteresis.identification.normal_equations import Nuisance, residuals
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Experiment, Record
+
+LIMITS = DriveLimits(sample_period=1e-4)
+TRUTH = Model((BoucWen(), Arx(a=(-1.2, 0.45), b=(0.15, 0.1), delay=3.0)), 1e-4, 10.0, 1e-5)
+NOISE = 2e-9
+
+
+def play(*bodies, limits=LIMITS, seed=0, every=1, offset=0.0, continues=False):
+    """Records of the truth with noise and a sensor zero, from named waveform bodies."""
+    random = np.random.default_rng(seed)
+    empty = [
+        Record(v, np.zeros(v.size), limits.sample_period, name, continues=continues and i > 0)
+        for i, (name, v) in enumerate((name, limits.from_safe_to_safe(body)) for name, body in bodies)
+    ]
+    outputs = TRUTH.simulate(empty)
+    return [
+        Record(
+            r.voltage,
+            y + offset + NOISE * random.standard_normal(r.size),
+            r.sample_period,
+            r.phase,
+            continues=r.continues,
+        ).decimate(every)
+        for r, y in zip(empty, outputs, strict=True)
+    ]
+
+
+def triangle(limits=LIMITS):
+    return "triangle", excitation.triangle(limits, (1.0, 0.5), 1.0)
+
+
+def noise(rms=0.05, seed=0):
+    return "noise", excitation.noise(LIMITS, rms, 2e3, 1.0, 0.35, seed)
+
+
+def step():
+    return "step", excitation.steps(LIMITS, (0.2, 0.5, 0.8, 0.5) * 5, 0.02)
+
+
+def mixture(seed, limits=LIMITS):
+    return "record", excitation.mixture(limits, 1.0, seed)
+
+
+def percent(model, records):
+    errors = residuals(model, records, Nuisance(offset=True))
+    return max(100.0 * np.std(e) / np.ptp(r.displacement) for e, r in zip(errors, records, strict=True))
+
+
+@pytest.fixture(scope="module")
+def complete():
+    records = play(step(), noise(0.05), noise(0.01, 1), triangle(), ("validation", excitation.mixture(LIMITS, 1.0, 9)))
+    return identify(Experiment(tuple(records), "complete"), gain=TRUTH["arx"].dc_gain, displacement_scale=1e-5)
+
+
+def test_three_phases_give_the_truth_within_its_uncertainty(complete):
+    deviates = [
+        (v - TRUTH.values()[n]) / complete.fit.standard_errors[n]
+        for n, v in complete.fit.values.items()
+        if n.startswith("bouc_wen.")
+    ]
+    assert np.max(np.abs(deviates)) < 4.0
+    assert complete.delay.samples == 3
+    assert complete.fit.converged
+
+
+def test_the_frequency_response_knows_its_error(complete):
+    frequency = np.geomspace(1.0, 2000.0, 20)
+    value, error = complete.response(frequency)
+    off = np.abs(value / TRUTH["arx"].response(frequency, 1e-4) - 1.0)
+    assert np.all(off < 4.0 * error)
+    assert error.max() < 1e-3
+
+
+def test_validation_is_held_out_and_predicted_to_the_noise(complete):
+    assert [p.phase for p in complete.phases if not p.is_fitted] == ["validation"]
+    assert complete.free_run_error == pytest.approx(NOISE, rel=0.05)
+    assert complete.model.provenance["source"] == "complete"
+
+
+def test_the_diagnostic_tells_that_noise_bleaches_the_loop(complete):
+    low, high = complete.comparisons
+    assert low.amplitude < high.amplitude
+    assert low.from_v > 1.2 * low.from_w
+    assert any(n.kind == "inputs_disagree" for n in complete.notices)
+
+
+def test_the_result_can_be_read(complete):
+    text = str(complete)
+    for word in ("delay 3 samples", "bouc_wen.gamma", "±", "held out", "% of range"):
+        assert word in text
+
+
+def test_orders_are_chosen_where_asked():
+    found = identify(Experiment(tuple(play(step(), noise(), triangle()))), orders=None)
+    assert 2 <= found.model["arx"].array("a").size <= 6
+    assert percent(found.model, play(mixture(3), seed=4)) < 0.1
+
+
+def test_a_single_foreign_record_is_enough():
+    found = identify(Experiment(tuple(play(mixture(1)))), orders=(4, 4))
+    kinds = {n.kind for n in found.notices}
+    assert {"no_step", "delay_from_fit", "nothing_held_out"} <= kinds
+    assert percent(found.model, play(mixture(2), seed=5)) < 0.1
+
+
+def test_records_with_their_own_sensor_zero_and_bipolar_drive():
+    bipolar = DriveLimits(sample_period=1e-4, voltage_min=-10.0, voltage_max=10.0)
+    records = play(mixture(1, bipolar), limits=bipolar, offset=3e-5)
+    records += play(mixture(2, bipolar), limits=bipolar, seed=1, offset=-8e-5)
+    found = identify(Experiment(tuple(records)), orders=(4, 4))
+    assert percent(found.model, play(mixture(5, bipolar), limits=bipolar, seed=7)) < 0.1
+
+
+def test_records_that_continue_carry_the_state():
+    bodies = (step(), noise(), triangle())
+    joined = Experiment(tuple(play(*bodies, continues=True)))
+    found = identify(joined, orders=(2, 2))
+    assert found.fit.cost < 1.5
+    assert percent(found.model, play(mixture(3), seed=4)) < 0.1
+
+
+def test_slow_data_give_loop_and_lag_and_say_so():
+    # 1 Hz loops sampled at 200 Hz, with a jump from rest at the beginning that shows dead time and pole
+    slow = Model((BoucWen(), Arx(a=(-0.68,), b=(0.32,), delay=1.0)), 5e-3, 10.0, 1e-5)
+    time = 5e-3 * np.arange(3000)
+    voltage = 5.0 + (2.0 + time / 5.0) * np.sin(2 * np.pi * time)
+    clean = slow.simulate(Record(voltage, time, 5e-3, initial_voltage=0.0))[0]
+    measured = clean + NOISE * np.random.default_rng(0).standard_normal(time.size) - 1e-4
+    found = identify(Experiment((Record(voltage, measured, 5e-3, "sine_1hz", initial_voltage=0.0),)))
+    assert any(n.kind == "lag_only" for n in found.notices)
+    lag = found.model["arx"].group_delay * found.model.sample_period
+    assert lag == pytest.approx(slow["arx"].group_delay * 5e-3, rel=0.02)
+    assert found.fit.rms[0] == pytest.approx(NOISE, rel=0.05)
+
+
+def test_phases_stored_slowly_join_fast_ones():
+    records = play(step(), noise()) + play(triangle(), every=5)
+    found = identify(Experiment(tuple(records)), orders=(2, 2))
+    assert percent(found.model, play(mixture(3), seed=4)) < 0.15
+
+
+@pytest.mark.parametrize("voltage", [np.zeros(1000), np.full(1000, 5.0)])
+def test_without_motion_the_error_says_what_is_missing(voltage):
+    with pytest.raises(IdentificationError, match="does not move"):
+        identify(Experiment((Record(voltage, np.zeros(1000), 1e-3),)))
