@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.stats import norm
 
 from ..errors import RecordError
 
 Array = NDArray[np.float64]
 
-CONFIDENCE = 2.576
-"""Standard deviations of the 99 % bounds."""
+FALSE_ALARMS = 0.01
+"""Chance that any lag of an independent residual lies beyond the bounds: they hold for all lags together."""
 
 CAPTION = (
     "An output-error model is judged by the cross-correlation: beyond its bounds, something that the drive does is not "
@@ -32,13 +33,13 @@ class Correlation:
     auto : (k + 1,) ndarray
         Auto-correlation of e.
     auto_bound : float
-        99 % bound for white noise, 2.58/√n.
+        99 % bound for white noise, z/√n.
     cross_lag : (2k + 1,) ndarray
         Lags of the cross-correlation [s]; positive where e follows u.
     cross : (2k + 1,) ndarray
         Cross-correlation of e(t + lag) with u(t).
     cross_bound : float
-        99 % bound for an e of the same colour that does not depend on u, 2.58·√(Σ ρ_e ρ_u / n).
+        99 % bound for an e of the same colour that does not depend on u, z·√(Σ ρ_e ρ_u / n).
     """
 
     lag: Array
@@ -50,13 +51,13 @@ class Correlation:
 
     @property
     def is_white(self) -> bool:
-        """True where at most 5 % of the lags of the auto-correlation, lag 0 apart, are beyond the bound."""
-        return bool(np.mean(np.abs(self.auto[1:]) > self.auto_bound) <= 0.05)
+        """True where no lag of the auto-correlation but 0 lies beyond the bound."""
+        return bool(np.all(np.abs(self.auto[1:]) <= self.auto_bound))
 
     @property
     def is_independent(self) -> bool:
-        """True where at most 5 % of the lags of the cross-correlation are beyond the bound."""
-        return bool(np.mean(np.abs(self.cross) > self.cross_bound) <= 0.05)
+        """True where no lag of the cross-correlation lies beyond the bound."""
+        return bool(np.all(np.abs(self.cross) <= self.cross_bound))
 
 
 def correlate(residual: Array, voltage: Array, sample_period: float, lags: int = 50) -> Correlation:
@@ -81,7 +82,8 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
     Notes
     -----
     Ljung, *System Identification*, 2nd ed., Sec. 16.6. The sum over the colours is taken over all lags, as the product
-    of the two spectra (Bartlett). A drive of one frequency has a bound above 1: it decides nothing.
+    of the two spectra (Bartlett). z is the normal quantile of 1 % shared by all lags (Bonferroni). A drive of one
+    frequency has a bound near or above 1: it decides nothing.
     """
     n = residual.size
     if n < 16:
@@ -100,8 +102,8 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
     return Correlation(
         lag=np.asarray(sample_period * np.arange(lags + 1)),
         auto=auto_e[: lags + 1],
-        auto_bound=CONFIDENCE / np.sqrt(n),
+        auto_bound=float(norm.isf(FALSE_ALARMS / 2 / lags) / np.sqrt(n)),
         cross_lag=np.asarray(sample_period * k),
         cross=both[k],
-        cross_bound=CONFIDENCE * float(np.sqrt(max(auto_e @ auto_u, 0.0) / n)),
+        cross_bound=float(norm.isf(FALSE_ALARMS / 2 / k.size)) * float(np.sqrt(max(auto_e @ auto_u, 0.0) / n)),
     )

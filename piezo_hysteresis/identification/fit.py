@@ -241,7 +241,8 @@ def _try(
 ) -> tuple[Model | None, float]:
     try:
         candidate = model.with_values(dict(zip(free, trial.tolist(), strict=True)))
-        return candidate, float(weighted(grams(candidate, records, (), nuisance), floors)[-1, -1])
+        left = residuals(candidate, records, nuisance)
+        return candidate, float(np.mean([e @ e / (e.size * f * f) for e, f in zip(left, floors, strict=True)]))
     except (DivergenceError, ParameterError):
         return None, np.inf
 
@@ -262,7 +263,7 @@ def _covariance(
         variance = e @ e / max(1.0, e.size - directions.shape[1] / len(records))
         meat += w * w * variance * colour(e) * (directions.T @ g.matrix[:-1, :-1] @ directions)
     scale = 1.0 / np.sqrt(np.clip(np.diag(bread), 1e-300, None))
-    inverse = np.linalg.pinv(bread * np.outer(scale, scale), rcond=1e-14, hermitian=True) * np.outer(scale, scale)
+    inverse = np.linalg.pinv(bread * np.outer(scale, scale), rcond=1e-10, hermitian=True) * np.outer(scale, scale)
     return np.asarray(directions @ inverse @ meat @ inverse @ directions.T)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from ..effects import Arx
+from ..effects import Arx, Place
 from ..errors import IdentificationError
 from ..model import Model
 from ..record import Record
@@ -24,7 +24,8 @@ ITERATIONS = 6
 
 def hysteresis_signals(model: Model, records: Sequence[Record], wanted: Collection[int]) -> Signals:
     """(w, y) of the records `wanted`: hysteresis output of the model, and normalised displacement."""
-    alone = Model((model[hysteresis_name(model)],), model.sample_period, model.voltage_scale)
+    before = tuple(e for e in model.effects if e.place < Place.DYNAMICS)
+    alone = Model(before, model.sample_period, model.voltage_scale)
     kept = carried(records, wanted)
     outputs = dict(zip(kept, alone.simulate([records[i] for i in kept]), strict=True))
     return [(outputs[i], np.array(records[i].displacement / model.displacement_scale)) for i in sorted(wanted)]

@@ -41,7 +41,9 @@ class Nuisance:
         rows = [np.ones(t.size)] if self.offset else []
         if self.hum_frequency is not None:
             for order in range(1, self.harmonics + 1):
-                if 2.2 * order * self.hum_frequency * record.sample_period < 1.0:
+                line = order * self.hum_frequency * record.sample_period
+                # a line that the sample period folds onto dc is averaged away, and would free the offset
+                if abs(line - round(line)) * record.size > 1.0:
                     angle = 2 * np.pi * order * self.hum_frequency * t
                     rows += [np.cos(angle), np.sin(angle)]
         return np.array(rows).reshape(len(rows), t.size)
@@ -55,8 +57,8 @@ class Gram:
     ----------
     size : int
         Number of samples.
-    matrix : (q + 1, q + 1) ndarray
-        Of the q sensitivities in the order asked for, and the residual last.
+    matrix : (q + k + 1, q + k + 1) ndarray
+        Of the q sensitivities in the order asked for, of k extra rows, and of the residual, which comes last.
     nuisance : (k,) ndarray
         Amplitudes of the nuisances at the present parameters.
     """
@@ -72,7 +74,11 @@ class Gram:
 
 
 def grams(
-    model: Model, records: Sequence[Record], wanted: Sequence[str] = (), nuisance: Nuisance | None = None
+    model: Model,
+    records: Sequence[Record],
+    wanted: Sequence[str] = (),
+    nuisance: Nuisance | None = None,
+    extra: Sequence[Array] | None = None,
 ) -> list[Gram]:
     """Inner products for every record.
 
@@ -86,14 +92,17 @@ def grams(
         Numbers of the model whose sensitivities enter, e.g. ``"creep.gamma"``.
     nuisance : Nuisance, optional
         Eliminated per record.
+    extra : sequence of (k, n) ndarray, optional
+        Further rows of every record, e.g. finite changes of the simulation.
     """
     nuisance = nuisance or Nuisance()
-    q = len(wanted)
+    q = len(wanted) + (len(extra[0]) if extra else 0)
     sums: list[Array] = []
     for index, part, y, slopes in model.linearise(records, wanted):
         record = records[index]
         residual = record.displacement[part] - y
-        rows = np.vstack((*(slopes[n] for n in wanted), residual, nuisance.rows(record, part)))
+        more = extra[index][:, part] if extra else np.empty((0, y.size))
+        rows = np.vstack((*(slopes[n] for n in wanted), more, residual, nuisance.rows(record, part)))
         product = rows @ rows.T
         if index == len(sums):
             sums.append(product)

@@ -1,0 +1,91 @@
+"""Scores on data that were not fitted, by cross-validation over records from inner products alone.
+
+With the inner products of every record at hand, leaving one out is one small linear solution: the parameters take the
+step that the other records ask for, and the record left out is judged with it. No record needs to be simulated again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..identification.normal_equations import Gram
+
+Array = NDArray[np.float64]
+
+RIDGE = 1e-9
+"""Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Score:
+    """How far records that were left out lie above their floor.
+
+    Parameters
+    ----------
+    ratios : (r,) ndarray
+        RMS residual over floor of every record, R.
+    step : (q,) ndarray
+        Linearised change of the parameters from all records.
+    """
+
+    ratios: Array
+    step: Array
+
+    @property
+    def excess(self) -> float:
+        """V: mean of R²; 1 is the floor."""
+        return float(np.mean(self.ratios**2))
+
+    @property
+    def logs(self) -> Array:
+        """ln max(1, R²) of every record: no bad record decides alone."""
+        return np.log(np.maximum(1.0, self.ratios**2))
+
+    @property
+    def cost(self) -> float:
+        """C: mean of `logs`."""
+        return float(self.logs.mean())
+
+    def better_than(self, other: Score) -> tuple[float, float]:
+        """Mean gain in C over `other`, and its standard error with records as units."""
+        gain = other.logs - self.logs
+        return float(gain.mean()), float(gain.std(ddof=1) / np.sqrt(gain.size)) if gain.size > 1 else np.inf
+
+
+def held_out(grams: Sequence[Gram], floors: Sequence[float], columns: Array) -> Score:
+    """Score of a model extended by `columns`, every record judged with parameters from the others.
+
+    Parameters
+    ----------
+    grams : sequence of Gram
+        Of the records, all over the same rows.
+    floors : sequence of float
+        Floor of every record [m].
+    columns : (rows, q) ndarray
+        Directions in which the parameters may move, as combinations of the rows of `grams`; the residual's row,
+        the last, is zero.
+    """
+    inner, cross, power = [], [], []
+    for gram, floor in zip(grams, floors, strict=True):
+        weight = 1.0 / (gram.size * floor * floor)
+        inner.append(weight * columns.T @ gram.matrix @ columns)
+        cross.append(weight * columns.T @ gram.matrix[:, -1])
+        power.append(weight * gram.matrix[-1, -1])
+    hessian, slope = sum(inner), sum(cross)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    squares = []
+    for h, g, e in zip(inner, cross, power, strict=True):
+        step = _solve(hessian - h, slope - g, scale) if len(grams) > 1 else _solve(hessian, slope, scale)
+        squares.append(max(0.0, e - 2.0 * step @ g + step @ h @ step))
+    return Score(np.sqrt(squares), _solve(hessian, slope, scale))
+
+
+def _solve(matrix: Array, right: Array, scale: Array) -> Array:
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    known = values > RIDGE * max(values[-1], 1e-300)
+    part = vectors[:, known]
+    return np.asarray(scale * (part @ ((part.T @ (scale * right)) / values[known])))

@@ -1,0 +1,209 @@
+"""Forward selection of missing effects: screen, refit the best, choose on records left out, add, repeat; know when to stop.
+
+Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 2014 for why discrepancy must be structured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects import CATALOGUE, Effect
+from ..model import Model
+from .candidates import Candidate, Evidence, alikeness, refit, screen
+from .held_out import Score
+
+Progress = Callable[[str, float], None]
+
+ADEQUATE = 1.5
+"""Mean R² up to which nothing is missing beyond noise."""
+LEAST_GAIN = 0.15
+"""Least gain in mean ln max(1, R²) for which an effect is accepted."""
+KEEPS = (0.8, 0.6)
+"""Share of V that may remain after the first accepted effect, and after further ones."""
+NAMED = 0.6
+"""Explained fraction of the gap from which a family is named."""
+REFITS = 6
+"""Candidates that are refitted jointly."""
+MOST = 3
+"""Effects at most."""
+ALIKE = 0.97
+"""|cos| of two signatures from which they count as one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """An effect that was not added, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Step:
+    """One turn of the selection.
+
+    Parameters
+    ----------
+    before : Score
+        Of the model without the effect.
+    best : Candidate
+        The best refit.
+    accepted : bool
+        Whether it was added.
+    rivals : tuple of Candidate
+        Refits that records left out cannot tell from the best.
+    rejected : tuple of Rejection
+        All others.
+    """
+
+    before: Score
+    best: Candidate
+    accepted: bool
+    rivals: tuple[Candidate, ...]
+    rejected: tuple[Rejection, ...]
+
+    @property
+    def confusable_with(self) -> tuple[str, ...]:
+        """Effects that would explain the same."""
+        return tuple(r.name for r in self.rivals)
+
+    @property
+    def member_certain(self) -> bool:
+        """True where no other member of the same family is a rival."""
+        return all(r.effect.family != self.best.effect.family for r in self.rivals)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Selection:
+    """Outcome of the forward selection.
+
+    Parameters
+    ----------
+    baseline : Model
+        What the selection began with.
+    model : Model
+        With all accepted effects.
+    score : Score
+        Of `model`.
+    steps : tuple of Step
+        In order; the last may not be accepted.
+    null : float
+        V that a perfect model would have.
+    """
+
+    baseline: Model
+    model: Model
+    score: Score
+    steps: tuple[Step, ...]
+    null: float
+
+    @property
+    def accepted(self) -> tuple[Step, ...]:
+        """The turns that added an effect."""
+        return tuple(s for s in self.steps if s.accepted)
+
+    def explained(self, score: Score) -> float:
+        """Share X of the gap of the baseline that a score has closed, 0 to 1."""
+        first = self.steps[0].before.excess if self.steps else self.score.excess
+        return explained(first, score.excess, self.null)
+
+
+def explained(before: float, after: float, null: float) -> float:
+    """X = 1 − √((V_after − V_null)/(V_before − V_null)), between 0 and 1."""
+    gap = before - null
+    return float(1.0 - np.sqrt(np.clip((after - null) / gap, 0.0, 1.0))) if gap > 0 else 1.0
+
+
+def select(
+    model: Model,
+    evidence: Evidence,
+    score: Score,
+    null: float,
+    effects: Collection[type[Effect]] = CATALOGUE,
+    progress: Progress | None = None,
+) -> Selection:
+    """Add effects while records left out ask for them.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted baseline.
+    evidence : Evidence
+        Records that fit and choose.
+    score : Score
+        Of the baseline.
+    null : float
+        V of a perfect model.
+    effects : collection of Effect classes
+        The library to choose from.
+    progress : callable, optional
+        Called with a word and the fraction done.
+    """
+    baseline, steps = model, list[Step]()
+    while score.excess > ADEQUATE and len(steps) < MOST:
+        step = _turn(model, evidence, score, effects, KEEPS[min(len(steps), 1)], progress)
+        if step is None:
+            break
+        steps.append(step)
+        if not step.accepted:
+            break
+        assert step.best.fit is not None
+        model, score, evidence = step.best.fit.model, step.best.score, step.best.evidence
+    return Selection(baseline, model, score, tuple(steps), null)
+
+
+def _turn(
+    model: Model,
+    evidence: Evidence,
+    before: Score,
+    effects: Collection[type[Effect]],
+    keeps: float,
+    progress: Progress | None,
+) -> Step | None:
+    def tell(word: str, fraction: float) -> None:
+        if progress is not None:
+            progress(word, fraction)
+
+    tell("score test of the catalogue", 0.0)
+    screened = screen(model, evidence, [e for e in effects if e.name not in model])
+    refits = []
+    for k, candidate in enumerate(screened[:REFITS]):
+        tell(f"refit with {candidate.name}", (k + 1) / (REFITS + 1))
+        result = refit(model, candidate)
+        if result is not None:
+            refits.append(result)
+    if not refits:
+        return None
+    refits.sort(key=lambda c: c.score.cost)
+    best = _simplest(refits)
+    rivals, rejected = [], []
+    gain = before.cost - best.score.cost
+    accepted = gain >= LEAST_GAIN and best.score.excess <= keeps * before.excess
+    for candidate in refits:
+        if candidate is best:
+            continue
+        lead, error = best.score.better_than(candidate.score)
+        alike = alikeness(best, candidate, model) if lead < 0.5 * gain else 0.0
+        if accepted and (lead < 2.0 * error or alike > ALIKE) and lead < 0.5 * gain:
+            rivals.append(candidate)
+        else:
+            rejected.append(Rejection(candidate.name, f"held-out score {lead:.2f} ± {error:.2f} behind {best.name}"))
+    rejected += [
+        Rejection(c.name, f"score test: at most {max(0.0, before.cost - c.score.cost):.2f} of held-out gain")
+        for c in screened[REFITS:]
+    ]
+    if not accepted:
+        reason = f"closest, but held-out gain {gain:.2f} and remaining V {best.score.excess / before.excess:.2f} do not suffice"
+        rejected.insert(0, Rejection(best.name, reason))
+    return Step(before, best, accepted, tuple(rivals), tuple(rejected))
+
+
+def _simplest(refits: list[Candidate]) -> Candidate:
+    """The refit with the fewest numbers among those that are as good as the best."""
+    best = refits[0]
+    assert best.fit is not None
+    ties = [c for c in refits if c is best or c.score.cost - best.score.cost < 0.02]
+    return min(ties, key=lambda c: (len(c.fit.names) if c.fit else 0, c.score.cost))
