@@ -24,8 +24,11 @@ def thinned(values: NDArray[np.float64], points: int = 1200) -> NDArray[np.intp]
     """
     if values.size <= points:
         return np.arange(values.size)
-    stretch = -(-2 * values.size // (points - 2))
+    stretch = -(-2 * values.size // (points - 4))
     whole = values.size // stretch
     rows = values[: whole * stretch].reshape(whole, stretch)
     first = stretch * np.arange(whole)
-    return np.unique(np.concatenate(([0], first + rows.argmin(axis=1), first + rows.argmax(axis=1), [values.size - 1])))
+    rest = values[whole * stretch :]
+    tail = whole * stretch + np.array([rest.argmin(), rest.argmax()]) if rest.size else np.empty(0, dtype=np.intp)
+    ends = np.array([0, values.size - 1])
+    return np.unique(np.concatenate((ends, first + rows.argmin(axis=1), first + rows.argmax(axis=1), tail)))

@@ -1,0 +1,157 @@
+"""The page: one file, nothing from outside, readable by machine, keyboard and eye; verdict first."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from base64 import b64decode
+from html.parser import HTMLParser
+
+import pytest
+
+from piezo_hysteresis.errors import RecordingError
+from piezo_hysteresis.report.verdict import verdict
+
+VOID = {"meta", "img", "br", "link", "hr"}
+
+
+class Tags(HTMLParser):
+    """Every tag with its attributes; refuses what is not closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str]]] = []
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        self.found.append((tag, {k: v or "" for k, v in attributes}))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.found if name == tag]
+
+
+@pytest.fixture(scope="module")
+def tags(drawn):
+    return Tags(drawn.html)
+
+
+def test_needs_no_other_file_and_no_network(drawn, tags):
+    links = [a[key] for _, a in tags.found for key in ("src", "href", "srcset", "action", "data") if key in a]
+    assert all(link.startswith(("#", "data:")) for link in links)
+    assert not tags.all("script")
+    assert not tags.all("link")
+    assert "url(" not in drawn.html
+    assert "@import" not in drawn.html
+
+
+def test_every_figure_is_there_with_words_and_numbers(drawn, tags):
+    images = tags.all("img")
+    assert len(images) == len(drawn.drawings) >= 10
+    assert all(len(a["alt"]) > 40 for a in images)
+    names = {d.name for d in drawn.drawings}
+    assert {a["download"].removesuffix(".csv") for a in tags.all("a") if "download" in a} == names
+    assert {"loops_by_amplitude", "time_series", "residual_maps", "residual_spectrum", "bode", "step", "creep"} <= names
+
+
+def test_structure_can_be_heard(tags):
+    assert tags.all("html")[0]["lang"] == "en"
+    headings = [int(tag[1]) for tag, _ in tags.found if re.fullmatch("h[1-6]", tag)]
+    assert headings[0] == 1
+    assert headings.count(1) == 1
+    assert all(b <= a + 1 for a, b in zip(headings, headings[1:], strict=False))
+    names = [a["id"] for _, a in tags.found if "id" in a]
+    assert len(names) == len(set(names))
+    assert {a["href"][1:] for a in tags.all("a") if a.get("href", "").startswith("#")} <= set(names)
+    assert {a["aria-labelledby"] for _, a in tags.found if "aria-labelledby" in a} <= set(names)
+    assert len(tags.all("caption")) == len(tags.all("table"))
+    assert all("scope" in a for a in tags.all("th"))
+
+
+def test_the_verdict_comes_first_and_in_words(drawn, tags):
+    assert drawn.html.index('id="verdict"') < drawn.html.index("<img")
+    assert "Missing effect: creep" in tags.words
+    assert any("from 0.72 % to 0.04 % of range" in w for w in tags.words)
+
+
+def test_what_was_given_is_text_and_never_markup(drawn, tags):
+    assert "phases <named> by their drive" in tags.words
+    assert "loses <0.4> on held-out phases" in tags.words
+    assert "A stage & its model" in tags.words
+
+
+def test_a_recording_without_a_model_says_so(bare):
+    assert verdict(bare).headline == "The recording, without a model"
+
+
+def test_saves_every_figure_with_its_data_the_same_as_in_the_page(drawn, saved):
+    written = {p.name for p in saved.with_name("page_figures").iterdir()}
+    assert written == {f"{d.name}.{kind}" for d in drawn.drawings for kind in ("svg", "png", "csv")}
+    inside = re.findall(r"data:image/svg\+xml;base64,([^\"]+)", drawn.html)
+    for drawing, text in zip(drawn.drawings, inside, strict=True):
+        file = saved.with_name("page_figures") / f"{drawing.name}.svg"
+        assert b64decode(text).decode() == file.read_text(encoding="utf-8")
+
+
+def test_a_place_that_cannot_be_written_is_told(drawn, saved):
+    with pytest.raises(RecordingError, match="expected a folder"):
+        drawn.save(saved / "in_a_file.html")
+
+
+@pytest.mark.parametrize(
+    ("change", "headline"),
+    [
+        ({"verdict": "nothing_missing", "effects": []}, "Nothing is missing beyond the noise"),
+        ({"verdict": "unknown", "effects": []}, "Something is missing, but it cannot be named"),
+    ],
+)
+def test_each_verdict_has_its_headline(comparison, answer, change, headline):
+    assert verdict(comparison, {**answer, **change}).headline == headline
+
+
+def test_without_a_diagnosis_the_verdict_tells_error_floor_and_worst_phase(comparison):
+    said = verdict(comparison)
+    now = comparison.now
+    assert said.headline == f"The model predicts this experiment to {now.percent:.2g} % of range"
+    assert any("floor" in s for s in said.sentences)
+    assert any("Before" in s for s in said.sentences)
+
+
+PROBE = """<script>
+addEventListener("load", () => {
+  const seen = i => i.complete && i.naturalWidth > 100 && i.getBoundingClientRect().width > 100;
+  const images = [...document.images].map(seen);
+  const focusable = [...document.querySelectorAll("a[href], [tabindex='0']")];
+  const reached = focusable.filter(e => (e.focus(), document.activeElement === e));
+  const wide = document.documentElement.scrollWidth > innerWidth;
+  document.title = JSON.stringify({images, reached: reached.length, wide});
+});
+</script></body>"""
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium on this machine")
+def test_a_browser_shows_every_figure_and_reaches_every_link_by_keyboard(drawn, tags, tmp_path):
+    probed = tmp_path / "probed.html"
+    probed.write_text(drawn.html.replace("</body>", PROBE), encoding="utf-8")
+    command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}/profile"]
+    command += ["--window-size=500,900", "--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom"]
+    done = subprocess.run([*command, probed.as_uri()], capture_output=True, text=True, timeout=120, check=True)
+    assert "CONSOLE" not in done.stderr
+    title = re.search("<title>(.*?)</title>", done.stdout)
+    told = json.loads(title[1].replace("&quot;", '"'))
+    assert told["images"] == [True] * len(drawn.drawings)
+    links = len(tags.all("a")) + sum(a.get("tabindex") == "0" for _, a in tags.found)
+    assert told["reached"] == links
+    assert not told["wide"], "nothing scrolls sideways but the tables in their own frame"
