@@ -8,7 +8,7 @@ RUN := scripts/run
 setup: install/.built                 ## .venv with ROS 2 and all dependencies, and the colcon build
 demo: setup ; @$(RUN) python examples/demo $(DEMO)
 test: setup ; @$(RUN) python -m pytest $(TEST)
-lint: setup ; @$(RUN) scripts/lint
+lint: setup ; @scripts/lint
 bench: setup ; @$(RUN) python -m benchmarks $(BENCH)
 bench-naming: setup ; @$(RUN) python -m benchmarks.naming $(BENCH)
 soak: setup ; @$(RUN) python -m benchmarks.soak $(SOAK)

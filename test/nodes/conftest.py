@@ -24,15 +24,19 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.nodes.conversions import SampleBlock, command_to_cloud, samples_from_cloud, values_of
-from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
+from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS, LATCHED
 from piezo_hysteresis.nodes.stage_lock import StageLock
 
-PATIENCE = 30.0
+PATIENCE = 60.0
+
+DEEP = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
+"""A test that is kept waiting by a busy machine shall not lose blocks on its own account."""
 
 
 class NodeProcess:
@@ -89,11 +93,22 @@ class Samples:
     @property
     def lost(self) -> int:
         """Samples that the jumps of the index tell of, never measured or lost on the way."""
-        return int((np.diff(self.index.astype(np.int64)) - 1).sum())
+        return int((np.diff(self.place()) - 1).sum())
 
-    def of_phase(self, number: int) -> np.ndarray:
-        """Voltages of one phase [V]."""
-        return self.voltage[self.phase == number]
+    def place(self) -> np.ndarray:
+        """Number of every sample, int64."""
+        return self.index.astype(np.int64)
+
+    def steepest(self, sample_period: float) -> float:
+        """Steepest change of the voltage between two samples that came in [V/s]."""
+        return float((np.abs(np.diff(self.voltage)) / np.diff(self.place())).max()) / sample_period
+
+    def played(self, waveform: np.ndarray, first: int, number: int) -> bool:
+        """True where phase `number` is the waveform from index `first` on, but for samples that were lost."""
+        inside = self.phase == number
+        at = self.place()[inside] - first
+        whole = inside.sum() + self.lost >= len(waveform)
+        return whole and np.array_equal(self.voltage[inside], np.asarray(waveform)[at])
 
 
 class Lab:
@@ -170,7 +185,7 @@ class Lab:
     def samples(self, topic: str = "samples") -> Samples:
         """Blocks of a topic, from now on."""
         samples = Samples()
-        self.node.create_subscription(PointCloud2, topic, samples.take, SAMPLES)
+        self.node.create_subscription(PointCloud2, topic, samples.take, DEEP)
         return samples
 
     def streaming(self, topic: str = "samples") -> Samples:
@@ -190,6 +205,12 @@ class Lab:
     def states(statuses: list[DiagnosticStatus], name: str) -> list[str]:
         """The states that a command went through, in order."""
         return [values_of(status)["state"] for status in list(statuses) if status.name == name]
+
+    @staticmethod
+    def value(statuses: list[DiagnosticStatus], name: str, state: str, key: str) -> int:
+        """A value of the status that a command had in a state."""
+        found = [values_of(status) for status in list(statuses) if status.name == name]
+        return int(next(values[key] for values in found if values["state"] == state))
 
     def diagnostics(self) -> list[DiagnosticArray]:
         return self.listen(DiagnosticArray, "/diagnostics", 10)
