@@ -18,6 +18,7 @@ from pathlib import Path
 from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
 from piezo_hysteresis.nodes.back_ends import BACK_ENDS
 from piezo_hysteresis.nodes.driver_settings import DRIVER, IN_FORCE
+from piezo_hysteresis.nodes.identification_node import IDENTIFICATION
 from piezo_hysteresis.nodes.model_node import MODEL
 from piezo_hysteresis.nodes.parameters import Row, Setting
 from piezo_hysteresis.parameter import Parameter
@@ -124,11 +125,23 @@ def driver() -> str:
     return settings((*DRIVER, *behind))
 
 
+def from_ros(heading: str) -> str:
+    """The table under a heading of docs/ros.md, which the README repeats."""
+    after = (DOCS / "ros.md").read_text().split(f"\n## {heading}\n", 1)[1]
+    lines = after.splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("|"))
+    last = next(i for i in range(first, len(lines)) if not lines[i].startswith("|"))
+    return "\n".join(lines[first:last]) + "\n"
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "parameters": parameters,
     "driver": driver,
     "in_force": lambda: settings(replace(row, name=f"in_force.{row.name}") for row in IN_FORCE),
     "model_node": lambda: settings(MODEL),
+    "identification_node": lambda: settings(IDENTIFICATION),
+    "topics": lambda: from_ros("Topics"),
+    "services": lambda: from_ros("Services"),
     "plant": lambda: settings(PlantParameters.table()),
 }
 

@@ -1,0 +1,110 @@
+"""What the pages say holds: code blocks run, commands and links exist, generated tables are those of the code.
+
+Blocks marked ``sh`` and ``python`` run in the order of the page, in one folder; a command that another page has run
+there already is not run again. Blocks marked ``console`` need a ROS 2 installation, root, or minutes: what they name
+must exist.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)#\s]+)(?:#[^)]*)?\)")
+
+
+def blocks(page, *kinds):
+    return [(kind, text) for kind, text in BLOCK.findall(page.read_text()) if kind in kinds]
+
+
+def name(page):
+    return str(page.relative_to(ROOT))
+
+
+runnable = [page for page in PAGES if blocks(page, "sh", "python") and page.name != "CONTRIBUTING.md"]
+
+
+class Workshop:
+    """A folder in which the pages are followed."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self._done = set()
+        piezo = folder / "bin" / "piezo"
+        piezo.parent.mkdir()
+        piezo.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m piezo_hysteresis.cli.main "$@"\n')
+        piezo.chmod(0o755)
+        paths = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+        self._environment = {**os.environ, "PATH": f"{piezo.parent}:{os.environ['PATH']}", "PYTHONPATH": paths}
+
+    def shell(self, text):
+        for command in text.replace("\\\n", " ").splitlines():
+            if not command.strip() or command in self._done:
+                continue
+            done = subprocess.run(
+                ["sh", "-euc", command],
+                cwd=self.folder,
+                env=self._environment,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert done.returncode == 0, f"$ {command}\n{done.stdout}{done.stderr}"
+            self._done.add(command)
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory):
+    return Workshop(tmp_path_factory.mktemp("workshop"))
+
+
+@pytest.mark.parametrize("page", runnable, ids=name)
+def test_code_blocks_run(page, workshop, monkeypatch):
+    monkeypatch.chdir(workshop.folder)
+    namespace = {"__name__": "page"}
+    for kind, text in blocks(page, "sh", "python"):
+        if kind == "sh":
+            workshop.shell(text)
+        else:
+            exec(compile(text, f"{name(page)}: python block", "exec"), namespace)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_somewhere(page):
+    dead = [to for to in LINK.findall(page.read_text()) if "://" not in to and not (page.parent / to).exists()]
+    assert not dead
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "console")], ids=name)
+def test_console_blocks_name_what_exists(page):
+    text = "\n".join(text for _, text in blocks(page, "console"))
+    targets = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)[1].split()
+    for target in re.findall(r"^make (\S+)", text, re.MULTILINE):
+        assert target in targets
+    scripts = re.findall(r"(\w+) = \{NAME\}", (ROOT / "setup.py").read_text())
+    for executable in re.findall(r"ros2 run piezo_hysteresis (\S+)", text):
+        assert executable in scripts
+    for file in re.findall(r"ros2 launch piezo_hysteresis (\S+)", text):
+        assert (ROOT / "launch" / file).exists()
+    for file in re.findall(r"\b((?:config|examples|docs|benchmarks|scripts)/[\w./]+)", text):
+        assert (ROOT / file).exists(), file
+
+
+def test_what_is_generated_is_that_of_the_code():
+    done = subprocess.run(
+        [sys.executable, ROOT / "docs" / "generate.py", "--check"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_every_command_behind_a_figure_exists():
+    rows = re.findall(r"\| `scripts/run python (\S+)` \|", (ROOT / "README.md").read_text())
+    assert rows
+    for file in rows:
+        assert (ROOT / file).exists(), file
