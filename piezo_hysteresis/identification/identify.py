@@ -114,9 +114,7 @@ def identify(
             tell(word, 0.3 + 0.6 * part)
 
         def fit_behind(model: Model, samples: int) -> tuple[Fit, Dynamics, tuple[Notice, ...]]:
-            return fit_dynamics(
-                model, records, floors, roles.fitted, roles.loops, roles.broadband, samples, chosen, joint_progress
-            )
+            return fit_dynamics(model, records, floors, roles.fitted, roles.broadband, samples, chosen, joint_progress)
 
         joint, dynamics, told = fit_behind(start, samples)
         if delay is None:

@@ -13,7 +13,7 @@ from ..record import Notice, Record
 from .carried import select
 from .dynamics import Dynamics
 from .fit import Fit, Progress, fit
-from .hysteresis import LOOP, fit_hysteresis, hysteresis_name
+from .hysteresis import LOOP, hysteresis_name
 from .linear_start import dynamics_behind, dynamics_of, follower, with_dynamics
 from .normal_equations import Nuisance, residuals
 
@@ -89,7 +89,6 @@ def fit_dynamics(
     records: Sequence[Record],
     floors: Sequence[float],
     fitted: Collection[int],
-    loops: Collection[int],
     broadband: Collection[int],
     delay: int,
     orders: tuple[int, int],
@@ -105,8 +104,8 @@ def fit_dynamics(
         The experiment, in order.
     floors : sequence of float
         Floor of every record [m].
-    fitted, loops, broadband : collection of int
-        Indices of the records of the joint fit, of those with slow loops, and of those for the start.
+    fitted, broadband : collection of int
+        Indices of the records of the joint fit, and of those for its start.
     delay : int
         d, samples.
     orders : (int, int)
@@ -126,14 +125,13 @@ def fit_dynamics(
     longest = max(records[i].duration for i in fitted)
     tried: list[tuple[Fit, Dynamics]] = []
     for order in _ladder(orders):
-        start, dynamics = _start(model, records, floors, loops, broadband, delay, order)
+        start, dynamics = _start(model, records, floors, broadband, delay, order)
         joint = fit_joint(start, records, floors, fitted, progress)
-        tried.append((joint, dynamics))
         if joint.converged and _slowest(joint.model) < SLOWEST_POLE * longest:
             break
+        tried.append((joint, dynamics))
     else:
-        tried.sort(key=lambda outcome: outcome[0].cost)
-    joint, dynamics = tried[-1] if len(tried) < len(_ladder(orders)) else tried[0]
+        joint, dynamics = min(tried, key=lambda outcome: outcome[0].cost)
     used = dynamics_of(joint.model)
     reached = used.array("a").size, used.array("b").size
     notices = dynamics.notices
@@ -156,23 +154,17 @@ def _start(
     model: Model,
     records: Sequence[Record],
     floors: Sequence[float],
-    loops: Collection[int],
     broadband: Collection[int],
     delay: int,
     orders: tuple[int, int],
 ) -> tuple[Model, Dynamics]:
-    """Start of the joint fit: the best of ARX behind the hysteresis, ARX behind it refitted, and one pole."""
-    candidates = [model.with_effect(follower(model, delay, orders))]
+    """Start of the joint fit, the better of ARX behind the hysteresis and one pole; and the ARX."""
     dynamics = dynamics_behind(model, records, broadband, delay, orders)
+    candidates = [model.with_effect(follower(model, delay, orders))]
     try:
         candidates.append(with_dynamics(model, dynamics.arx))
-        # The loops again, now behind the lag that the dynamics show, and the dynamics behind these loops.
-        model = fit_hysteresis(candidates[-1], records, loops).model
-        again = dynamics_behind(model, records, broadband, delay, orders)
-        candidates.append(with_dynamics(model, again.arx))
-        dynamics = again
     except IdentificationError:
-        pass
+        return candidates[0], dynamics
     kept, sizes = select(records, floors, broadband)
 
     def cost(candidate: Model) -> float:

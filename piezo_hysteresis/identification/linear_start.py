@@ -16,9 +16,8 @@ from ..model import Model
 from ..record import Record
 from .carried import carried
 from .dynamics import Dynamics, Signals, identify_arx
-from .hysteresis import hysteresis_name
 
-ITERATIONS = 6
+ITERATIONS = 3
 """Steiglitz-McBride iterations of the start."""
 
 
