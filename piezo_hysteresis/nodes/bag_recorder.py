@@ -8,12 +8,14 @@ from pathlib import Path
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
 
 from ..errors import RecordingError
 from ..recording import BagWriter
-from .quality import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
+from .conversions import samples_from_cloud
+from .quality import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES
 
 TOPICS = {
     "samples": (PointCloud2, SAMPLES),
@@ -34,9 +36,6 @@ TOPICS = {
     "/diagnostics": (DiagnosticArray, QoSProfile(depth=10)),
 }
 """Topics of an axis: type and quality of service."""
-
-DEPTH = 1000
-"""Depth of the subscriptions: ten seconds of blocks while the disk stalls."""
 
 
 class BagRecorder:
@@ -68,12 +67,20 @@ class BagRecorder:
         self.counts = dict.fromkeys(TOPICS, 0)
         self.failure: RecordingError | None = None
         self._last = time.monotonic()
+        self._newest = b""
         self._subscriptions = [self._subscribe(name) for name in TOPICS]
 
     @property
     def silence(self) -> float:
         """Time since the last block of samples [s]."""
         return time.monotonic() - self._last
+
+    def holds(self, index: int) -> bool:
+        """True where the newest sample written is number `index` (modulo 2³²) or a later one."""
+        if not self._newest:
+            return False
+        newest = int(samples_from_cloud(deserialize_message(self._newest, PointCloud2)).index[-1])
+        return (newest - index) % 2**32 < 2**31
 
     def close(self) -> None:
         """End the bag; harmless when repeated."""
@@ -91,7 +98,7 @@ class BagRecorder:
             reliable=quality.reliability == ReliabilityPolicy.RELIABLE,
             transient_local=quality.durability == DurabilityPolicy.TRANSIENT_LOCAL,
         )
-        deep = QoSProfile(depth=DEPTH, reliability=quality.reliability, durability=quality.durability)
+        deep = QoSProfile(depth=DEEP.depth, reliability=quality.reliability, durability=quality.durability)
 
         def write(message: bytes) -> None:
             self._write(name, topic, message)
@@ -100,7 +107,7 @@ class BagRecorder:
 
     def _write(self, name: str, topic: str, message: bytes) -> None:
         if name == "samples":
-            self._last = time.monotonic()
+            self._last, self._newest = time.monotonic(), message
         if self.failure is not None:
             return
         try:

@@ -18,9 +18,6 @@ from .driver_link import DriverLink
 PATIENCE = 30.0
 """Longest wait for the driver, for an answer, and for samples [s]."""
 
-TAIL = 0.3
-"""Recorded after the last phase, so that nothing of it is still on the way [s]."""
-
 
 @dataclass(frozen=True, slots=True)
 class Progress:
@@ -90,9 +87,9 @@ def campaign(node: Node, driver: DriverLink, plan: Callable[[DriveLimits], Proto
             )
             yield from _play(driver, recorder, phase, told)
             done += phase.duration
-        end = time.monotonic() + TAIL
-        while time.monotonic() < end:
-            yield Progress("running", str(path), 1.0)
+        # what is written lags behind the status while the computer is busy
+        end = driver.first_index + protocol.phases[-1].voltage.size
+        yield from _until(lambda: recorder.holds(end), lambda: "the last samples")
         finished = True
     finally:
         recorder.close()
@@ -104,7 +101,7 @@ def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Iterato
     deadline = time.monotonic() + PATIENCE
     while not condition():
         if time.monotonic() > deadline:
-            raise StageError(f"waited {PATIENCE:g} s in vain for {missing()}; nothing moves")
+            raise StageError(f"waited {PATIENCE:g} s in vain for {missing()}")
         yield Progress("waiting", f"for {missing()}")
 
 

@@ -42,12 +42,15 @@ class DriverLink:
         What the driver accepts; None while there is no configured driver.
     state, reason : str
         Fate of the last phase sent: ``sent``, ``accepted``, ``playing``, ``done``, ``refused`` or ``stopped``.
+    first_index : int
+        Index of its first sample, once it plays.
     """
 
     def __init__(self, node: Node, driver: str) -> None:
         self._node, self._driver = node, driver
         self.limits: DriveLimits | None = None
         self.state = self.reason = ""
+        self.first_index = 0
         self._sent: tuple[str, str] | None = None
         self._newest: float | None = None
         self._pending: Future | None = None
@@ -116,3 +119,4 @@ class DriverLink:
         values = values_of(status)
         if self._sent == (status.name, values.get("stamp")):
             self.state, self.reason = values.get("state", ""), status.message
+            self.first_index = int(values.get("first_index", self.first_index))

@@ -27,7 +27,7 @@ from .model_diagnostics import ModelDiagnostics
 from .model_topics import ModelTopics
 from .parameters import Row, Setting, declare, read
 from .process import run
-from .quality import LATCHED, SAMPLES
+from .quality import DEEP, LATCHED
 
 _SOURCE = "model node"
 
@@ -58,7 +58,7 @@ class ModelNode(Node):
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._apply)
         self.create_subscription(String, "model", self._on_model, LATCHED)
-        self.create_subscription(PointCloud2, "samples", self._on_samples, SAMPLES)
+        self.create_subscription(PointCloud2, "samples", self._on_samples, DEEP)
         self.create_service(Trigger, "~/zero", self._on_zero)
 
     def _on_samples(self, cloud: PointCloud2) -> None:

@@ -15,3 +15,6 @@ COMMAND_STATUS = QoSProfile(
     depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 """`command_status`: a late joiner gets the last ten."""
+
+DEEP = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+"""Subscriptions that must not miss a block while the machine is busy: ten seconds of blocks of 10 ms."""
