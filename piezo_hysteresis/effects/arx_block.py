@@ -36,15 +36,15 @@ def padded(coefficients: Array) -> Array:
 @kernel
 def weigh(x, taps, y):
     """y_i = Σ_k taps_k x_(i + K − k) with K + 1 taps, a multiple of `ORDER`; x (n + K,), y (n,)."""
-    last = taps.size - 1
+    y[:] = 0.0
     for k in range(0, taps.size, 8):
         t0, t1, t2, t3 = taps[k], taps[k + 1], taps[k + 2], taps[k + 3]
         t4, t5, t6, t7 = taps[k + 4], taps[k + 5], taps[k + 6], taps[k + 7]
-        j = last - k
+        past = x[taps.size - 8 - k :]  # indices from zero: a negative one would count from the end, and cost the check
         for i in range(y.size):
-            near = (t0 * x[i + j] + t1 * x[i + j - 1]) + (t2 * x[i + j - 2] + t3 * x[i + j - 3])
-            far = (t4 * x[i + j - 4] + t5 * x[i + j - 5]) + (t6 * x[i + j - 6] + t7 * x[i + j - 7])
-            y[i] = near + far if k == 0 else y[i] + (near + far)
+            near = (t0 * past[i + 7] + t1 * past[i + 6]) + (t2 * past[i + 5] + t3 * past[i + 4])
+            far = (t4 * past[i + 3] + t5 * past[i + 2]) + (t6 * past[i + 1] + t7 * past[i])
+            y[i] += near + far
 
 
 @kernel
@@ -96,18 +96,15 @@ def arx_slopes(by_x, by_y, na, taps_slope, interpolation, rows):
     """
     n, last = rows.shape[1], taps_slope.size - 1
     for j in range(na):
+        past = by_y[na - 1 - j :]
         for i in range(n):
-            rows[j, i] = -by_y[na - 1 - j + i]
+            rows[j, i] = -past[i]
     for j in range(rows.shape[0] - na - 1):
+        past = by_x[last - 3 - j :]
         row = rows[na + j]
-        if interpolation[0] == 0.0 and interpolation[1] == 1.0:
-            for i in range(n):
-                row[i] = by_x[last - 1 - j + i]
-        else:
-            for i in range(n):
-                near = interpolation[0] * by_x[last - j + i] + interpolation[1] * by_x[last - j - 1 + i]
-                far = interpolation[2] * by_x[last - j - 2 + i] + interpolation[3] * by_x[last - j - 3 + i]
-                row[i] = near + far
+        for i in range(n):
+            near = interpolation[0] * past[i + 3] + interpolation[1] * past[i + 2]
+            row[i] = near + (interpolation[2] * past[i + 1] + interpolation[3] * past[i])
     weigh(by_x, taps_slope, rows[rows.shape[0] - 1])
 
 

@@ -91,7 +91,10 @@ class MemorylessBlock(Block):
         return None
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        return self.value(x), np.vstack((self.slope(x) * dx, self.by_parameter(x))), None, None
+        rows = np.empty((len(dx) + len(self.names), x.size))
+        np.multiply(self.slope(x), dx, out=rows[: len(dx)])
+        rows[len(dx) :] = self.by_parameter(x)
+        return self.value(x), rows, None, None
 
 
 class SumBlock(Block):

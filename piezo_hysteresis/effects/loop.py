@@ -29,7 +29,7 @@ def decay(r, length):
     """(1 − e^(−r·length))/r, also for small r."""
     x = r * length
     if abs(x) < 0.02:
-        return length * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x / 720.0)))))
+        return length * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0))))))
     return -expm1(-x) / r
 
 

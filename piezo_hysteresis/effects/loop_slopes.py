@@ -35,7 +35,7 @@ def decay_slope(r, length):
     """∂decay/∂r."""
     x = r * length
     if abs(x) < 0.02:
-        return -length * length * (0.5 - x * (1.0 / 3.0 - x * (1.0 / 8.0 - x * (1.0 / 30.0 - x / 144.0))))
+        return -length * length * (0.5 - x * (1.0 / 3.0 - x * (1.0 / 8.0 - x * (1.0 / 30.0 - x * (1.0 / 144.0)))))
     return (length * exp(-x) - decay(r, length)) / r
 
 
