@@ -4,295 +4,48 @@ from __future__ import annotations
 
 import os
 import random
-import signal
-import subprocess
-import sys
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+
+import pytest
 
 os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "SHM")
 
-import numpy as np
-import pytest
-import rclpy
-import yaml
-from ament_index_python.packages import PackageNotFoundError, get_package_prefix
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from lifecycle_msgs.srv import ChangeState, GetState
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import String
-
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.nodes.conversions import SampleBlock, command_to_cloud, samples_from_cloud, values_of
-from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS, LATCHED
 from piezo_hysteresis.nodes.stage_lock import StageLock
 
-PATIENCE = 60.0
-
-DEEP = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
-"""A test that is kept waiting by a busy machine shall not lose blocks on its own account."""
+from .lab import Lab
 
 
-class NodeProcess:
-    """A node of the package as a process, its output in a file."""
-
-    def __init__(self, command: list[str], environment: dict[str, str], log: Path) -> None:
-        self._log = log
-        with log.open("wb") as output:
-            self._process = subprocess.Popen(command, env=environment, stdout=output, stderr=subprocess.STDOUT)
-        self.pid = self._process.pid
-
-    @property
-    def output(self) -> str:
-        return self._log.read_text(errors="replace")
-
-    @property
-    def is_running(self) -> bool:
-        return self._process.poll() is None
-
-    def signal(self, number: signal.Signals) -> None:
-        self._process.send_signal(number)
-
-    def wait(self, timeout: float = PATIENCE) -> int:
-        return self._process.wait(timeout)
-
-    def end(self) -> None:
-        if self.is_running:
-            self.signal(signal.SIGCONT)
-            self.signal(signal.SIGINT)
-            try:
-                self.wait(10.0)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
-
-
-class Samples:
-    """Everything that came in on a topic like `samples`, in order."""
-
-    def __init__(self) -> None:
-        self.blocks: list[SampleBlock] = []
-
-    def take(self, cloud: PointCloud2) -> None:
-        self.blocks.append(samples_from_cloud(cloud))
-
-    def __getattr__(self, name: str) -> np.ndarray:
-        return np.concatenate([getattr(block, name) for block in list(self.blocks)])
-
-    @property
-    def newest(self) -> SampleBlock:
-        """The last block."""
-        return self.blocks[-1]
-
-    @property
-    def lost(self) -> int:
-        """Samples that the jumps of the index tell of, never measured or lost on the way."""
-        return int((np.diff(self.place()) - 1).sum())
-
-    def place(self) -> np.ndarray:
-        """Number of every sample, int64."""
-        return self.index.astype(np.int64)
-
-    def steepest(self, sample_period: float) -> float:
-        """Steepest change of the voltage between two samples that came in [V/s]."""
-        return float((np.abs(np.diff(self.voltage)) / np.diff(self.place())).max()) / sample_period
-
-    def played(self, waveform: np.ndarray, first: int, number: int) -> bool:
-        """True where phase `number` is the waveform from index `first` on, but for samples that were lost."""
-        inside = self.phase == number
-        at = self.place()[inside] - first
-        whole = inside.sum() + self.lost >= len(waveform)
-        return whole and np.array_equal(self.voltage[inside], np.asarray(waveform)[at])
-
-
-class Lab:
-    """A node of the test's own in a thread, and the processes that it has started."""
-
-    def __init__(self, domain: int, folder: Path) -> None:
-        self.domain, self.folder = domain, folder
-        self.processes: list[NodeProcess] = []
-        self._added: list[Any] = []
-        self._context = rclpy.Context()
-        rclpy.init(context=self._context, domain_id=domain)
-        self.node = Node("lab", context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
-        self._thread.start()
-
-    def start(
-        self,
-        executable: str,
-        *arguments: str,
-        namespace: str = "",
-        environment: dict[str, str] | None = None,
-        **parameters: Any,
-    ) -> NodeProcess:
-        """Start ``driver_node``, ``model_node`` or ``identification_node``; '__' in a parameter name means '.'."""
-        number = len(self.processes)
-        values = {name.replace("__", "."): value for name, value in parameters.items()}
-        file = self.folder / f"parameters_{number}.yaml"
-        file.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}) if values else "")
-        ros = ["--ros-args", *(["--params-file", str(file)] if values else [])]
-        if namespace:
-            ros += ["-r", f"__ns:={namespace}"]
-        full = {
-            **os.environ,
-            "ROS_DOMAIN_ID": str(self.domain),
-            "ROS_LOG_DIR": str(self.folder),
-            "XDG_RUNTIME_DIR": str(self.folder),
-            **(environment or {}),
-        }
-        command = [*_command(executable), *ros, *arguments]
-        process = NodeProcess(command, full, self.folder / f"{executable}_{number}.log")
-        self.processes.append(process)
-        return process
-
-    def driver(self, *arguments: str, namespace: str = "", **parameters: Any) -> NodeProcess:
-        """Start a driver that does not wait long for another one."""
-        return self.start("driver_node", *arguments, namespace=namespace, **{"discovery_time": 0.1, **parameters})
-
-    def add(self, kind: type[Node], **parameters: Any) -> Any:
-        """A node with `end`, in the process and the thread of the test's own."""
-        overrides = [rclpy.Parameter(name.replace("__", "."), value=value) for name, value in parameters.items()]
-        node = kind(context=self._context, parameter_overrides=overrides)
-        self._executor.add_node(node)
-        self._added.append(node)
-        return node
-
-    def wait(self, condition: Callable[[], Any], what: str, timeout: float = PATIENCE) -> Any:
-        """Wait until a condition holds and return its value; fail with the logs of the processes otherwise."""
-        deadline = time.monotonic() + timeout
-        while not (value := condition()):
-            if time.monotonic() > deadline:
-                logs = "\n".join(process.output for process in self.processes)
-                pytest.fail(f"waited {timeout:g} s in vain for {what}\n{logs}")
-            time.sleep(0.005)
-        return value
-
-    def listen(self, kind: type, topic: str, quality: Any = COMMAND) -> list:
-        """A list that fills with the messages of a topic."""
-        messages: list = []
-        self.node.create_subscription(kind, topic, messages.append, quality)
-        return messages
-
-    def samples(self, topic: str = "samples") -> Samples:
-        """Blocks of a topic, from now on."""
-        samples = Samples()
-        self.node.create_subscription(PointCloud2, topic, samples.take, DEEP)
-        return samples
-
-    def streaming(self, topic: str = "samples") -> Samples:
-        """Blocks of a topic, once the first one has come."""
-        samples = self.samples(topic)
-        self.wait(lambda: samples.blocks, f"the first block of {topic}")
-        return samples
-
-    def phases(self, namespace: str = "") -> list[String]:
-        return self.listen(String, f"{namespace}/phase" if namespace else "phase", LATCHED)
-
-    def statuses(self) -> list[DiagnosticStatus]:
-        """Messages of command_status, from now on and the last ones before."""
-        return self.listen(DiagnosticStatus, "command_status", COMMAND_STATUS)
-
-    @staticmethod
-    def states(statuses: list[DiagnosticStatus], name: str) -> list[str]:
-        """The states that a command went through, in order."""
-        return [values_of(status)["state"] for status in list(statuses) if status.name == name]
-
-    @staticmethod
-    def value(statuses: list[DiagnosticStatus], name: str, state: str, key: str) -> int:
-        """A value of the status that a command had in a state."""
-        found = [values_of(status) for status in list(statuses) if status.name == name]
-        return int(next(values[key] for values in found if values["state"] == state))
-
-    def diagnostics(self) -> list[DiagnosticArray]:
-        return self.listen(DiagnosticArray, "/diagnostics", 10)
-
-    def publisher(self, kind: type, topic: str, quality: Any = COMMAND) -> Any:
-        """A publisher that somebody listens to."""
-        publisher = self.node.create_publisher(kind, topic, quality)
-        self.wait(lambda: publisher.get_subscription_count() > 0, f"a subscriber of {topic}")
-        return publisher
-
-    def send(self, voltage: Any, phase: str, sample_period: float = 2e-5, *, age: float | None = 0.0) -> None:
-        """Send a command with the stamp of now less `age` [s]; None for no stamp."""
-        if not hasattr(self, "_command"):
-            self._command = self.publisher(PointCloud2, "command")
-        stamp = None
-        if age is not None:
-            stamp = (self.node.get_clock().now() - rclpy.duration.Duration(seconds=age)).to_msg()
-        self._command.publish(command_to_cloud(voltage, sample_period, phase, stamp))
-
-    def call(self, kind: type, service: str, request: Any = None) -> Any:
-        """Answer of a service."""
-        client = self.node.create_client(kind, service)
-        self.wait(client.service_is_ready, f"the service {service}")
-        future = client.call_async(request or kind.Request())
-        self.wait(future.done, f"an answer of {service}")
-        self.node.destroy_client(client)
-        return future.result()
-
-    def transition(self, name: str, node: str = "driver_node") -> bool:
-        """Ask a lifecycle node for a transition."""
-        request = ChangeState.Request()
-        request.transition.label = name
-        request.transition.id = _TRANSITIONS[name]
-        return self.call(ChangeState, f"{node}/change_state", request).success
-
-    def state(self, node: str = "driver_node") -> str:
-        """State of a lifecycle node."""
-        return self.call(GetState, f"{node}/get_state").current_state.label
-
-    def close(self) -> None:
-        for process in self.processes:
-            process.end()
-        for node in self._added:
-            node.end()
-        self._executor.shutdown()
-        self._thread.join(10.0)
-        for node in self._added:
-            node.destroy_node()
-        self.node.destroy_node()
-        rclpy.shutdown(context=self._context)
-
-
-_TRANSITIONS = {"configure": 1, "cleanup": 2, "activate": 3, "deactivate": 4}
-
-
-def _command(executable: str) -> list[str]:
-    try:
-        built = Path(get_package_prefix("piezo_hysteresis")) / "lib" / "piezo_hysteresis" / executable
-    except (PackageNotFoundError, OSError):
-        built = Path()
-    return [str(built)] if built.is_file() else [sys.executable, "-m", f"piezo_hysteresis.nodes.{executable}"]
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    """A ROS domain that no other test of this machine uses at the same time."""
+@contextmanager
+def opened(folder: Path) -> Iterator[Lab]:
+    """A lab in a ROS domain that nobody else tests in on this machine at the same time."""
     for number in random.Random(os.getpid()).sample(range(1, 101), 100):
         try:
             lock = StageLock([f"test in domain {number}"])
+            break
         except StageError:
             continue
-        yield number
-        lock.release()
-        return
-    pytest.fail("all domains from 1 to 100 are taken")
-
-
-@pytest.fixture
-def lab(domain: int, tmp_path: Path) -> Iterator[Lab]:
-    """The test's own node; processes that it starts are ended with the test."""
-    lab = Lab(domain, tmp_path)
+    else:
+        pytest.fail("all domains from 1 to 100 are taken")
+    lab = Lab(number, folder)
     try:
         yield lab
     finally:
         lab.close()
+        lock.release()
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Iterator[Lab]:
+    """The test's own node; processes that it starts are ended with the test."""
+    with opened(tmp_path) as lab:
+        yield lab
+
+
+@pytest.fixture(scope="module")
+def shared_lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
+    """One lab for all tests of a file."""
+    with opened(tmp_path_factory.mktemp("lab")) as lab:
+        yield lab

@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
-from std_srvs.srv import Trigger
 
 from piezo_hysteresis.nodes import back_ends
-from piezo_hysteresis.nodes.conversions import phase_from_text
 from piezo_hysteresis.nodes.driver_node import DriverNode
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import write
@@ -26,83 +23,6 @@ IDEAL = {"simulated__electronics__dac_bits": 0.0, "ramp_rate": RAMP_RATE}
 """Without a converter the voltages published are those applied, bit for bit."""
 
 
-def test_every_sample_of_a_command_arrives_or_is_told_lost(lab):
-    lab.driver(**IDEAL)
-    samples, statuses, phases = lab.streaming(), lab.statuses(), lab.phases()
-    wave = np.concatenate(([0.0], np.random.default_rng(1).uniform(0, 10, 50_000), [0.0]))
-    lab.send(wave, "noise")
-    lab.wait(lambda: lab.states(statuses, "noise") == ["accepted", "playing", "done"], "the end of the command")
-    number, first = (lab.value(statuses, "noise", "done", key) for key in ("phase", "first_index"))
-    lab.wait(lambda: samples.newest.index[-1] > first + wave.size, "the samples after it")
-    assert (np.diff(samples.place()) > 0).all()
-    assert samples.played(wave, first, number)
-    assert [phase_from_text(p.data)[1] for p in phases][-2:] == ["noise", "hold"]
-
-
-def test_stamps_and_times_are_one_clock(lab):
-    lab.driver(**IDEAL)
-    samples = lab.streaming()
-    lab.wait(lambda: len(samples.blocks) > 100, "a second of blocks")
-    blocks = samples.blocks[:100]
-    start = np.array([b.stamp + round(b.time[0] * 1e9) for b in blocks])
-    expected = np.array([int(b.index[0]) for b in blocks]) * round(PERIOD * 1e9)
-    assert np.abs((start - start[0]) - (expected - expected[0])).max() <= 1
-    assert all(b.sample_period == pytest.approx(PERIOD, rel=1e-9) for b in blocks)
-
-
-def test_a_refused_command_plays_nothing(lab):
-    lab.driver(**IDEAL, max_slew_rate=1e5)
-    samples, statuses = lab.streaming(), lab.statuses()
-    refused = {
-        "too_high": ([0.0, 1.0, 10.1], PERIOD, 0.0, "expected 0 to 10 V"),
-        "too_low": ([0.0, -0.1], PERIOD, 0.0, "expected 0 to 10 V"),
-        "too_steep": ([0.0, 3.0, 0.0], PERIOD, 0.0, "V/s"),
-        "far_start": ([5.0, 5.0], PERIOD, 0.0, "V/s"),
-        "not_finite": ([0.0, np.nan, 0.0], PERIOD, 0.0, "finite"),
-        "other_period": ([0.0, 0.1, 0.0], 2 * PERIOD, 0.0, "period"),
-        "old": ([0.0, 0.1, 0.0], PERIOD, 3.0, "old"),
-        "empty": ([], PERIOD, 0.0, "no points"),
-    }
-    for name, (wave, period, age, _) in refused.items():
-        lab.send(wave, name, period, age=age)
-    lab.wait(lambda: {s.name for s in statuses} >= set(refused), "all refusals")
-    reasons = {s.name: s.message for s in statuses}
-    for name, (_, _, _, reason) in refused.items():
-        assert lab.states(statuses, name) == ["refused"]
-        assert reason in reasons[name], reasons[name]
-    blocks = len(samples.blocks)
-    lab.wait(lambda: len(samples.blocks) > blocks + 10, "later blocks")
-    assert not samples.voltage.any()
-    assert not samples.phase.any()
-
-
-def test_a_second_command_is_refused_and_the_first_played_whole(lab):
-    lab.driver(**IDEAL)
-    samples, statuses = lab.streaming(), lab.statuses()
-    wave = np.linspace(0, 2, 20_000)
-    lab.send(wave, "first")
-    lab.send(np.zeros(10), "second")
-    lab.wait(lambda: "done" in lab.states(statuses, "first"), "the first command")
-    assert lab.states(statuses, "second") == ["refused"]
-    lab.wait(lambda: samples.newest.phase[-1] == 2, "the hold after it")
-    assert samples.played(wave, lab.value(statuses, "first", "playing", "first_index"), 1)
-
-
-def test_set_voltage_ramps_and_holds(lab):
-    lab.driver(**IDEAL)
-    samples, statuses, live = lab.streaming(), lab.statuses(), lab.listen(JointState, "live")
-    ask = lab.publisher(Float64, "set_voltage")
-    ask.publish(Float64(data=4.0))
-    lab.wait(lambda: samples.newest.voltage[-1] == 4.0, "the set-point")
-    assert samples.steepest(PERIOD) <= RAMP_RATE * (1 + 1e-6)
-    for wrong in (10.5, -0.5, float("nan")):
-        ask.publish(Float64(data=wrong))
-    lab.wait(lambda: lab.states(statuses, "set_voltage") == ["refused"] * 3, "three refusals")
-    assert samples.voltage.max() == 4.0
-    lab.wait(lambda: live and live[-1].position[0] == 4.0, "live values")
-    assert list(live[-1].name) == ["voltage", "displacement"]
-
-
 def test_hold_timeout_leads_to_the_safe_voltage(lab):
     lab.driver(**IDEAL, hold_timeout=0.3)
     samples = lab.streaming()
@@ -111,19 +31,6 @@ def test_hold_timeout_leads_to_the_safe_voltage(lab):
     held = samples.place()[samples.voltage == 1.0]
     assert held[-1] - held[0] == pytest.approx(0.3 / PERIOD, abs=2 + samples.lost)
     assert samples.steepest(PERIOD) <= 1 / (999 * PERIOD) * (1 + 1e-6)
-
-
-def test_stop_ramps_a_playing_waveform_down(lab):
-    lab.driver(**IDEAL)
-    samples, statuses = lab.streaming(), lab.statuses()
-    lab.send(np.concatenate((np.linspace(0, 3, 10_000), np.full(500_000, 3.0))), "long")
-    lab.wait(lambda: samples.newest.voltage[-1] == 3.0, "the top")
-    assert lab.call(Trigger, "driver_node/stop").success
-    lab.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
-    assert lab.states(statuses, "long") == ["accepted", "playing", "stopped"]
-    assert samples.steepest(PERIOD) <= RAMP_RATE * (1 + 1e-6)
-    lab.send(np.zeros(10), "next")
-    lab.wait(lambda: "done" in lab.states(statuses, "next"), "a later command")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])

@@ -1,0 +1,117 @@
+"""What a running driver does with commands: all of it, or nothing and a reason; one driver for all tests here."""
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from piezo_hysteresis.nodes.conversions import phase_from_text
+
+pytestmark = pytest.mark.nodes
+
+PERIOD = 2e-5
+RAMP_RATE = 20.0
+
+
+@pytest.fixture(scope="module")
+def streaming_lab(shared_lab):
+    """A driver without a converter: the voltages published are those applied, bit for bit."""
+    shared_lab.driver(simulated__electronics__dac_bits=0.0, ramp_rate=RAMP_RATE, max_slew_rate=4e5)
+    return shared_lab
+
+
+@pytest.fixture
+def driven(streaming_lab):
+    """The driver at rest at its safe voltage."""
+    yield streaming_lab
+    streaming_lab.forget()
+    samples = streaming_lab.streaming()
+    streaming_lab.call(Trigger, "driver_node/stop")
+    streaming_lab.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
+    streaming_lab.forget()
+
+
+def test_every_sample_of_a_command_arrives_or_is_told_lost(driven):
+    samples, statuses, phases = driven.streaming(), driven.statuses(), driven.phases()
+    wave = np.concatenate(([0.0], np.random.default_rng(1).uniform(0, 7, 50_000), [0.0]))
+    driven.send(wave, "noise")
+    driven.wait(lambda: driven.states(statuses, "noise") == ["accepted", "playing", "done"], "the end of the command")
+    number, first = (driven.value(statuses, "noise", "done", key) for key in ("phase", "first_index"))
+    driven.wait(lambda: samples.newest.index[-1] > first + wave.size, "the samples after it")
+    assert (np.diff(samples.place()) > 0).all()
+    assert samples.played(wave, first, number)
+    assert [phase_from_text(p.data)[1] for p in phases][-2:] == ["noise", "hold"]
+
+
+def test_stamps_and_times_are_one_clock(driven):
+    samples = driven.streaming()
+    driven.wait(lambda: len(samples.blocks) > 100, "a second of blocks")
+    blocks = samples.blocks[:100]
+    start = np.array([b.stamp + round(b.time[0] * 1e9) for b in blocks])
+    expected = np.array([int(b.index[0]) for b in blocks]) * round(PERIOD * 1e9)
+    assert np.abs((start - start[0]) - (expected - expected[0])).max() <= 1
+    assert all(b.sample_period == pytest.approx(PERIOD, rel=1e-9) for b in blocks)
+
+
+def test_a_refused_command_plays_nothing(driven):
+    samples, statuses = driven.streaming(), driven.statuses()
+    refused = {
+        "too_high": ([0.0, 1.0, 10.1], PERIOD, 0.0, "expected 0 to 10 V"),
+        "too_low": ([0.0, -0.1], PERIOD, 0.0, "expected 0 to 10 V"),
+        "too_steep": ([0.0, 9.0, 0.0], PERIOD, 0.0, "V/s"),
+        "far_start": ([9.0, 9.0], PERIOD, 0.0, "V/s"),
+        "not_finite": ([0.0, np.nan, 0.0], PERIOD, 0.0, "finite"),
+        "other_period": ([0.0, 0.1, 0.0], 2 * PERIOD, 0.0, "period"),
+        "old": ([0.0, 0.1, 0.0], PERIOD, 3.0, "old"),
+        "empty": ([], PERIOD, 0.0, "no points"),
+    }
+    for name, (wave, period, age, _) in refused.items():
+        driven.send(wave, name, period, age=age)
+    driven.wait(lambda: {s.name for s in statuses} >= set(refused), "all refusals")
+    reasons = {s.name: s.message for s in statuses}
+    for name, (_, _, _, reason) in refused.items():
+        assert driven.states(statuses, name) == ["refused"]
+        assert reason in reasons[name], reasons[name]
+    blocks = len(samples.blocks)
+    driven.wait(lambda: len(samples.blocks) > blocks + 10, "later blocks")
+    assert not samples.voltage.any()
+    assert (samples.phase == samples.phase[0]).all()
+
+
+def test_a_second_command_is_refused_and_the_first_played_whole(driven):
+    samples, statuses = driven.streaming(), driven.statuses()
+    wave = np.linspace(0, 2, 20_000)
+    driven.send(wave, "first")
+    driven.send(np.zeros(10), "second")
+    driven.wait(lambda: "done" in driven.states(statuses, "first"), "the first command")
+    assert driven.states(statuses, "second") == ["refused"]
+    number, first = (driven.value(statuses, "first", "done", key) for key in ("phase", "first_index"))
+    driven.wait(lambda: samples.newest.phase[-1] == number + 1, "the hold after it")
+    assert samples.played(wave, first, number)
+
+
+def test_set_voltage_ramps_and_holds(driven):
+    samples, statuses, live = driven.streaming(), driven.statuses(), driven.listen(JointState, "live")
+    ask = driven.publisher(Float64, "set_voltage")
+    ask.publish(Float64(data=4.0))
+    driven.wait(lambda: samples.newest.voltage[-1] == 4.0, "the set-point")
+    assert samples.steepest(PERIOD) <= RAMP_RATE * (1 + 1e-6)
+    for wrong in (10.5, -0.5, float("nan")):
+        ask.publish(Float64(data=wrong))
+    driven.wait(lambda: driven.states(statuses, "set_voltage") == ["refused"] * 3, "three refusals")
+    assert samples.voltage.max() == 4.0
+    driven.wait(lambda: live and live[-1].position[0] == 4.0, "live values")
+    assert list(live[-1].name) == ["voltage", "displacement"]
+
+
+def test_stop_ramps_a_playing_waveform_down(driven):
+    samples, statuses = driven.streaming(), driven.statuses()
+    driven.send(np.concatenate((np.linspace(0, 3, 10_000), np.full(500_000, 3.0))), "long")
+    driven.wait(lambda: samples.newest.voltage[-1] == 3.0, "the top")
+    assert driven.call(Trigger, "driver_node/stop").success
+    driven.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
+    assert driven.states(statuses, "long") == ["accepted", "playing", "stopped"]
+    assert samples.steepest(PERIOD) <= RAMP_RATE * (1 + 1e-6)
+    driven.send(np.zeros(10), "next")
+    driven.wait(lambda: "done" in driven.states(statuses, "next"), "a later command")
