@@ -42,11 +42,19 @@ def test_records_of_different_offset_join():
 
 
 def test_iterations_remove_the_bias_of_the_sensor_noise():
-    def lag_error(iterations):
-        found = [identify_arx(noisy(0.002, s), DELAY, SAMPLE_PERIOD, iterations=iterations).lag for s in range(4)]
-        return abs(np.mean(found) - PUBLISHED.lag)
+    truth = Dynamics(Arx(a=(-1.5, 0.7), b=(0.1, 0.1), delay=2), 1.0)
+    random = np.random.default_rng(0)
+    u = random.standard_normal(40_000)
+    clean = truth.simulate(u)
+    y = clean + 0.3 * np.std(clean) * random.standard_normal(u.size)
 
-    assert lag_error(10) < 0.5 * lag_error(0)
+    def largest_error(iterations):
+        model = identify_arx([(u, y)], 2, 1.0, (2, 2), iterations)
+        frequency = np.linspace(0.01, 0.2, 50)
+        return np.abs(model.response(frequency) / truth.response(frequency) - 1.0).max()
+
+    assert largest_error(0) > 0.2
+    assert largest_error(6) < 0.03
 
 
 def test_a_noisy_record_gives_a_start_good_to_0_3_percent():
