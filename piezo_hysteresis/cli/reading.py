@@ -85,7 +85,9 @@ def _pairs(option: str, texts: Sequence[str], kind: Callable[[str], T]) -> dict[
         except ValueError:
             equals = ""
         if not (name and equals and value):
-            raise RecordingError(f"{option}: got '{text}', expected NAME=VALUE")
+            raise RecordingError(
+                f"{option}: got '{text}', expected NAME={'N, a whole number' if kind is int else 'VALUE'}"
+            )
     return pairs
 
 

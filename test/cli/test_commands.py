@@ -1,0 +1,129 @@
+"""The subcommands at work on a real experiment: what one writes the next one reads."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis import model_file, recording
+from piezo_hysteresis.discrepancy.residual import errors
+from piezo_hysteresis.identification.normal_equations import Nuisance
+from piezo_hysteresis.stage.hidden import HIDDEN_EFFECTS
+
+
+@pytest.fixture(scope="module")
+def identified(folder, tmp_path_factory):
+    from piezo_hysteresis.cli.main import main
+
+    place = tmp_path_factory.mktemp("identified")
+    words = [
+        "identify",
+        str(folder),
+        "-o",
+        f"{place}/model.yaml",
+        "--json",
+        f"{place}/model.json",
+        "--orders",
+        "3",
+        "3",
+    ]
+    assert main(words) == 0
+    return place
+
+
+def test_identify_writes_a_model_and_its_certainty(identified):
+    answer = json.loads((identified / "model.json").read_text())
+    model = model_file.load(identified / "model.yaml")
+    assert answer["effects"] == [e.name for e in model.effects]
+    beta = answer["parameters"]["bouc_wen.beta"]
+    assert beta["interval_95"][0] < beta["value"] == model["bouc_wen"]["beta"] < beta["interval_95"][1]
+    assert beta["value"] == pytest.approx(4.6075, rel=0.05), "the simulated stage is the one of the paper"
+    assert answer["delay_s"] == pytest.approx(60e-6)
+    assert [p["phase"] for p in answer["phases"] if not p["fitted"]] == ["validation"]
+    assert answer["free_run_error_percent_of_range"] < 0.1
+
+
+def test_validate_reports_the_one_error_measure(piezo, identified, folder, tmp_path):
+    out = tmp_path / "v.json"
+    done = piezo("validate", identified / "model.yaml", folder, "--json", out, "--figures", tmp_path / "figures")
+    assert done.status == 0
+    answer = json.loads(out.read_text())
+    table = errors(model_file.load(identified / "model.yaml"), recording.read(folder))
+    assert answer["percent_of_range"] == pytest.approx(table.percent)
+    assert [p["rms_m"] for p in answer["phases"]] == pytest.approx([r.rms for r in table.rows])
+    assert answer["percent_of_range_by_frequency"] == {"50": pytest.approx(table.by_frequency[50.0])}
+    for row in table.rows:
+        assert f"{row.percent:.3f}" in done.out
+        assert f"{1e9 * row.rms:.1f}" in done.out
+    assert "cross-correlation" in done.out
+    assert {"gap.svg", "gap.csv", "time_series.png", "residual_tests.csv"} <= {
+        p.name for p in (tmp_path / "figures").iterdir()
+    }
+
+
+def test_a_zero_per_phase_can_only_help(piezo, identified, folder, tmp_path):
+    piezo("validate", identified / "model.yaml", folder, "--json", tmp_path / "free.json", "--zero-per-phase")
+    free = json.loads((tmp_path / "free.json").read_text())["percent_of_range"]
+    model, experiment = model_file.load(identified / "model.yaml"), recording.read(folder)
+    assert free == pytest.approx(errors(model, experiment, Nuisance(offset=True)).percent)
+    assert free <= errors(model, experiment).percent
+
+
+def test_report_writes_a_page_with_its_figures(piezo, identified, folder, tmp_path):
+    model, triangle = identified / "model.yaml", folder / "04_triangle.npz"
+    words = ["--model", f"ours={model}", "-o", tmp_path / "page.html", "--title", "The small one"]
+    done = piezo("report", triangle, *words)
+    assert done.status == 0
+    html = (tmp_path / "page.html").read_text()
+    assert "<h1>The small one</h1>" in html
+    assert "ours [%]" in html
+    assert (tmp_path / "page_figures" / "loops_by_amplitude.svg").exists()
+
+
+def test_import_maps_columns_units_and_period_of_a_foreign_file(piezo, tmp_path):
+    t = 0.01 * np.arange(400)
+    u = 2.0 - 2.0 * np.cos(2 * np.pi * t)
+    foreign = tmp_path / "foreign.dat"
+    np.savetxt(foreign, np.column_stack((1e3 * u, np.zeros(u.size), 5.0 * u)))
+    options = "--column voltage=1 --unit voltage=mV --column displacement=3 --unit displacement=um --sample-period 0.01"
+    words = [*options.split(), "--phase", "sine_1hz", "--rows", "100:300", "--json", tmp_path / "i.json"]
+    done = piezo("import", foreign, "-o", tmp_path / "ours", *words)
+    assert done.status == 0, done.err
+    (record,) = recording.read(tmp_path / "ours")
+    assert record.voltage == pytest.approx(u[100:300], abs=1e-9)
+    assert record.displacement == pytest.approx(5e-6 * u[100:300], abs=1e-14)
+    assert (record.sample_period, record.phase) == (0.01, "sine_1hz")
+    assert "What was recorded" in done.out
+    assert json.loads((tmp_path / "i.json").read_text())["phases"][0]["samples"] == 200
+
+
+def test_simulate_is_repeatable_and_hides_what_a_seed_draws(piezo, tmp_path):
+    for name in ("one", "two"):
+        words = ["--protocol", "paper", "--sample-period", "1e-4", "--seed", 7, "--hidden", 3]
+        done = piezo("simulate", "-o", tmp_path / name, *words, "--truth", tmp_path / f"{name}.json")
+        assert done.status == 0, done.err
+        assert "largest slew" in done.out, "told before anything moves"
+    first, second = recording.read(tmp_path / "one"), recording.read(tmp_path / "two")
+    assert all(np.array_equal(a.displacement, b.displacement) for a, b in zip(first, second, strict=True))
+    truth = json.loads((tmp_path / "one.json").read_text())
+    assert truth["name"] in HIDDEN_EFFECTS
+    assert truth["name"] not in done.out
+    assert [r.continues for r in first] == [False] + [True] * (len(first) - 1)
+
+
+def test_simulate_takes_the_plant_from_a_file(piezo, tmp_path):
+    plant = tmp_path / "plant.yaml"
+    plant.write_text("sensor: {noise: 0.0, adc_bits: 0}\nstructure.displacement_scale: 5.0e-5\n")
+    for name, options in (("half", ["--plant", plant]), ("whole", ["--noise", "0"])):
+        piezo("simulate", "-o", tmp_path / name, "--protocol", "paper", "--sample-period", "1e-4", *options)
+    half, whole = (next(r for r in recording.read(tmp_path / n) if r.phase == "triangle") for n in ("half", "whole"))
+    assert np.ptp(half.displacement) / np.ptp(whole.displacement) == pytest.approx(0.5, rel=0.01)
+
+
+def test_json_has_no_number_that_machines_cannot_read(piezo, identified, folder, tmp_path):
+    piezo("validate", identified / "model.yaml", folder, "--json", tmp_path / "v.json")
+    text = (tmp_path / "v.json").read_text()
+    assert "NaN" not in text
+    assert "Infinity" not in text

@@ -1,0 +1,126 @@
+"""The command as such: starts fast, one line per error, exit status, never a traceback."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis import model_file, recording
+from piezo_hysteresis.cli.main import COMMANDS
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Experiment, Record
+
+
+def test_help_names_every_command_and_loads_nothing_heavy():
+    code = (
+        "import sys; from piezo_hysteresis.cli.main import main\n"
+        "try: main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'numba', 'matplotlib', 'rich'} & set(sys.modules)\n"
+        "sys.exit(f'loaded {heavy}' if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert all(command in done.stdout for command in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(piezo, command):
+    done = piezo(command, "--help")
+    assert done.status == 0
+    assert done.out.startswith(f"usage: piezo {command}")
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    done = subprocess.run(
+        f"{sys.executable} -m piezo_hysteresis.cli.main effects | head -1",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "Catalogue" in done.stdout
+    assert done.stderr == ""
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory, folder):
+    """Good and bad files by name."""
+    place = tmp_path_factory.mktemp("files")
+    fine = model_file.save(
+        Model((BoucWen(), Arx(a=[-0.5], b=[0.25])), 2e-5, displacement_scale=1e-4), place / "fine.yaml"
+    )
+    text = "".join(line for line in fine.read_text().splitlines(True) if " hash:" not in line)
+    (place / "broken.yaml").write_text("/**: [1, 2\n")
+    (place / "extra.yaml").write_text(text.replace("        gamma:", "        gama: 1.0\n        gamma:"))
+    (place / "missing.yaml").write_text("".join(line for line in text.splitlines(True) if " gamma:" not in line))
+    (place / "unstable.yaml").write_text(
+        "".join("        a: [-1.5]\n" if line.lstrip().startswith("a:") else line for line in text.splitlines(True))
+    )
+    (place / "empty.npz").write_bytes(b"")
+    (place / "list.json").write_text("[1]")
+    t = np.arange(50.0)
+    recording.write(Experiment((Record(t, 1e-6 * t, 1e-6, phase="fast"),)), place / "fast")
+    recording.write(Experiment((Record(t, 0 * t, 1e-3, phase="still"),)), place / "still")
+    recording.write(Experiment((Record(0 * t, 1e-9 * t, 1e-3, phase="undriven"),)), place / "undriven")
+    return {**{p.name.partition(".")[0]: p for p in place.iterdir()}, "experiment": folder, "place": place}
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("validate {place}/none.yaml {experiment}", "expected a model file"),
+        ("validate {broken} {experiment}", "broken.yaml"),
+        ("validate {extra} {experiment}", "gama"),
+        ("validate {missing} {experiment}", "gamma"),
+        ("validate {unstable} {experiment}", "arx.a"),
+        ("validate {fine} {place}/nothing", "expected a recording"),
+        ("validate {fine} {empty}", "empty.npz"),
+        ("validate {fine} {fast}", "decimate"),
+        ("validate {fine} {still}", "every sample"),
+        ("validate {fine} {experiment} --json {place}/no/where.json", "expected a file that can be written"),
+        ("validate {fine} {experiment} --column voltage", "--column: got 'voltage', expected NAME=VALUE"),
+        ("validate {fine} {experiment} --column wolt=1", "wolt"),
+        ("validate {fine} {experiment} --unit displacement=inch", "inch"),
+        ("validate {fine} {experiment} --decimate noise=few", "a whole number"),
+        ("validate {fine} {experiment} --rows 5", "expected FROM:TO"),
+        ("validate {fine} {experiment} --sample-period -1", "expected a positive time"),
+        ("validate {fine} {experiment} --phase 0=a --phase b", "TIME=NAME"),
+        ("report {experiment} --answer {fine}", "no JSON"),
+        ("report {experiment} --answer {list}", "got a list"),
+        ("report {experiment} --model before={place}/none.yaml", "expected a model file"),
+        ("import {experiment} -o {experiment}", "choose an empty folder"),
+        ("simulate -o {place}/s --plant {place}/none.yaml", "expected a YAML file"),
+        ("simulate -o {place}/s --plant {list}", "got a list"),
+        ("simulate -o {place}/s --plant {fine}", "unknown quantity"),
+        ("simulate -o {place}/s --plant {broken}", "broken YAML"),
+        ("simulate -o {place}/s --noise -1", "sensor.noise"),
+        ("simulate -o {place}/s --sample-period 1", "sample period"),
+        ("effects creeep", "unknown effect 'creeep'"),
+    ],
+)
+def test_bad_input_is_told_in_one_line(piezo, files, line, words):
+    done = piezo(*(word.format_map(files) for word in line.split()))
+    assert done.status == 2
+    assert words in done.err
+    assert done.err.startswith("piezo: ")
+    assert done.err.count("\n") == 1
+
+
+def test_data_that_determine_nothing_exit_with_1(piezo, files, tmp_path):
+    done = piezo("identify", files["undriven"], "-o", tmp_path / "m.yaml")
+    assert done.status == 1
+    assert done.err.count("\n") == 1
+    assert "drive does not move" in done.err
+    assert not (tmp_path / "m.yaml").exists()
+
+
+@pytest.mark.parametrize("line", ["", "teleport", "validate", "identify --orders 8", "simulate --protocol long -o x"])
+def test_a_command_line_that_makes_no_sense_exits_with_2(piezo, line):
+    done = piezo(*line.split())
+    assert done.status == 2
+    assert "Traceback" not in done.err
