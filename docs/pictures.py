@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
@@ -42,15 +45,20 @@ def what_a_stage_does() -> Figure:
     return figure
 
 
-PICTURES = {"what_a_stage_does": what_a_stage_does}
+PAPER = ("table_1", "figure_5", "figure_8")
+"""Exhibits of examples/paper that the tour shows."""
 
 
 def main() -> None:
     """Draw all."""
     IMAGES.mkdir(exist_ok=True)
-    for name, draw in PICTURES.items():
-        with mpl.rc_context(SETTINGS):
-            draw().savefig(IMAGES / f"{name}.png", dpi=110, metadata={"Software": None})
+    with mpl.rc_context(SETTINGS):
+        what_a_stage_does().savefig(IMAGES / "what_a_stage_does.png", dpi=110, metadata={"Software": None})
+    scripts = IMAGES.parents[1] / "examples" / "paper"
+    with tempfile.TemporaryDirectory() as folder:
+        for name in PAPER:
+            subprocess.run([sys.executable, scripts / f"{name}.py", "-o", folder], check=True)
+            (IMAGES / f"{name}.png").write_bytes((Path(folder) / f"{name}.png").read_bytes())
 
 
 if __name__ == "__main__":
