@@ -27,7 +27,8 @@ def residual_maps(comparison: Comparison) -> Drawing | None:
     limit = float(np.quantile(np.abs(e), 0.9995)) or 1e-12
     figure, axes = canvas(1, 3, 3.4, sharey=True)
     fast = max(float(np.abs(rate).max()), 1e-9)
-    slow = 10.0 ** np.ceil(np.log10(fast) - 4.0)
+    moving = np.abs(rate[rate != 0.0])
+    slow = 10.0 ** np.ceil(np.log10(max(1e-4 * fast, float(np.quantile(moving, 0.02)) if moving.size else 0.0)))
     data: dict[str, Array] = {}
     told = []
     quantities = (
@@ -38,8 +39,8 @@ def residual_maps(comparison: Comparison) -> Drawing | None:
     for axis, (name, values, label) in zip(axes.flat, quantities, strict=True):
         if name == "rate_V_per_s":
             axis.set_xscale("symlog", linthresh=slow)
-            axis.set_xticks([-100 * slow, -slow, slow, 100 * slow])
-            positive = np.geomspace(slow, fast, BINS // 2)
+            axis.set_xticks([t for t in (-100 * slow, -slow, slow, 100 * slow) if abs(t) <= fast])
+            positive = np.geomspace(slow, max(fast, 2.0 * slow), BINS // 2)
             edges = np.concatenate((-positive[::-1], positive))
         else:
             edges = np.linspace(values.min(), values.max(), BINS + 1)
