@@ -9,8 +9,8 @@ from pathlib import Path
 from ..errors import RecordingError
 from ..record import Experiment, Notice, Record
 from .damage import naming
-from .layout import CHANNELS, Layout
-from .table import LABELS, resolve, table_records
+from .layout import CHANNELS, LABELS, Layout
+from .table import resolve, table_records
 from .text_cells import Dialect, read_cells
 from .time_base import TimeBase
 

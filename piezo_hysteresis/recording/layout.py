@@ -13,7 +13,10 @@ from ..record import Samples
 from .units import si_factor
 
 CHANNELS = ("time", "voltage", "displacement", "other_displacement", "temperature")
-"""What a column of a recording can be; a table may also have `phase`, `record`, `continues`, `initial_voltage`."""
+"""What a column of numbers can be."""
+
+LABELS = ("phase", "record", "continues", "truncated", "initial_voltage", "sample_period", "start_time")
+"""What is constant within a record."""
 
 Column = str | int
 
@@ -27,8 +30,8 @@ class Layout:
     axis : str, optional
         Namespace of one stage in a bag that holds several, e.g. ``"/stage_x"``.
     columns : mapping of str to str or int
-        Channel (``voltage``, ``displacement``, ``time``, ``other_displacement``, ``temperature``, ``phase``) to its
-        place: a column number counted from 1, a column, key or variable name, ``/topic.field[element]`` in a bag.
+        Channel (one of `CHANNELS`) or label (one of `LABELS`) to its place: a column number counted from 1, the name of
+        a column, key or variable, or ``/topic.field[element]`` in a bag.
     units : mapping of str to str or float
         Channel to its unit (``um``, ``nm``, ``mV``, ``ms``, …) or to the SI value of one count.
     sample_period : float, optional
@@ -58,7 +61,7 @@ class Layout:
     include: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        known = (*CHANNELS, "phase", "record", "continues", "truncated", "initial_voltage")
+        known = (*CHANNELS, *LABELS)
         for name in (*self.columns, *self.units):
             if name not in known:
                 raise RecordingError(f"columns: got channel '{name}', expected one of {', '.join(known)}")

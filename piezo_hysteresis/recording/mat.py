@@ -15,9 +15,9 @@ from ..errors import RecordingError
 from ..record import Experiment, Notice, Record, Samples
 from .damage import naming
 from .hdf5_variables import Hdf5Variables, is_hdf5
-from .layout import CHANNELS, Layout
+from .layout import CHANNELS, LABELS, Layout
 from .mat5_sizes import check_sizes
-from .table import LABELS, table_records
+from .table import table_records
 
 _PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
 _STRUCT = "phase_"

@@ -7,14 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..record import Notice, Record, Samples
 from .waveform import phase_name, turning_points
 
 _BLOCKS = 20_000
-_LARGEST_NOISE = 5e-3
-_PEAK = 0.3
+_SHORTEST = 4
+_NOISE_WIDTH = 20.0
+_LARGEST_NOISE = 0.02
+_PEAK = 0.5
 _JUMP = 0.05
 _MOST = 100
 
@@ -136,13 +139,13 @@ def _pieces(voltage: Samples) -> list[_Piece]:
     span = float(np.ptp(voltage))
     if span <= 1e-9 * float(np.abs(voltage).max()):
         return [_Piece(0, voltage.size, float(voltage[0]))]
-    length = max(4, voltage.size // _BLOCKS)
-    noise = float(np.quantile(np.ptp(_blocks(voltage, length), axis=1), 0.05))
-    tolerance = min(max(1.5 * noise, 1e-6 * span), _LARGEST_NOISE * span)
-    length = max(length, int(4 * voltage.size * tolerance / span) if tolerance > 1e-5 * span else 0)
+    length = max(_SHORTEST, voltage.size // _BLOCKS)
+    noise = float(np.quantile(np.std(_blocks(voltage, 4 * length), axis=1), 0.01))
+    tolerance = min(max(_NOISE_WIDTH * noise, 1e-6 * span), _LARGEST_NOISE * span)
+    length = max(length, int(voltage.size * tolerance / span))  # no drive is slower than once through its range
     levels = _joined(voltage, _levels_of(voltage, _blocks(voltage, length), length, tolerance), 4 * tolerance)
     turns = turning_points(voltage, max(4 * tolerance, 0.01 * span))
-    levels = [level for level in levels if not _is_peak(level, turns, voltage.size)]
+    levels = _without_peaks(levels, turns, voltage.size)
     pieces: list[_Piece] = []
     end = 0
     for level in levels:
@@ -203,16 +206,19 @@ def _joined(voltage: Samples, levels: list[_Piece], tolerance: float) -> list[_P
     return joined
 
 
-def _is_peak(level: _Piece, turns: np.ndarray[tuple[int], np.dtype[np.int64]], size: int) -> bool:
-    """True where a level is short against the swings beside it."""
-    if level.start == 0 or level.stop == size:
-        return False
-    before = turns[turns < level.start - 1]
-    after = turns[turns > level.stop]
-    if not before.size or not after.size:
-        return False
-    swing = min(level.start - int(before[-1]), int(after[0]) - level.stop)
-    return level.size < _PEAK * swing
+def _without_peaks(levels: list[_Piece], turns: NDArray[np.int64], size: int) -> list[_Piece]:
+    """Levels that are not short against the movements beside them, up to the next level or turning point."""
+    kept = []
+    for i, level in enumerate(levels):
+        before = max(int(turns[turns < level.start - 1].max(initial=0)), levels[i - 1].stop if i else 0)
+        after = min(
+            int(turns[turns > level.stop].min(initial=size)), levels[i + 1].start if i + 1 < len(levels) else size
+        )
+        # a movement that the record cuts off says nothing about its length
+        moves = [level.start - before] * (before > 0) + [after - level.stop] * (after < size - 1)
+        if level.start == 0 or level.stop == size or level.size >= _PEAK * min(moves, default=0):
+            kept.append(level)
+    return kept
 
 
 def _chain_end(pieces: list[_Piece], i: int, voltage: Samples) -> int:

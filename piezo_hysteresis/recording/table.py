@@ -8,13 +8,10 @@ from collections.abc import Mapping, Sequence
 from ..errors import RecordingError
 from ..record import Notice, Record, Samples
 from .finite import finite_records
-from .layout import Layout
+from .layout import LABELS, Layout
 from .phases import labelled
 from .time_base import TimeBase
 from .units import UNITS, plain
-
-LABELS = ("phase", "record", "continues", "truncated", "initial_voltage", "sample_period", "start_time")
-"""Columns that are constant within a record."""
 
 Mark = tuple[int, Mapping[str, str]]
 """First row of a record and its labels."""

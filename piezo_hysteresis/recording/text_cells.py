@@ -18,6 +18,9 @@ BLOCK_BYTES = 1 << 20
 """Text that is parsed at a time; no line may be longer."""
 
 
+_COMMENT = ("#", "%")
+
+
 @dataclass(frozen=True, slots=True)
 class Dialect:
     """How the numbers of a text file are written.
@@ -75,17 +78,15 @@ class Dialect:
 
     @classmethod
     def _with(cls, lines: Sequence[str], delimiter: str | None, comma: bool) -> tuple[float, int, Dialect] | None:
-        rows = [_cells(line, delimiter) for line in lines]
+        rows = [[] if line.lstrip().startswith(_COMMENT) else _cells(line, delimiter) for line in lines]
         body = [row for row in rows if row][-40:]
         width = len(body[-1]) if body else 0
-        if width < 2:
+        first = next((i for i, row in enumerate(rows) if len(row) == width and _has_numbers(row, comma)), None)
+        if width < 2 or first is None:
             return None
         numeric = [np.mean([_number(cell, comma) is not None for cell in row]) for row in body if len(row) == width]
-        first = next((i for i, row in enumerate(rows) if len(row) == width and _has_numbers(row, comma)), None)
-        if first is None:
-            return None
-        above = rows[first - 1] if first else []
-        header = tuple(above) if len(above) == width and not lines[first - 1].lstrip().startswith("%%") else ()
+        above = _cells(lines[first - 1].lstrip(" #%"), delimiter) if first else []
+        header = tuple(above) if len(above) == width else ()
         return float(np.sum(numeric)) / len(body), width, cls(delimiter, comma, first, header, width)
 
 
@@ -162,7 +163,7 @@ def _line_blocks(path: Path, skipped: int) -> Iterator[list[str]]:
             lines = decoded(whole + newline).splitlines()
             used = min(skipped, len(lines))
             skipped -= used
-            rows = [line for line in lines[used:] if line.strip() and not line.lstrip().startswith(("#", "%"))]
+            rows = [line for line in lines[used:] if line.strip() and not line.lstrip().startswith(_COMMENT)]
             if rows:
                 yield rows
 

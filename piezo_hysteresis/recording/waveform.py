@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,15 +12,17 @@ from ..record import Samples
 _POINTS = 40_000
 _LEAST_SWING = 0.05
 _REGULAR = 0.1
-_LIKE = 0.03
+_STRAIGHT = 0.03
+_OTHER_POWER = 0.005
 _PERIODIC = 0.9
 
 
 def phase_name(voltage: Samples, sample_period: float) -> str:
     """Propose the phase name of a drive signal without pauses.
 
-    A swing is the movement from one turning point to the next. Straight swings make a triangle, cosine-shaped ones of
-    equal duration a sine; what repeats itself otherwise is a multisine, what does not is noise.
+    A swing is the movement from one turning point to the next. Straight swings make a triangle, swings of equal
+    duration with periods that a sine fits make a sine; what repeats itself otherwise is a multisine, and what does not
+    is noise.
 
     Parameters
     ----------
@@ -44,25 +48,26 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     turns = turning_points(voltage, _LEAST_SWING * span)
     if turns.size <= 2:
         return _transition(voltage)
-    if _has_levels(voltage):
-        return "steps"
     wave = voltage[turns[1] : turns[-2] + 1]  # without what leads into it and out of it
+    if _has_levels(wave):
+        return "steps"
     if _is_chirp(wave):
         return "chirp"
     if np.median(np.diff(turns)) < 8 * max(1, voltage.size // _POINTS):  # too fast for the coarse turning points
         middle = wave.size // 2
         voltage = wave[max(0, middle - _POINTS // 2) : middle + _POINTS // 2]
         turns = turning_points(voltage, _LEAST_SWING * span)
-    straight, cosine = _shape(voltage, turns)
+    straight = _straightness(voltage, turns)
     reversals = turns[1:-1]  # the ends of the record are none
     periods = reversals[2:] - reversals[:-2]
     usual = float(np.median(periods)) if periods.size else 2.0 * float(turns[1] - turns[0])
     like = periods[np.abs(periods - usual) <= _REGULAR * usual]
     regular = like.size >= 0.8 * periods.size - 1  # one may belong to what leads in or out
-    if straight < _LIKE:
+    if straight < _STRAIGHT:
         return "triangle" if regular else "minor_loops"
-    if cosine < _LIKE and regular:
-        return f"sine_{1 / (float(np.mean(like)) if like.size else usual) / sample_period:.3g}hz"
+    period = float(np.mean(like)) if like.size else usual
+    if regular and _is_sine(voltage[turns[0] if turns.size <= 3 else turns[1] :], period):
+        return f"sine_{1 / (period * sample_period):.3g}hz"
     return "multisine" if _repeats(wave) else "noise"
 
 
@@ -104,19 +109,31 @@ def _has_levels(voltage: Samples) -> bool:
     return bool(counts[-8:].sum() > 0.7 * voltage.size and counts[-1] < 0.8 * voltage.size)
 
 
-def _shape(voltage: Samples, turns: NDArray[np.int64]) -> tuple[float, float]:
-    """Deviation of the swings from straight lines and from half cosines: rms relative to the swing, median."""
-    inner = list(zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True))
-    whole = inner[1:-1] or inner
-    line, half_cosine = [], []
+def _straightness(voltage: Samples, turns: NDArray[np.int64]) -> float:
+    """Deviation of the swings from straight lines: rms relative to the swing, median over swings."""
+    swings = list(itertools.pairwise(turns.tolist()))
+    whole = swings[1:-1] or swings
+    deviations = []
     for a, b in whole[:: max(1, len(whole) // 200)]:
-        if b - a < 4:
-            continue
         way = (voltage[a : b + 1] - voltage[a]) / (voltage[b] - voltage[a])
-        time = np.linspace(0.0, 1.0, b - a + 1)
-        line.append(float(np.sqrt(np.mean((way - time) ** 2))))
-        half_cosine.append(float(np.sqrt(np.mean((way - (1 - np.cos(np.pi * time)) / 2) ** 2))))
-    return (float(np.median(line)), float(np.median(half_cosine))) if line else (1.0, 1.0)
+        deviations.append(float(np.sqrt(np.mean((way - np.linspace(0.0, 1.0, b - a + 1)) ** 2))))
+    return float(np.median(deviations))
+
+
+def _is_sine(voltage: Samples, period: float) -> bool:
+    """True where single periods are sines, whatever their amplitude and level; `period` in samples."""
+    length = max(3, round(period))
+    starts = np.arange(0, voltage.size - length, max(length, voltage.size // 200))
+    if not starts.size:
+        starts, length = np.array([0]), voltage.size
+    angle = 2.0 * np.pi * np.arange(length) / period
+    basis, _ = np.linalg.qr(np.stack((np.ones(length), np.sin(angle), np.cos(angle), np.arange(length)), axis=1))
+    shares = []
+    for start in starts.tolist():
+        part = voltage[start : start + length] - voltage[start : start + length].mean()
+        left = part - basis @ (basis.T @ part)
+        shares.append(float(left @ left) / (float(part @ part) or 1.0))
+    return float(np.median(shares)) < _OTHER_POWER
 
 
 def _is_chirp(voltage: Samples) -> bool:

@@ -1,0 +1,215 @@
+"""Tables of other software: columns, units, sample periods, missing cells, and a measured record."""
+
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from scipy import io
+
+from piezo_hysteresis.errors import PiezoError, RecordingError
+from piezo_hysteresis.recording import read
+
+TIME = np.arange(200) * 5e-3
+VOLTAGE = 1.8 + 1.8 * np.sin(2 * np.pi * TIME)
+MICRONS = 12.0 * VOLTAGE - 100.0
+
+
+def kinds(experiment):
+    return {notice.kind for notice in experiment.notices}
+
+
+def text(delimiter, header="", comma=False, number="{:.9g}"):
+    rows = (delimiter.join(number.format(x) for x in row) for row in zip(TIME, VOLTAGE, MICRONS, strict=True))
+    body = "\n".join(rows) + "\n"
+    return header + (body.replace(".", ",") if comma else body)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        text(",", "time_s,voltage_V,displacement_um\n"),
+        text(";", "Time [s];Voltage [V];Displacement [µm]\n", comma=True),
+        text("\t", "Instrument 12\nsome words 1 2\n\ntime (s)\tvoltage (V)\tdisplacement (um)\n"),
+        text("   ", "# time_s voltage_V displacement_um\n"),
+        text(",", '\ufeff"time_s","voltage_V","displacement_um"\n'),
+        text(",", "time_s,voltage_V,displacement_um\n").replace("\n", "\r\n"),
+    ],
+)
+def test_titles_tell_channels_and_units(tmp_path, content):
+    (tmp_path / "table.csv").write_text(content, encoding="utf-8", newline="")
+    (record,) = read(tmp_path / "table.csv", phases="sine_1hz")
+    np.testing.assert_allclose(record.voltage, VOLTAGE, rtol=1e-8)
+    np.testing.assert_allclose(record.displacement, MICRONS * 1e-6, rtol=1e-8)
+    assert record.sample_period == 5e-3
+
+
+def test_latin_1_of_old_instruments(tmp_path):
+    (tmp_path / "t.txt").write_bytes(text("\t", "time [s]\tvoltage [V]\tdisplacement [µm]\n").encode("latin-1"))
+    np.testing.assert_allclose(read(tmp_path / "t.txt")[0].displacement, MICRONS * 1e-6, rtol=1e-8)
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
+def test_columns_of_a_table_without_titles_are_numbered_from_one(tmp_path, delimiter):
+    (tmp_path / "t.dat").write_text(text(delimiter))
+    (record,) = read(
+        tmp_path / "t.dat",
+        columns={"voltage": 2, "displacement": "3"},
+        units={"voltage": "mV", "displacement": "nm"},
+        sample_period=1e-3,
+        initial_voltage=0.0,
+        phases="sine_5hz",
+    )
+    np.testing.assert_allclose(record.voltage, VOLTAGE * 1e-3, rtol=1e-8)
+    np.testing.assert_allclose(record.displacement, MICRONS * 1e-9, rtol=1e-8)
+    assert (record.sample_period, record.initial_voltage) == (1e-3, 0.0)
+
+
+def test_rows_are_a_python_slice(tmp_path):
+    (tmp_path / "t.dat").write_text(text(" "))
+    for rows, part in (((10, 60), slice(10, 60)), ((None, -20), slice(None, -20)), ((150, None), slice(150, None))):
+        (record,) = read(
+            tmp_path / "t.dat", columns={"voltage": 2, "displacement": 3}, sample_period=1.0, rows=rows, phases="x"
+        )
+        np.testing.assert_allclose(record.voltage, VOLTAGE[part], rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({}, "expected a column for voltage"),
+        ({"columns": {"voltage": 2, "displacement": 9}}, "got 9 for displacement"),
+        ({"columns": {"voltage": "U", "displacement": 3}}, "got 'U' for voltage"),
+        ({"columns": {"voltage": 2, "displacement": 3}}, "sample_period"),
+        ({"columns": {"voltage": 2, "displacement": 3}, "units": {"displacement": "inch"}}, "got 'inch'"),
+        ({"columns": {"current": 2}}, "channel 'current'"),
+        ({"columns": {"voltage": 0, "displacement": 1}}, "counted from 1"),
+        ({"sample_period": -1.0}, "positive"),
+        ({"columns": {"voltage": 2, "displacement": 3}, "sample_period": 1.0, "rows": (500, 600)}, "rows"),
+        (
+            {"columns": {"voltage": 2, "displacement": 3}, "sample_period": 1.0, "phases": [(0.5, "a"), (0.1, "b")]},
+            "growing",
+        ),
+        ({"format": "wav"}, "expected one of"),
+    ],
+)
+def test_what_is_missing_or_wrong_is_said(tmp_path, options, says):
+    (tmp_path / "t.dat").write_text(text(" "))
+    with pytest.raises(RecordingError, match=says):
+        read(tmp_path / "t.dat", **options)
+
+
+def test_cells_without_a_number_split_the_record_and_are_counted(tmp_path):
+    lines = text(",", "time_s,voltage_V,displacement_um\n").splitlines()
+    lines[51] = lines[51].rsplit(",", 1)[0] + ","
+    lines[52] = lines[52].rsplit(",", 1)[0] + ",overflow"
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    experiment = read(tmp_path / "t.csv", phases="x")
+    assert [(r.size, r.truncated) for r in experiment] == [(50, False), (148, True)]
+    assert {"non_finite", "not_a_number"} <= kinds(experiment)
+
+
+def test_a_gap_in_time_splits_the_record(tmp_path):
+    lines = text(",", "time_s,voltage_V,displacement_um\n").splitlines()
+    del lines[101:111]
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    first, second = experiment = read(tmp_path / "t.csv", phases="x")
+    assert (first.size, second.size, second.truncated) == (100, 90, True)
+    assert second.start_time == pytest.approx(110 * 5e-3)
+    assert any(n.kind == "gap" and "10 samples" in n.message for n in experiment.notices)
+
+
+def test_phases_of_a_table_in_one_go_continue(tmp_path):
+    rows = "".join(
+        f"{t:.6g},{u:.6g},{y:.6g},{'rest' if t < 0.3 else 'triangle'}\n"
+        for t, u, y in zip(TIME, VOLTAGE, MICRONS, strict=True)
+    )
+    (tmp_path / "t.csv").write_text("time_s,voltage_V,displacement_um,phase\n" + rows)
+    rest, triangle = read(tmp_path / "t.csv")
+    assert (rest.phase, rest.size, rest.continues) == ("rest", 60, False)
+    assert (triangle.phase, triangle.size, triangle.continues) == ("triangle", 140, True)
+
+
+def test_a_table_larger_than_a_block_is_read_piecewise(tmp_path):
+    numbers = np.random.default_rng(0).normal(size=(60_000, 2))
+    with (tmp_path / "t.txt").open("w") as file:
+        file.writelines(f"{a!r} {b!r}\n" for a, b in numbers.tolist())
+    assert (tmp_path / "t.txt").stat().st_size > 2 << 20
+    (record,) = read(tmp_path / "t.txt", columns={"voltage": 1, "displacement": 2}, sample_period=1e-4, phases="noise")
+    np.testing.assert_array_equal(np.stack((record.voltage, record.displacement), axis=1), numbers)
+
+
+GCS = """# REM Controller
+# TYPE = 1
+# SEPARATOR = 9
+# DIM = 3
+# SAMPLE_TIME = 5.00000e-03
+# NDATA = {n}
+# NAME0 = Commanded Position of axis:A
+# NAME1 = Current Position of axis:A
+# NAME2 = Voltage of output chan:1
+# END_HEADER
+"""
+
+
+def test_a_gcs_array_names_its_columns_and_its_period(tmp_path):
+    rows = "".join(f"0.0\t{y:.9g}\t{u:.9g} \n" for y, u in zip(MICRONS, VOLTAGE, strict=True))
+    (tmp_path / "a.dat").write_text(GCS.format(n=200) + rows)
+    (record,) = read(tmp_path / "a.dat", phases="sine_1hz")
+    np.testing.assert_allclose(record.voltage, VOLTAGE, rtol=1e-8)
+    np.testing.assert_allclose(record.displacement, MICRONS * 1e-6, rtol=1e-8)
+    assert record.sample_period == 5e-3
+    (tmp_path / "b.dat").write_text(GCS.format(n=300) + rows)
+    assert "cut" in kinds(read(tmp_path / "b.dat"))
+    (record,) = read(
+        tmp_path / "a.dat", phases="x", columns={"displacement": 3, "voltage": 2}, units={"displacement": "m"}
+    )
+    np.testing.assert_allclose(record.displacement, VOLTAGE, rtol=1e-8)
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_variables_fields_and_matrix_columns_of_matlab(tmp_path, version):
+    path = tmp_path / "m.mat"
+    matrix = np.stack((VOLTAGE, MICRONS), axis=1)
+    if version == "5":
+        io.savemat(path, {"run": {"m": matrix, "Ts": 5e-3}, "unused": np.eye(3)}, do_compression=True)
+    else:
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file["run/m"] = matrix.T  # MATLAB stores column by column
+            file["run/Ts"] = [[5e-3]]
+    options = {"columns": {"voltage": "run.m[1]", "displacement": "run.m[2]", "sample_period": "run.Ts"}}
+    (record,) = read(path, units={"displacement": "um"}, phases="sine_1hz", **options)
+    np.testing.assert_array_equal(record.voltage, VOLTAGE)
+    np.testing.assert_allclose(record.displacement, MICRONS * 1e-6, rtol=1e-12)
+    assert record.sample_period == 5e-3
+    for columns in (
+        {},
+        {"voltage": "run.m", "displacement": "run.m[2]"},
+        {"voltage": "run.m[3]", "displacement": "run.m[2]"},
+    ):
+        with pytest.raises(PiezoError, match=r"m\.mat"):
+            read(path, columns=columns, sample_period=5e-3)
+
+
+def measured():
+    for folder in (os.environ.get("PIEZO_DATA", ""), Path(__file__).parents[3] / "shared" / "data"):
+        if folder and (path := Path(folder) / "picma-p885").is_dir():
+            return path
+    pytest.skip("no measured data: neither PIEZO_DATA nor ../shared/data holds picma-p885")
+
+
+OPTIONS = {"columns": {"voltage": 1, "displacement": 5}, "units": {"displacement": "um"}, "sample_period": 5e-3}
+
+
+def test_the_measured_record_is_a_sine_from_zero_volts():
+    (record,) = experiment = read(measured() / "Model_Vi_Do.dat", initial_voltage=0.0, **OPTIONS)
+    assert (record.phase, record.size, record.sample_period, record.initial_voltage) == ("sine_1hz", 8027, 5e-3, 0.0)
+    assert np.ptp(record.voltage) == pytest.approx(3.6, abs=1e-3)
+    assert np.ptp(record.displacement) == pytest.approx(45e-6, rel=0.2)
+    assert not any(notice.severe for notice in experiment.notices)
+    assert "not_at_rest" not in kinds(experiment)
+
+
+def test_the_measured_record_taken_as_settled_contradicts_rest():
+    assert "not_at_rest" in kinds(read(measured() / "Model_Vi_Do.dat", **OPTIONS))
