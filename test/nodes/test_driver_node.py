@@ -57,6 +57,9 @@ def test_deactivate_ramps_down_and_activate_streams_again(lab):
     blocks = len(samples.blocks)
     assert lab.transition("activate")
     lab.wait(lambda: len(samples.blocks) > blocks + 5, "blocks again")
+    assert all(lab.transition(name) for name in ("deactivate", "cleanup", "configure", "activate"))
+    blocks = len(samples.blocks)
+    lab.wait(lambda: len(samples.blocks) > blocks + 5, "blocks of the stage opened again")
 
 
 @pytest.mark.parametrize("same_machine", [True, False])
