@@ -36,16 +36,12 @@ def test_replay_plays_no_command(tmp_path):
     replay = load("replay")
     context = launch.LaunchContext()
     context.launch_configurations.update(
-        bag=str(tmp_path),
-        axis="stage_x",
-        rate="1.0",
+        {**dict.fromkeys(("params_file", "model_file"), ""), "bag": str(tmp_path), "axis": "stage_x", "rate": "1.0"},
         namespace="replay",
-        params_file="",
         use_sim_time="true",
-        model_file="",
     )
     player = next(a for a in replay.actions(context) if type(a) is launch.actions.ExecuteProcess)
-    words = [part.text for part in sum(player.cmd, [])]
+    words = [part.text for word in player.cmd for part in word]
     assert words[words.index("--topics") + 1 : words.index("--remap")] == [
         "/stage_x/samples", "/stage_x/phase", "/stage_x/model",
     ]  # fmt: skip
