@@ -14,6 +14,7 @@ import numpy as np
 from ..effects import Arx, BoucWen, Effect, Offset
 from ..errors import IdentificationError
 from ..model import Model
+from ..provenance import provenance
 from ..record import Experiment, Notice
 from .comparison import Comparison, compare_inputs
 from .delay import Delay, identify_delay
@@ -136,15 +137,16 @@ def identify(
         joint = fit_lag(start, records, floors, roles.fitted)
     tell("free run", 0.95)
     phases = _free_run(joint.model, experiment, roles, reach)
-    model = _with_offset(joint, experiment, phases)
+    zero = float(np.mean([n[0] for n in joint.nuisances]))
+    joint = replace(joint, model=joint.model.with_effect(Offset(y0=zero)))
     if not joint.converged:
         notices.append(Notice("not_converged", f"the joint fit stopped after {joint.iterations} linearisations"))
     notices += [Notice("at_bound", f"{name} stopped at a bound of its table") for name in joint.at_bounds]
     if not any(not p.is_fitted for p in phases):
         notices.append(Notice("nothing_held_out", "all records were fitted: the errors are not those of a prediction"))
-    return Identification(
-        model, replace(joint, model=model), delay, dynamics, published, table, comparisons, phases, tuple(notices)
-    )
+    found = Identification(joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices))
+    origin = provenance(experiment, found.free_run_error, found.free_run_percent)
+    return replace(found, model=replace(joint.model, provenance=origin))
 
 
 def _delay(experiment: Experiment, roles: Roles, notices: list[Notice]) -> Delay | None:
@@ -187,12 +189,3 @@ def _free_run(model: Model, experiment: Experiment, roles: Roles, reach: float) 
         PhaseError(experiment[i].phase, rms[i], 100.0 * rms[i] / reach, i in roles.fitted)
         for i in (*roles.fitted, *roles.held_out)
     )
-
-
-def _with_offset(joint: Fit, experiment: Experiment, phases: tuple[PhaseError, ...]) -> Model:
-    """The model with the mean sensor zero of its records, and where it comes from."""
-    kept = [n[0] for n, rms in zip(joint.nuisances, joint.rms, strict=True) if np.isfinite(rms)]
-    judged = [p for p in phases if not p.is_fitted] or list(phases)
-    error = float(np.sqrt(np.mean([p.rms**2 for p in judged])))
-    told = {"source": experiment.source, "free_run_error": f"{error:.6g}"}
-    return replace(joint.model.with_effect(Offset(y0=float(np.mean(kept)))), provenance=told)

@@ -20,7 +20,7 @@ from .normal_equations import Nuisance, residuals
 FINER = 100
 """Sample periods of a pure lag per sample of the record."""
 SLOWEST_POLE = 0.1
-"""Longest time constant of G, as share of the longest record: slower ones are the hysteresis or drift in disguise."""
+"""Longest time constant of G, as share of the longest record: slower ones are drift in disguise."""
 
 
 def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Fit:
