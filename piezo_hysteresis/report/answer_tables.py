@@ -7,6 +7,8 @@ from typing import Any
 
 from .table import Table
 
+_GAP = ("before", "after", "floor")
+
 
 def effect_table(answer: Mapping[str, Any]) -> Table | None:
     """Every effect found, parameter by parameter, with 95 % intervals."""
@@ -34,7 +36,22 @@ def where_table(answer: Mapping[str, Any]) -> Table | None:
     return Table("Where the residual sits", ("axis", "share", "detail"), rows, note, frozenset({1})) if rows else None
 
 
+def gap_table(answer: Mapping[str, Any]) -> Table | None:
+    """Gap before and after, by phase where the diagnosis says it."""
+    gap = answer.get("gap_percent_of_range") or {}
+    phases = {name: value for name, value in (gap.get("per_phase") or {}).items() if isinstance(value, Mapping)}
+    rows = [(name, *(_percent(value.get(key)) for key in _GAP)) for name, value in phases.items()]
+    if gap.get("before") is not None:
+        rows.append(("all phases", *(_percent(gap.get(key)) for key in _GAP)))
+    note = "Per cent of range, on data used neither for fitting nor for choosing."
+    return Table("Gap", ("phase", *_GAP), tuple(rows), note, frozenset({1, 2, 3})) if rows else None
+
+
 def rejection_table(answer: Mapping[str, Any]) -> Table | None:
     """Effects that were tried and why they were not taken."""
     rows = tuple((r["name"], r["reason"]) for r in answer.get("rejected", ()))
     return Table("Rejected", ("effect", "reason"), rows) if rows else None
+
+
+def _percent(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import RecordingError
 from ..identification.fit import Fit
-from .answer_tables import effect_table, rejection_table, where_table
+from .answer_tables import effect_table, gap_table, rejection_table, where_table
 from .bode import bode
 from .comparison import Comparison
 from .creep import creep
@@ -121,7 +121,12 @@ def _tables(comparison: Comparison, fit: Fit | None, answer: Mapping[str, Any] |
         "Data": [notice_table(comparison.experiment), record_table(comparison.experiment, comparison.noise)],
     }
     if answer is not None:
-        tables["Diagnosis"] = [effect_table(answer), where_table(answer), rejection_table(answer)]
+        tables["Diagnosis"] = [
+            effect_table(answer),
+            gap_table(answer),
+            where_table(answer),
+            rejection_table(answer),
+        ]
     if comparison.model is not None:
         tables["Parameters"] = [parameter_table(comparison.model, fit)]
         tables["Parameters"] += [correlation_table(fit)] if fit is not None else []

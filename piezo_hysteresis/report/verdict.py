@@ -37,7 +37,13 @@ def verdict(comparison: Comparison, answer: Mapping[str, Any] | None = None) -> 
         return Verdict("The recording, without a model", (*doubts, "No model was given: only the data are shown."))
     if answer is None:
         return Verdict(_fit_headline(comparison), (*doubts, *_fit_sentences(comparison)))
-    return Verdict(_headline(answer), (*doubts, *_sentences(answer), *_fit_sentences(comparison)))
+    said = answer_verdict(answer)
+    return Verdict(said.headline, (*doubts, *said.sentences, *_fit_sentences(comparison)))
+
+
+def answer_verdict(answer: Mapping[str, Any]) -> Verdict:
+    """What a diagnosis says, from its answer for machines."""
+    return Verdict(_headline(answer), _sentences(answer))
 
 
 def _excess(comparison: Comparison) -> float:

@@ -33,7 +33,12 @@ ANSWER = {
         }
     ],
     "where": [{"axis": "time_since_level_change", "share": 0.81, "detail": "more than 1 s after a change of level"}],
-    "gap_percent_of_range": {"before": 0.72, "after": 0.04, "floor": 0.03, "per_phase": {}},
+    "gap_percent_of_range": {
+        "before": 0.72,
+        "after": 0.04,
+        "floor": 0.03,
+        "per_phase": {"triangle": {"before": 0.9, "after": 0.05, "floor": 0.03}},
+    },
     "rejected": [{"name": "thermal_drift", "reason": "loses <0.4> on held-out phases"}],
     "next_experiment": {"phase": "staircase", "separates": ["creep", "thermal_drift"]},
     "data_quality": [],

@@ -12,6 +12,7 @@ from html.parser import HTMLParser
 import pytest
 
 from piezo_hysteresis.errors import RecordingError
+from piezo_hysteresis.report.answer_tables import effect_table, gap_table, rejection_table, where_table
 from piezo_hysteresis.report.verdict import verdict
 
 VOID = {"meta", "img", "br", "link", "hr"}
@@ -155,3 +156,17 @@ def test_a_browser_shows_every_figure_and_reaches_every_link_by_keyboard(drawn, 
     links = len(tags.all("a")) + sum(a.get("tabindex") == "0" for _, a in tags.found)
     assert told["reached"] == links
     assert not told["wide"], "nothing scrolls sideways but the tables in their own frame"
+
+
+def test_tables_of_a_diagnosis_say_what_its_answer_says(answer):
+    (effect,) = effect_table(answer).rows
+    assert effect[:3] == ("creep", "creep", "97 %")
+    assert effect[-3:] == ("0.0143", "0.0139 … 0.0147", "1/decade")
+    assert gap_table(answer).rows == (
+        ("triangle", "0.900", "0.050", "0.030"),
+        ("all phases", "0.720", "0.040", "0.030"),
+    )
+    assert where_table(answer).rows[0][:2] == ("time since level change", "81 %")
+    assert rejection_table(answer).rows == (("thermal_drift", "loses <0.4> on held-out phases"),)
+    empty = {"verdict": "nothing_missing", "effects": [], "where": [], "rejected": []}
+    assert [t(empty) for t in (effect_table, gap_table, where_table, rejection_table)] == [None] * 4

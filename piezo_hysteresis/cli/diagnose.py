@@ -1,0 +1,64 @@
+"""``piezo diagnose``: where the model is wrong, which effect is missing, and the gap after adding it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .. import model_file
+from ..discrepancy.diagnose import diagnose
+from ..report.answer_tables import effect_table, gap_table, rejection_table, where_table
+from ..report.comparison import compare
+from ..report.page import page
+from ..report.verdict import answer_verdict
+from . import reading
+from .json_file import write_json
+from .terminal import console, progress, show, show_notices
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("diagnose", description=__doc__)
+    reading.add_arguments(parser)
+    parser.add_argument("--model", metavar="FILE", help="model file to begin with; default: identify one first")
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the model with what was found added")
+    parser.add_argument("--report", metavar="FILE", help="write the page, with figures beside it")
+    parser.add_argument("--json", metavar="FILE", help="answer for machines")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, print and save; returns 0 for all three verdicts.
+
+    Raises
+    ------
+    PiezoError
+        On bad input, or data that do not even determine a baseline.
+    """
+    start = None if args.model is None else model_file.load(args.model)
+    experiment = reading.read(args)
+    with progress("diagnose") as tell:
+        found = diagnose(experiment, start, progress=tell)
+    path = None if args.output is None else str(model_file.save(found.model, args.output))
+    answer = {**found.to_json(), "model": path}
+    out = console()
+    said = answer_verdict(answer)
+    out.print(said.headline, style="bold")
+    for sentence in said.sentences:
+        out.print(sentence)
+    out.print()
+    show(effect_table(answer), where_table(answer), gap_table(answer), rejection_table(answer))
+    show_notices(experiment.notices)
+    if args.json is not None:
+        write_json(args.json, answer)
+    if args.report is not None:
+        models = {"before": found.baseline}
+        if found.model is not found.baseline:
+            models["after"] = found.model
+        with progress("report") as tell:
+            drawn = page(compare(experiment, models), answer=answer, progress=tell)
+        drawn.save(Path(args.report).expanduser())
+    for written in (path, args.json, args.report):
+        if written is not None:
+            out.print(f"wrote {written}")
+    return 0

@@ -1,0 +1,67 @@
+"""Tables say what the comparison, the model and the data say."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from piezo_hysteresis.identification.fit import Fit
+from piezo_hysteresis.record import Experiment, Notice
+from piezo_hysteresis.report.error_table import error_table, frequency_table
+from piezo_hysteresis.report.parameter_table import correlation_table, parameter_table
+from piezo_hysteresis.report.quality_table import notice_table, record_table
+from piezo_hysteresis.report.words import duration, nanometre
+
+
+def test_every_phase_has_its_error_before_and_after(comparison):
+    table = error_table(comparison)
+    assert table.header[3:5] == ("baseline [%]", "with creep [%]")
+    for row, cells in zip(comparison.now.rows, table.rows, strict=False):
+        assert cells[0] == row.phase
+        assert cells[4] == f"{row.percent:.3f}"
+        assert cells[5] == f"{1e9 * row.rms:.1f}"
+    assert table.rows[-1][0] == "all phases"
+    assert table.rows[-1][4] == f"{comparison.now.percent:.3f}"
+
+
+def test_the_frequency_table_has_the_form_of_table_1(comparison):
+    table = frequency_table(comparison)
+    assert table.header == ("sine of", "1 Hz", "200 Hz")
+    assert [row[0] for row in table.rows] == ["baseline [%]", "with creep [%]"]
+
+
+def fitted(model, names, covariance, at_bounds=()):
+    return Fit(model, names, covariance, 1.0, (), (), at_bounds, True, 1)
+
+
+def test_parameters_show_intervals_bounds_hit_and_correlations(models):
+    model = models["with creep"]
+    names = ("bouc_wen.A", "bouc_wen.beta", "bouc_wen.p2", "creep.gamma")
+    covariance = np.diag([1e-4, 4e-4, 1e-4, 1e-8])
+    covariance[0, 2] = covariance[2, 0] = -0.99e-4
+    fit = fitted(model, names, covariance, ("creep.gamma",))
+    rows = {row[0]: row for row in parameter_table(model, fit).rows}
+    assert rows["bouc_wen.beta"][2:4] == ("4.6075", "± 0.039")
+    assert rows["creep.gamma"][5].endswith("at a bound")
+    assert not rows["bouc_wen.A"][5].endswith("at a bound")
+    assert rows["bouc_wen.gamma"][3] == "", "not fitted, so no interval"
+    assert correlation_table(fit).rows == (("bouc_wen.p2", "bouc_wen.A", "-0.990"),)
+    assert correlation_table(fitted(model, names, np.diag(np.diag(covariance)))) is None
+
+
+def test_the_data_are_told_as_they_are(experiment, comparison):
+    table = record_table(experiment, comparison.noise)
+    assert [row[0] for row in table.rows] == [r.phase for r in experiment]
+    assert table.rows[3][2] == "200 µs"
+    truncated = dataclasses.replace(experiment[0], truncated=True)
+    told = Experiment((truncated,), notices=(Notice("minor", "a"), Notice("gap", "b", "step", severe=True)))
+    assert record_table(told, comparison.noise[:1]).rows[0][-1] == "truncated"
+    assert [row[0] for row in notice_table(told).rows] == ["gap", "minor"], "the severe first"
+    assert notice_table(Experiment((truncated,))) is None
+
+
+def test_small_lengths_and_times_have_fitting_units():
+    assert nanometre(0.0) == "0 nm"
+    assert nanometre(-1.5e-6) == "-1.5 µm"
+    assert [duration(t) for t in (5e-9, 2e-5, 5e-3, 60.0)] == ["5 ns", "20 µs", "5 ms", "60 s"]
