@@ -19,7 +19,7 @@ from .warmup import Warmup, chain_at
 Array = NDArray[np.float64]
 
 ZERO_TIME = 0.1
-"""Time over which the offset between sensor and model is averaged [s]."""
+"""Time over which the offset between sensor and model is averaged [s]; in motion it takes a whole loop."""
 
 ZERO_SAMPLES = 20
 """Samples over which it is averaged at least."""
@@ -229,9 +229,10 @@ class Predictor:
             self._zero_from(start, at_rest=True)
         elif was_warming and not self.warming_up:
             self._zero_from(start)
+            self._zero.until = 2.0 * self._history.travel  # once more as far as what was forgotten
         elif self._zero.at_rest and not is_held(drive):
             self._zero.close()
-        self._zero.add(measured, modelled)
+        self._zero.add(measured, modelled, self._history.travel)
         return modelled
 
     def _remember(self, residual: Array) -> None:

@@ -19,11 +19,16 @@ class SensorZero:
         Samples to average; the offset holds from the first one on and settles with them.
     at_rest : bool
         True where the window ends early with the rest of the stage.
+
+    Attributes
+    ----------
+    until : float
+        Travel of the drive [V] before which the window stays open, so that it covers a loop and not a piece of one.
     """
 
     def __init__(self, start: int, wanted: int, at_rest: bool = False) -> None:
         self.start, self.stop = start, start
-        self.at_rest = at_rest
+        self.at_rest, self.until = at_rest, 0.0
         self._end = start + wanted
         self._measured = self._modelled = 0.0
 
@@ -32,8 +37,18 @@ class SensorZero:
         """Sensor minus model [m]; 0 before the first sample."""
         return (self._measured - self._modelled) / (self.stop - self.start) if self.stop > self.start else 0.0
 
-    def add(self, measured: Array, modelled: Array | None) -> None:
-        """Take the next samples [m], shape (n,), as far as they are wanted; `modelled` is None without a model."""
+    def add(self, measured: Array, modelled: Array | None, travel: float) -> None:
+        """Take the next samples, as far as they are wanted.
+
+        Parameters
+        ----------
+        measured, modelled : (n,) ndarray
+            Displacement [m]; `modelled` is None without a model.
+        travel : float
+            Way of the drive so far [V].
+        """
+        if travel < self.until:
+            self._end = max(self._end, self.stop + measured.size)
         count = min(measured.size, self._end - self.stop)
         self._measured += float(measured[:count].sum())
         if modelled is not None:

@@ -1,0 +1,62 @@
+"""Play a bag where there is no `ros2 bag play`: `python play_bag.py BAG [--rate 2] [--topics /samples /model]`.
+
+Every message goes out as it was recorded, on its own topic (`--ros-args -r /samples:=/replay/samples` renames it), and
+/clock follows the times of the bag: start the nodes with use_sim_time. A recorded `command` moves no stage, it is old.
+"""
+
+import argparse
+import sys
+import time
+from importlib import import_module
+from pathlib import Path
+
+import rclpy
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.utilities import remove_ros_args
+from rosgraph_msgs.msg import Clock
+
+from piezo_hysteresis.recording import Bag
+
+LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # serves late joiners and all others
+DISCOVERY = 3.0  # s, after which topics that nobody listens to are played to nobody
+CLOCK_STEP = 0.001  # s between two messages of /clock
+
+parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+parser.add_argument("bag", help="folder, or .mcap or .db3 file")
+parser.add_argument("--rate", type=float, default=1.0, help="speed of playing")
+parser.add_argument("--topics", nargs="*", help="topics to play; default all")
+options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+
+rclpy.init()
+node = rclpy.create_node("play_bag")
+clock = node.create_publisher(Clock, "/clock", 10)
+
+
+def publisher(topic: str, kind: str) -> Publisher:
+    """Publisher of a topic of the bag."""
+    package, _, name = kind.split("/")
+    return node.create_publisher(getattr(import_module(f"{package}.msg"), name), topic, LATCHED)
+
+
+bag = Bag(Path(options.bag))
+kinds = {message.topic: message.type for message in bag.messages(options.topics)}
+publishers = {topic: publisher(topic, kind) for topic, kind in kinds.items()}
+deadline = time.monotonic() + DISCOVERY
+while time.monotonic() < deadline and not all(p.get_subscription_count() for p in publishers.values()):
+    time.sleep(0.05)
+
+began, first, told = time.monotonic(), None, 0
+for message in bag.in_time_order(options.topics):
+    first = first or message.time_ns
+    due = began + (message.time_ns - first) * 1e-9 / options.rate
+    time.sleep(max(0.0, due - time.monotonic()))
+    if message.time_ns - told >= CLOCK_STEP * 1e9:
+        told = message.time_ns
+        now = Clock()
+        now.clock.sec, now.clock.nanosec = divmod(told, 1_000_000_000)
+        clock.publish(now)
+    publishers[message.topic].publish(message.raw)
+for one in publishers.values():
+    one.wait_for_all_acked()
+print(f"played {len(publishers)} topics of {options.bag}")
