@@ -12,6 +12,7 @@ FEWEST_LEVELS = 1000
 """Quantisation is told where a channel uses fewer levels than this; below a sixteenth of it nothing rests on it."""
 
 _DRIVE_MOVES = 0.05
+_DRIVE_RETURNS = 0.01
 _RETURN = 0.03
 _SEVERE_SHARE = 0.05
 
@@ -31,8 +32,10 @@ def _runs_of_equal(values: Samples, shortest: int) -> NDArray[np.int64]:
     return np.asarray(runs[runs[:, 1] - runs[:, 0] >= shortest])
 
 
-def _ranges(values: Samples, runs: NDArray[np.int64]) -> Samples:
-    return np.array([np.ptp(values[a:b]) for a, b in runs.tolist()])
+def _extremes(values: Samples, runs: NDArray[np.int64]) -> tuple[Samples, Samples]:
+    """Lowest and highest value in every run."""
+    padded = np.append(values, values[-1])  # a run may end behind the last sample
+    return np.minimum.reduceat(padded, runs.ravel())[::2], np.maximum.reduceat(padded, runs.ravel())[::2]
 
 
 def _stuck(record: Record) -> list[Notice]:
@@ -41,8 +44,13 @@ def _stuck(record: Record) -> list[Notice]:
     runs = _runs_of_equal(y, 5)
     if not len(runs):
         return []
-    runs = runs[_ranges(u, runs) > _DRIVE_MOVES * np.ptp(u)]
     at_rail = np.isin(y[runs[:, 0]], (y.min(), y.max()))
+    low, high = _extremes(u, runs)
+    first, last = u[runs[:, 0]], u[runs[:, 1] - 1]
+    beyond = np.maximum(high - np.maximum(first, last), np.minimum(first, last) - low)
+    # behind a turning point of the drive a stage with backlash stands still too; across it, it does not
+    moved = (high - low > _DRIVE_MOVES * np.ptp(u)) | (at_rail & (beyond > _DRIVE_RETURNS * np.ptp(u)))
+    runs, at_rail = runs[moved], at_rail[moved]
     notices = []
     for kind, part, text in (
         ("clipped", runs[at_rail], "the displacement is cut off at {:.4g} m"),

@@ -1,0 +1,208 @@
+"""Defects are found where they are, and good data are left alone."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.record import Experiment, Record
+from piezo_hysteresis.recording import inspect
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+PERIOD = 1e-4
+
+
+def stage(voltage, seed=0, noise=5e-9, lag=3e-4):
+    """A play operator, a lag and noise: 1.5 µm/V with a loop of a tenth of the stroke."""
+    v = np.asarray(voltage)
+    play = np.empty_like(v)
+    state = v[0]
+    for i, x in enumerate(v):
+        state = min(max(state, x - 0.4), x + 0.4)
+        play[i] = state
+    y = np.empty_like(v)
+    x = 1.2e-6 * v[0] + 0.3e-6 * play[0]
+    for i in range(v.size):
+        x += (1 - np.exp(-PERIOD / lag)) * (1.2e-6 * v[i] + 0.3e-6 * play[i] - x)
+        y[i] = x
+    return y + noise * np.random.default_rng(seed).normal(size=v.size)
+
+
+def sine(frequency=5.0, duration=1.0):
+    return 3.5 + 2.5 * np.sin(2 * np.pi * frequency * np.arange(round(duration / PERIOD)) * PERIOD)
+
+
+def clean():
+    drives = {
+        "rest": np.zeros(3000),
+        "step": np.repeat([0.0, 5.0], 2000),
+        "sine_5hz": sine(5.0),
+        "sine_200hz": sine(200.0, 0.3),
+        "noise": 3.5 + np.random.default_rng(1).normal(size=4000) * 0.1,
+        "staircase": np.repeat([0.0, 2.0, 4.0, 6.0, 4.0, 2.0, 0.0], 1000),
+    }
+    records = []
+    for seed, (phase, drive) in enumerate(drives.items()):
+        # the drive starts at the voltage at which the stage had settled
+        records.append(Record(drive, stage(drive, seed), PERIOD, phase, start_time=2.0 * seed))
+    return Experiment(tuple(records))
+
+
+def kinds(*records):
+    return {n.kind for n in inspect(Experiment(records))}
+
+
+def found(kind, *records):
+    notices = [n for n in inspect(Experiment(records)) if n.kind == kind]
+    assert notices, kind
+    return notices
+
+
+def test_good_data_are_left_alone():
+    assert inspect(clean()) == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_simulated_stage_gives_good_data(seed):
+    plant = SimulatedStage(seed=seed)
+    time = np.arange(20_000) * 2e-5
+    records = [
+        plant.play([0.0] * 2000, phase="rest"),
+        plant.play([0.0] * 500 + [3.0] * 3000 + [0.0] * 3000, phase="step"),
+        plant.play(3.0 - 3.0 * np.cos(2 * np.pi * 50 * time), phase="sine_50hz"),
+    ]
+    assert not [n for n in inspect(Experiment(tuple(records))) if n.severe or n.kind == "not_at_rest"]
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6, 1e9, 1e-6, 1e-9])
+def test_a_displacement_in_another_unit_is_told_with_the_power_of_ten(factor):
+    wrong = [Record(r.voltage, r.displacement * factor, PERIOD, r.phase) for r in clean()]
+    if 1e-9 < 7.5e-6 * factor < 2e-3:
+        pytest.skip("still a displacement that a stage can have")
+    (notice,) = found("units", *wrong)
+    assert notice.severe and "1e" in notice.message
+
+
+def test_a_voltage_in_another_unit_is_told():
+    wrong = [Record(r.voltage * 1e3, r.displacement, PERIOD, r.phase) for r in clean()]
+    assert found("units", *wrong)[0].severe
+    wrong = [Record(r.voltage * 1e-6, r.displacement, PERIOD, r.phase) for r in clean()]
+    assert found("units", *wrong)[0].severe
+
+
+@pytest.mark.parametrize("power", [-6, -3, 3, 6])
+def test_one_phase_in_another_unit_is_told_against_the_others(power):
+    records = list(clean().records)
+    records[2] = Record(records[2].voltage, records[2].displacement * 10.0**power, PERIOD, "sine_5hz", 4.0)
+    notices = found("scale", *records)
+    assert [n.phase for n in notices] == ["sine_5hz"]
+    assert f"1e{power:+d}" in notices[0].message
+    assert notices[0].severe
+
+
+@pytest.mark.parametrize(("channel", "severe"), [("voltage", True), ("displacement", True)])
+def test_a_channel_that_never_changes_is_told(channel, severe):
+    drive = sine()
+    still = Record(
+        np.zeros(drive.size) if channel == "voltage" else drive,
+        np.zeros(drive.size) if channel == "displacement" else stage(drive),
+        PERIOD,
+    )
+    assert [n.severe for n in found("constant", still)] == [severe]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.2])
+@pytest.mark.parametrize("top", [True, False])
+def test_a_displacement_at_its_rail_is_clipped(share, top):
+    drive = sine()
+    y = stage(drive)
+    rail = np.quantile(y, 1 - share if top else share)
+    cut = np.minimum(y, rail) if top else np.maximum(y, rail)
+    (notice,) = found("clipped", Record(drive, cut, PERIOD, "sine_5hz"))
+    told = int(notice.message.split(" samples")[0].split()[-1])
+    assert told == pytest.approx(np.count_nonzero(cut == rail), rel=0.01)
+    assert notice.severe
+
+
+def test_a_voltage_that_its_recorder_cuts_off_is_clipped():
+    drive = sine()
+    record = Record(np.minimum(drive, 5.5), stage(drive), PERIOD, "sine_5hz")
+    assert "clipped" in kinds(record)
+
+
+def test_a_drive_that_saturates_is_no_defect():
+    drive = np.minimum(sine(), 5.5)
+    assert "clipped" not in kinds(Record(drive, stage(drive), PERIOD, "x"))
+
+
+def test_a_stage_with_backlash_is_not_clipped():
+    drive = sine()
+    assert "clipped" not in kinds(Record(drive, stage(drive, noise=0.0, lag=1e-9) - 1.2e-6 * drive, PERIOD, "x"))
+
+
+def test_a_sensor_that_hangs_is_stuck():
+    drive = sine()
+    y = stage(drive)
+    y[4100:4400] = y[4100]
+    assert "stuck" in kinds(Record(drive, y, PERIOD, "sine_5hz"))
+
+
+@pytest.mark.parametrize("length", [1, 7, 40])
+def test_drop_outs_are_counted(length):
+    drive = sine()
+    y = stage(drive)
+    for start in (1200, 5300, 8100):
+        y[start : start + length] = -1e-6
+    (notice,) = found("dropout", Record(drive, y, PERIOD, "sine_5hz"))
+    assert "3 times" in notice.message
+    assert f"{3 * length} samples" in notice.message
+
+
+@pytest.mark.parametrize(("bits", "told", "severe"), [(16, False, False), (8, True, False), (5, True, True)])
+def test_coarse_quantisation_is_told_with_its_step(bits, told, severe):
+    drive = sine()
+    y = stage(drive)
+    step = np.ptp(y) / 2**bits
+    notices = [
+        n
+        for n in inspect(Experiment((Record(drive, np.round(y / step) * step, PERIOD, "x"),)))
+        if n.kind == "quantisation"
+    ]
+    assert bool(notices) == told
+    assert any(n.severe for n in notices) == severe
+    assert all(f"{step:.3g}" in n.message for n in notices)
+
+
+def test_columns_shifted_against_each_other_are_told():
+    drive = sine()
+    y = stage(drive)
+    assert "leads" not in kinds(Record(drive, y, PERIOD, "sine_5hz"))
+    early = Record(drive[:-300], y[300:], PERIOD, "sine_5hz")
+    assert found("leads", early)[0].severe
+
+
+def test_a_stage_that_moves_against_its_drive_is_told():
+    drive = sine()
+    assert kinds(Record(drive, -stage(drive), PERIOD, "sine_5hz")) == {"polarity"}
+
+
+def test_a_wrong_sample_period_shows_in_the_name_of_a_sine():
+    drive = sine()
+    (notice,) = found("sample_period", Record(drive, stage(drive), 10 * PERIOD, "sine_5hz"))
+    assert "0.5 Hz" in notice.message
+
+
+def test_phases_that_overlap_in_time_are_told():
+    drive = sine()
+    record = Record(drive, stage(drive), PERIOD, "sine_5hz")
+    later = Record(drive, stage(drive), PERIOD, "sine_5hz", start_time=0.4)
+    assert "time_base" in kinds(record, later)
+
+
+def test_a_start_that_is_not_settled_contradicts_rest():
+    drive = np.repeat([0.0, 4.0], [2000, 8000]) + np.concatenate((np.zeros(4000), 0.5 * np.sin(np.arange(6000) * 0.01)))
+    y = stage(drive, lag=5e-3)
+    settled = Record(drive[1000:], y[1000:], PERIOD, "x")
+    late = Record(drive[2000:], y[2000:], PERIOD, "x")
+    assert "not_at_rest" not in kinds(settled)
+    assert "not_at_rest" in kinds(late)
+    assert "not_at_rest" not in kinds(Record(late.voltage, late.displacement, PERIOD, "x", initial_voltage=0.0))
+    assert "not_at_rest" not in kinds(Record(late.voltage, late.displacement, PERIOD, "x", truncated=True))
