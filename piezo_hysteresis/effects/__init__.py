@@ -1,7 +1,7 @@
 """The catalogue: one physical effect per file, listed here in the order of the chain.
 
-u → [timing] → [amplifier] → v → [backlash] → [input polynomial + h + plays] → w → [creep] → [G, extra mode, softening]
-→ x → [sensor] → [other axis, drift, hum] → y
+u → [amplifier] → [backlash] → v → [h with its terms + plays + even polynomial] → w → [creep] →
+[delay, G with softening, extra mode] → x → [sensor] → [drift, other axis, hum, zero] → y
 """
 
 from __future__ import annotations

@@ -79,13 +79,16 @@ def oscillator(f0: float, zeta: float, sample_period: float) -> tuple[Array, Arr
 @kernel
 def run_mode(u, step, z, q):
     """Rows of u (r, n) to positions q (r, n); z (r, 3) = last input, position, velocity/ω0, updated."""
+    p0, p1, p2, p3 = step[0, 0], step[0, 1], step[0, 2], step[0, 3]
+    v0, v1, v2, v3 = step[1, 0], step[1, 1], step[1, 2], step[1, 3]
     for r in range(u.shape[0]):
         last, position, velocity = z[r, 0], z[r, 1], z[r, 2]
         for i in range(u.shape[1]):
-            du = u[r, i] - last
-            moved = step[0, 0] * position + step[0, 1] * velocity + step[0, 2] * last + step[0, 3] * du
-            velocity = step[1, 0] * position + step[1, 1] * velocity + step[1, 2] * last + step[1, 3] * du
-            position, last = moved, u[r, i]
+            x = u[r, i]
+            pushed, turned = p2 * last + p3 * (x - last), v2 * last + v3 * (x - last)
+            moved = p0 * position + p1 * velocity + pushed
+            velocity = v0 * position + v1 * velocity + turned
+            position, last = moved, x
             q[r, i] = position
         z[r, 0], z[r, 1], z[r, 2] = last, position, velocity
 
@@ -103,8 +106,8 @@ def mode_slopes(u, step, slopes, z, dz, dq):
             dz[k, 1] = step[1, 0] * dz[k, 0] + step[1, 1] * dz[k, 1] + pushed
             dz[k, 0] = moved
             dq[k, i] = moved
-        moved = step[0, 0] * z[1] + step[0, 1] * z[2] + step[0, 2] * z[0] + step[0, 3] * du
-        z[2] = step[1, 0] * z[1] + step[1, 1] * z[2] + step[1, 2] * z[0] + step[1, 3] * du
+        moved = step[0, 0] * z[1] + step[0, 1] * z[2] + (step[0, 2] * z[0] + step[0, 3] * du)
+        z[2] = step[1, 0] * z[1] + step[1, 1] * z[2] + (step[1, 2] * z[0] + step[1, 3] * du)
         z[1], z[0] = moved, u[i]
 
 

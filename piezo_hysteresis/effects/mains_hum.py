@@ -73,20 +73,29 @@ class MainsHumBlock(TimeBlock):
     ) -> None:
         super().__init__(sample_period)
         self.names, self.cosine, self.sine = names, cosine, sine
-        self.rates = 2.0 * np.pi * np.arange(1, cosine.size + 1)
         self.frequency = frequency
 
     def rest(self, x0: float, time: float) -> State:
         return 0.0, 0
 
+    def _waves(self, t: Array) -> tuple[Array, Array]:
+        """Cosines and sines of all harmonics, each (k, n), by the addition theorem."""
+        cosines, sines = np.empty((self.cosine.size, t.size)), np.empty((self.cosine.size, t.size))
+        angle = 2.0 * np.pi * self.frequency * t
+        c, s = np.cos(angle), np.sin(angle)
+        for k in range(self.cosine.size):
+            cosines[k], sines[k] = c, s
+            c, s = c * cosines[0] - s * sines[0], s * cosines[0] + c * sines[0]
+        return cosines, sines
+
     def value(self, x: Array, t: Array) -> Array:
-        for rate, c, s in zip(self.rates, self.cosine, self.sine, strict=True):
-            angle = rate * self.frequency * t
-            x = x + (c * np.cos(angle) + s * np.sin(angle))
+        for c, s, cosine, sine in zip(self.cosine, self.sine, *self._waves(t), strict=True):
+            x = x + (c * cosine + s * sine)
         return x
 
     def by_parameter(self, x: Array, t: Array) -> Array:
-        angles = np.outer(self.rates * self.frequency, t)
-        cosines, sines = np.cos(angles), np.sin(angles)
-        by_angle = self.sine[:, None] * cosines - self.cosine[:, None] * sines
-        return np.vstack(((self.rates @ by_angle) * t, cosines, sines))
+        cosines, sines = self._waves(t)
+        by_frequency = np.zeros(t.size)
+        for k, (c, s) in enumerate(zip(self.cosine, self.sine, strict=True)):
+            by_frequency += 2.0 * np.pi * (k + 1) * t * (s * cosines[k] - c * sines[k])
+        return np.vstack((by_frequency, cosines, sines))

@@ -14,14 +14,16 @@ from .relaxation import hold
 def run_poles(u, left, lead, back, z, y):
     """Rows of u (r, n) through z.shape[1] − 1 equal poles; z (r, 1 + poles) = last input and outputs, updated."""
     for r in range(u.shape[0]):
-        for i in range(u.shape[1]):
-            before, x = z[r, 0], u[r, i]
-            z[r, 0] = x
-            for k in range(1, z.shape[1]):
-                after = left * z[r, k] + lead * x + back * before
-                before, x = z[r, k], after
-                z[r, k] = after
-            y[r, i] = x
+        y[r] = u[r]
+        for k in range(1, z.shape[1]):
+            before, after = z[r, k - 1], z[r, k]
+            for i in range(u.shape[1]):
+                x = y[r, i]
+                after = left * after + lead * x + back * before
+                before = x
+                y[r, i] = after
+            z[r, k - 1] = before
+        z[r, z.shape[1] - 1] = y[r, u.shape[1] - 1]
 
 
 @kernel

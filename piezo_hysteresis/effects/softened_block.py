@@ -89,32 +89,48 @@ def run_mode_deviation(w, x0, p, z, xi):
 
 
 @kernel
-def linearise_mode_deviation(w, dw, x0, dx0, p, z, dz, dxi):
-    """∂ξ to dxi (m + 4, n): rows dw (m, n), then p; dx0 (m + 4,) are slopes of x0, z (4,) and dz (m + 4, 4) updated."""
-    gain, m = 1.0 + p[0] + p[1], dw.shape[0]
+def linearise_mode_deviation(w, dw, x0, dx0, p, z, dz, xi, dxi):
+    """`run_mode_deviation` with ∂ξ to dxi (m + 4, n): rows dw (m, n), then p.
+
+    dx0 (m + 4,) are slopes of x0; dz (m + 4, 4) is updated.
+    """
+    gain, m, n = 1.0 + p[0] + p[1], dw.shape[0], w.size
+    m1, m2 = p[0], p[1]
     held, held_slope = force(x0, p[2], p[3]), force_slope(x0, p[2], p[3])
-    by_p = np.zeros(4)
-    mode_by_p = np.zeros(4)
-    for i in range(w.size):
+    slope, forcing = np.empty(n), np.zeros((4, 2, n))
+    for i in range(n):
         x = x0 + (z[0] + z[2])
-        excess, slope = force(x, p[2], p[3]) - held, force_slope(x, p[2], p[3])
-        mode_by_p[0], mode_by_p[1] = w[i] - z[0], w[i] - z[1]
-        by_p[0], by_p[1] = -z[2] - excess, -z[3] - excess
-        by_p[2], by_p[3] = -gain * (abs(x) * x - abs(x0) * x0), -gain * (x * x * x - x0 * x0 * x0)
-        for r in range(m + 4):
-            d_excess = slope * (dx0[r] + dz[r, 0] + dz[r, 2]) - held_slope * dx0[r]
-            d_mode = -p[0] * dz[r, 0] - p[1] * dz[r, 1]
-            d_xi = -p[0] * dz[r, 2] - p[1] * dz[r, 3] - gain * d_excess
+        excess = force(x, p[2], p[3]) - held
+        slope[i] = force_slope(x, p[2], p[3])
+        forcing[0, 0, i], forcing[0, 1, i] = w[i] - z[0], -z[2] - excess
+        forcing[1, 0, i], forcing[1, 1, i] = w[i] - z[1], -z[3] - excess
+        forcing[2, 1, i] = -gain * (abs(x) * x - abs(x0) * x0)
+        forcing[3, 1, i] = -gain * (x * x * x - x0 * x0 * x0)
+        xi[i] = -m1 * z[2] - m2 * z[3] - gain * excess
+        z[1], z[0], z[3], z[2] = z[0], gain * w[i] - m1 * z[0] - m2 * z[1], z[2], xi[i]
+    for r in range(m + 4):
+        mode, mode_before, moved, moved_before = dz[r, 0], dz[r, 1], dz[r, 2], dz[r, 3]
+        for i in range(n):
+            d_excess = slope[i] * (dx0[r] + mode + moved) - held_slope * dx0[r]
+            d_mode = -m1 * mode - m2 * mode_before
+            d_xi = -m1 * moved - m2 * moved_before - gain * d_excess
             if r < m:
                 d_mode += gain * dw[r, i]
             else:
-                d_mode += mode_by_p[r - m]
-                d_xi += by_p[r - m]
-            dz[r, 1], dz[r, 0], dz[r, 3], dz[r, 2] = dz[r, 0], d_mode, dz[r, 2], d_xi
+                d_mode += forcing[r - m, 0, i]
+                d_xi += forcing[r - m, 1, i]
+            mode, mode_before, moved, moved_before = d_mode, mode, d_xi, moved
             dxi[r, i] = d_xi
-        mode = gain * w[i] - p[0] * z[0] - p[1] * z[1]
-        xi = -p[0] * z[2] - p[1] * z[3] - gain * excess
-        z[1], z[0], z[3], z[2] = z[0], mode, z[2], xi
+        dz[r, 0], dz[r, 1], dz[r, 2], dz[r, 3] = mode, mode_before, moved, moved_before
+
+
+@kernel
+def add_mixed(weights, rows, out):
+    """out (j, n) += Σ_k weights (k, j) · rows (k, n); a matrix product that does not depend on how n is cut."""
+    for j in range(out.shape[0]):
+        for k in range(rows.shape[0]):
+            for i in range(rows.shape[1]):
+                out[j, i] += weights[k, j] * rows[k, i]
 
 
 class StaticSoftening(MemorylessBlock):
@@ -184,9 +200,8 @@ class SoftenedBlock(Block):
         m, na, nb = len(dx), self.arx.a.size, self.arx.b.size
         dz, xi = dz.copy(), np.empty(x.shape)
         d_xi = np.empty((m + 4, x.size))
-        linearise_mode_deviation(x - w0, dx - dw0[:, None], x0, dx0, self.loop, z.copy(), dz, d_xi)
         z = z.copy()
-        run_mode_deviation(x - w0, x0, self.loop, z, xi)
+        linearise_mode_deviation(x - w0, dx - dw0[:, None], x0, dx0, self.loop, z, dz, xi, d_xi)
         y, rows, arx, d_arx = self.arx.linearise(x, dx, arx, d_arx)
         added, through, by_rest = np.empty((1, x.size)), np.empty(d_xi.shape), np.empty((na - 1 + nb, x.size))
         after = self.rest_of_arx.filter(xi[None, :], filtered, added)
@@ -195,7 +210,8 @@ class SoftenedBlock(Block):
         rows[:m] += self.arx.gain * (dx0[:m] - dw0)[:, None] + through[:m]
         rows[m:] += (self.arx.gain_slopes() * (x0 - w0))[:, None]
         by_mode = through[m : m + 2] - added / self.mode_gain
-        rows[m : m + na] += self.by_a.T @ np.vstack((by_mode, by_rest[: na - 2]))
+        add_mixed(self.by_a[:2], by_mode, rows[m : m + na])
+        add_mixed(self.by_a[2:], by_rest[: na - 2], rows[m : m + na])
         rows[m + na : m + na + nb] += by_rest[na - 2 : -1] / self.mode_gain
         rows[m + na + nb] += by_rest[-1]
         by_stiffness = self.arx.gain * dx0[m + 2 :, None] + through[m + 2 :]

@@ -1,0 +1,84 @@
+"""Speed of simulation and of sensitivities: the published chain, and every effect of the catalogue added to it.
+
+Processor time of one core, after warm-up, over a drive that fits in no cache.
+
+    python -m benchmarks.simulation
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from piezo_hysteresis.effects import CATALOGUE, Arx, BoucWen, Effect, PublishedBoucWen
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Record
+
+ARX = Arx(
+    a=[-0.05847, 0.2423, -0.05833, -0.4917, 0.4170, -0.1945, 0.07748, -0.01198],
+    b=[0.004481, 0.04629, 0.1320, 0.1154, -0.02198, -0.06236, -0.0007691, 0.01408],
+    delay=3,
+)
+PERIOD = 2e-5
+
+
+def seconds(work: Callable[[], object], repeats: int = 5) -> float:
+    """Shortest processor time of `work`, after one run to warm up."""
+    work()
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        work()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def record(size: int) -> Record:
+    """Large slow sine with a little noise, every channel filled."""
+    voltage = 3.5 + 2.5 * np.sin(np.arange(size) * 2e-3) + np.random.default_rng(0).normal(scale=0.01, size=size)
+    zero = np.zeros(size)
+    return Record(voltage, zero, PERIOD, other_displacement=zero, temperature=zero + 293.15)
+
+
+def measure(model: Model, data: Record, wanted: list[str]) -> tuple[float, float]:
+    """Samples per second of the simulation, and the cost of its sensitivities as a multiple of it."""
+    value = seconds(lambda: model.simulate(data))
+    slopes = seconds(lambda: [None for _ in model.linearise([data], wanted)], 3)
+    return data.size / value, slopes / value
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, default=400_000)
+    data = record(parser.parse_args().samples)
+    table = Table("chain", "million samples/s", "numbers", "sensitivities / simulation", title="one core")
+
+    def row(name: str, *effects: Effect) -> None:
+        model = Model(effects, PERIOD)
+        wanted = [n for n in model.values() if not model.row(n).fixed]
+        speed, ratio = measure(model, data, wanted)
+        table.add_row(name, f"{speed / 1e6:.0f}", str(len(wanted)), f"{ratio:.1f}")
+
+    row("published_bouc_wen", PublishedBoucWen())
+    row("published_bouc_wen, arx", PublishedBoucWen(), ARX)
+    row("bouc_wen", BoucWen())
+    row("bouc_wen, arx", BoucWen(), ARX)
+    for kind in CATALOGUE:
+        on = {
+            p.name: p.off - p.scale if p.off == p.upper else p.off + p.scale
+            for p in kind.parameters
+            if p.off is not None
+        }
+        arrays = {p.name: (on[p.name],) * len(p.value) for p in kind.parameters if p.name in on and p.is_array}
+        row(f"… with {kind.name}", BoucWen(), ARX, kind(**{**on, **arrays}))
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()
