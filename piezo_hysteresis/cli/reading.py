@@ -72,7 +72,7 @@ def read(args: argparse.Namespace) -> Experiment:
         rows=_rows(args.rows),
         phases=_phases(args.phase),
         include=args.include,
-        decimate=_pairs("--decimate", args.decimate, int),
+        decimate=_pairs("--decimate", args.decimate, int) or None,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,7 +41,9 @@ class Progress:
     phase: str = ""
 
 
-def campaign(node: Node, driver: DriverLink, plan: Callable[[DriveLimits], Protocol], path: Path) -> Iterator[Progress]:
+def campaign(
+    node: Node, driver: DriverLink, plan: Callable[[DriveLimits], Protocol], path: Path
+) -> Generator[Progress]:
     """Play and record a protocol; to be resumed at short intervals until it ends.
 
     Closing the iterator aborts: the driver is asked to go to its safe voltage and the recording is finished.
@@ -97,7 +99,7 @@ def campaign(node: Node, driver: DriverLink, plan: Callable[[DriveLimits], Proto
             driver.stop()
 
 
-def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Iterator[Progress]:
+def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Generator[Progress]:
     deadline = time.monotonic() + PATIENCE
     while not condition():
         if time.monotonic() > deadline:
@@ -105,7 +107,7 @@ def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Iterato
         yield Progress("waiting", f"for {missing()}")
 
 
-def _play(driver: DriverLink, recorder: BagRecorder, phase: Phase, told: Progress) -> Iterator[Progress]:
+def _play(driver: DriverLink, recorder: BagRecorder, phase: Phase, told: Progress) -> Generator[Progress]:
     driver.send(phase)
     # a device that plays from its memory is silent meanwhile
     longest_silence = PATIENCE + 2.0 * phase.duration

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -57,7 +57,7 @@ class IdentificationNode(Node):
         self._status = IdentificationStatus(self)
         self._driver = DriverLink(self, self._value("driver"))
         self._models = self.create_publisher(String, "model", LATCHED)
-        self._job: Iterator[Progress] | None = None
+        self._job: Generator[Progress] | None = None
         self._last: Path | None = None
         self._served = ServedModel(self, START)
         try:
@@ -117,7 +117,7 @@ class IdentificationNode(Node):
         response.success, response.message = True, "aborted"
         return response
 
-    def _begin(self, response: Trigger.Response, job: Iterator[Progress], message: str) -> Trigger.Response:
+    def _begin(self, response: Trigger.Response, job: Generator[Progress], message: str) -> Trigger.Response:
         if self._job is not None:
             job.close()
             response.message = "busy; wait, or abort first"
@@ -137,7 +137,7 @@ class IdentificationNode(Node):
             self._job = None
             self._status.failed(str(error))
 
-    def _identify(self, path: Path) -> Iterator[Progress]:
+    def _identify(self, path: Path) -> Generator[Progress]:
         planned: list[Protocol] = []
 
         def plan(limits: DriveLimits) -> Protocol:
@@ -150,7 +150,7 @@ class IdentificationNode(Node):
         self._last = path
         yield from self._fit(identification, path)
 
-    def _fit(self, job: Job, path: Path) -> Iterator[Progress]:
+    def _fit(self, job: Job, path: Path) -> Generator[Progress]:
         self._status.experiment = str(path)
         model = self._served.model
         process = FitProcess(job, path, "" if model is None else dumps(model))

@@ -16,6 +16,7 @@ from ..record import Experiment
 from .bag import Bag
 from .bag_writer import BagWriter
 from .csv import Csv
+from .decimation import load_decimation
 from .format import Format, WritableFormat
 from .gcs_array import GcsArray
 from .layout import Column, Layout
@@ -64,7 +65,8 @@ def read(
     axis, columns, units, sample_period, initial_voltage, rows, phases, include
         What the file does not say: see `Layout`.
     decimate : mapping of str to int, optional
-        Phase name to the number of samples that are averaged into one on reading (`Record.decimate`).
+        Phase name to the number of samples that are averaged into one on reading (`Record.decimate`); default what the
+        identification node left in the folder of its bag, or nothing.
 
     Returns
     -------
@@ -86,6 +88,8 @@ def read(
         records = tuple(
             r if r.continues or r.truncated else replace(r, initial_voltage=initial_voltage) for r in records
         )
+    if decimate is None:
+        decimate = load_decimation(place)
     if decimate:
         records = tuple(r.decimate(decimate.get(r.phase, decimate.get(r.phase.split("_")[0], 1))) for r in records)
     experiment = replace(experiment, records=records)
