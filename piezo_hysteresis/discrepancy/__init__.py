@@ -1,0 +1,29 @@
+"""The gap finder: where a model is wrong, which physical effect is missing, and the gap after adding it.
+
+`noise_floor` (what no model can explain) → `localise` (where) → `candidates` (score test, joint refit) → `selection`
+(add, repeat, stop) → `gap` (before, after, on unseen records) → `next_experiment`. `diagnose` runs them all.
+"""
+
+from __future__ import annotations
+
+from .diagnose import diagnose
+from .diagnosis import Diagnosis, Verdict
+from .gap import Gap, measure_gap
+from .localise import Place, localise
+from .noise_floor import floors, noise_floors, stroke
+from .selection import Selection, select
+
+__all__ = [
+    "Diagnosis",
+    "Gap",
+    "Place",
+    "Selection",
+    "Verdict",
+    "diagnose",
+    "floors",
+    "localise",
+    "measure_gap",
+    "noise_floors",
+    "select",
+    "stroke",
+]

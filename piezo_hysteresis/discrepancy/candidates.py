@@ -13,10 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import Effect, MainsHum
+from ..effects import Arx, Effect, MainsHum
 from ..effects.extent import Extent
-from ..errors import DivergenceError, ModelError, ParameterError
+from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
+from ..identification.content import content_of
 from ..identification.fit import Fit, fit, gauge
+from ..identification.linear_start import dynamics_behind, with_dynamics
 from ..identification.normal_equations import Gram, Nuisance, grams
 from ..model import Model
 from ..record import Record
@@ -34,7 +36,7 @@ class Evidence:
     records : tuple of Record
         In experiment order.
     floors : (r,) ndarray
-        Floor of every record [m].
+        Floor of every record [m]; infinite where a record only carries the state of the stage.
     nuisance : Nuisance
         Free per record.
     extent : Extent
@@ -45,6 +47,18 @@ class Evidence:
     floors: Array
     nuisance: Nuisance
     extent: Extent
+
+    def broadband(self) -> list[int]:
+        """Records whose drive determines linear dynamics."""
+        return [
+            i
+            for i, (r, f) in enumerate(zip(self.records, self.floors, strict=True))
+            if np.isfinite(f) and r.sample_period < 1.001 * self.extent.fastest_period and content_of(r).is_broadband
+        ]
+
+    def with_peaks(self, peaks: tuple[float, ...]) -> Evidence:
+        """With the frequencies at which the residual stands out [Hz]."""
+        return replace(self, extent=replace(self.extent, peaks=peaks))
 
     def with_hum(self, frequency: float) -> Evidence:
         """With mains hum of its own amplitude and phase in every record."""
@@ -83,7 +97,7 @@ def free_numbers(model: Model, nuisance: Nuisance) -> list[str]:
         row = model.row(name)
         if not (row.fixed or row.per_record or name == "arx.delay"):
             names.append(name)
-    skipped = {"offset.y0"} if nuisance.offset else set()
+    skipped = {"offset.y0", "offset.settling"} if nuisance.offset else set()
     skipped |= {f"{MainsHum.name}.f"}
     return [n for n in names if n not in skipped]
 
@@ -181,24 +195,48 @@ def _screen_moves(model: Model, evidence: Evidence, base: list[str], moves: list
     ]
 
 
-def refit(model: Model, candidate: Candidate, max_iterations: int = 12, tolerance: float = 1e-3) -> Candidate | None:
+def refit(model: Model, candidate: Candidate, max_iterations: int = 8, tolerance: float = 1e-3) -> Candidate | None:
     """Fit the model with the candidate jointly, from its start; None where that diverges."""
     evidence = candidate.evidence
     try:
-        extended = model.with_effect(candidate.effect)
-        result = fit(
-            extended,
-            evidence.records,
-            free_numbers(extended, evidence.nuisance),
-            floors=evidence.floors.tolist(),
-            nuisance=evidence.nuisance,
-            max_iterations=max_iterations,
-            tolerance=tolerance,
-        )
-        score = score_model(result.model, evidence)
-    except (DivergenceError, ParameterError, ModelError):
+        result = _joint(model.with_effect(candidate.effect), evidence, max_iterations, tolerance)
+        return replace(candidate, effect=result.model[candidate.name], score=score_model(result.model, evidence), fit=result)
+    except (DivergenceError, ParameterError, ModelError, IdentificationError):
         return None
+
+
+def restart(candidate: Candidate, max_iterations: int = 8, tolerance: float = 1e-3) -> Candidate:
+    """The refit once more behind dynamics found anew; itself where that is no better.
+
+    The dynamics of the model before were bent by the effect it lacked; from there a joint fit has a long way to go.
+    """
+    evidence, fitted = candidate.evidence, candidate.fit
+    assert fitted is not None
+    broadband = evidence.broadband()
+    if not broadband or not isinstance(arx := fitted.model["arx"], Arx):
+        return candidate
+    orders = (arx.array("a").size, arx.array("b").size)
+    try:
+        found = dynamics_behind(fitted.model, evidence.records, broadband, round(arx["delay"]), orders)
+        result = _joint(with_dynamics(fitted.model, found.arx), evidence, max_iterations, tolerance)
+        score = score_model(result.model, evidence)
+    except (DivergenceError, ParameterError, ModelError, IdentificationError):
+        return candidate
+    if result.cost >= fitted.cost:
+        return candidate
     return replace(candidate, effect=result.model[candidate.name], score=score, fit=result)
+
+
+def _joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: float) -> Fit:
+    return fit(
+        model,
+        evidence.records,
+        free_numbers(model, evidence.nuisance),
+        floors=evidence.floors.tolist(),
+        nuisance=evidence.nuisance,
+        max_iterations=max_iterations,
+        tolerance=tolerance,
+    )
 
 
 def alikeness(first: Candidate, second: Candidate, model: Model) -> float:
@@ -218,7 +256,7 @@ def alikeness(first: Candidate, second: Candidate, model: Model) -> float:
     products = grams(model, evidence.records, base, evidence.nuisance, extra)
     total = weighted_sum(products, evidence.floors)
     q = len(base)
-    free = np.vstack((gauge(model, base),))
+    free = gauge(model, base)
     inner = free.T @ total[:q, :q] @ free
     cross = free.T @ total[:q, q : q + 2]
     scale = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))

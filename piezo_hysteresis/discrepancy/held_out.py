@@ -64,13 +64,15 @@ def held_out(grams: Sequence[Gram], floors: Sequence[float], columns: Array) -> 
     grams : sequence of Gram
         Of the records, all over the same rows.
     floors : sequence of float
-        Floor of every record [m].
+        Floor of every record [m]; those with an infinite one only carry the state of the stage and do not count.
     columns : (rows, q) ndarray
         Directions in which the parameters may move, as combinations of the rows of `grams`; the residual's row,
         the last, is zero.
     """
     inner, cross, power = [], [], []
     for gram, floor in zip(grams, floors, strict=True):
+        if not np.isfinite(floor):
+            continue
         weight = 1.0 / (gram.size * floor * floor)
         inner.append(weight * columns.T @ gram.matrix @ columns)
         cross.append(weight * columns.T @ gram.matrix[:, -1])
@@ -79,7 +81,7 @@ def held_out(grams: Sequence[Gram], floors: Sequence[float], columns: Array) -> 
     scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
     squares = []
     for h, g, e in zip(inner, cross, power, strict=True):
-        step = _solve(hessian - h, slope - g, scale) if len(grams) > 1 else _solve(hessian, slope, scale)
+        step = _solve(hessian - h, slope - g, scale) if len(inner) > 1 else _solve(hessian, slope, scale)
         squares.append(max(0.0, e - 2.0 * step @ g + step @ h @ step))
     return Score(np.sqrt(squares), _solve(hessian, slope, scale))
 

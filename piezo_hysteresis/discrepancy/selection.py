@@ -12,7 +12,7 @@ import numpy as np
 
 from ..effects import CATALOGUE, Effect
 from ..model import Model
-from .candidates import Candidate, Evidence, alikeness, refit, screen
+from .candidates import Candidate, Evidence, alikeness, refit, restart, screen
 from .held_out import Score
 
 Progress = Callable[[str, float], None]
@@ -27,8 +27,15 @@ NAMED = 0.6
 """Explained fraction of the gap from which a family is named."""
 REFITS = 6
 """Candidates that are refitted jointly."""
+AGAIN = 3
+"""Refits that begin once more behind dynamics found anew."""
+RESTARTS = 4
+WORTHWHILE = 0.8
+"""Share of the cost above which beginning anew once more is not worth it."""
 MOST = 3
 """Effects at most."""
+CLOSE = 0.3
+"""Share of the best gain by which a rival may lie behind."""
 ALIKE = 0.97
 """|cos| of two signatures from which they count as one."""
 
@@ -178,6 +185,9 @@ def _turn(
     if not refits:
         return None
     refits.sort(key=lambda c: c.score.cost)
+    tell("dynamics anew", 0.9)
+    again = [_settled(c) for c in refits[:AGAIN]]
+    refits = sorted(again + refits[AGAIN:], key=lambda c: c.score.cost)
     best = _simplest(refits)
     rivals, rejected = [], []
     gain = before.cost - best.score.cost
@@ -186,8 +196,8 @@ def _turn(
         if candidate is best:
             continue
         lead, error = best.score.better_than(candidate.score)
-        alike = alikeness(best, candidate, model) if lead < 0.5 * gain else 0.0
-        if accepted and (lead < 2.0 * error or alike > ALIKE) and lead < 0.5 * gain:
+        close = lead < CLOSE * gain
+        if accepted and close and (lead < 2.0 * error or alikeness(best, candidate, model) > ALIKE):
             rivals.append(candidate)
         else:
             rejected.append(Rejection(candidate.name, f"held-out score {lead:.2f} ± {error:.2f} behind {best.name}"))
@@ -199,6 +209,18 @@ def _turn(
         reason = f"closest, but held-out gain {gain:.2f} and remaining V {best.score.excess / before.excess:.2f} do not suffice"
         rejected.insert(0, Rejection(best.name, reason))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected))
+
+
+def _settled(candidate: Candidate) -> Candidate:
+    """The refit begun anew while that still closes much of what is left."""
+    for _ in range(RESTARTS):
+        if candidate.score.excess <= ADEQUATE:
+            break
+        before, candidate = candidate, restart(candidate)
+        assert before.fit is not None and candidate.fit is not None
+        if candidate.fit.cost > WORTHWHILE * before.fit.cost:
+            break
+    return candidate
 
 
 def _simplest(refits: list[Candidate]) -> Candidate:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from ..record import Record
 
@@ -10,20 +10,24 @@ SHARE = 3
 """One record of so many of a kind reports."""
 
 
-def reporting(records: Sequence[Record]) -> tuple[int, ...]:
+def reporting(records: Sequence[Record], usable: Collection[int]) -> tuple[int, ...]:
     """Indices of the records set aside for the report.
 
-    From every kind of phase of which there are at least three realisations one in three, from the middle of its list, so
-    that the extremes of amplitude and frequency stay in the fit. A record that another one continues is never taken.
+    Of every kind of phase with at least three realisations one in three, from the middle of its list, so that the
+    extremes of amplitude and frequency stay in the fit; of a kind named ``validation`` all.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The experiment.
+    usable : collection of int
+        Indices that may be taken.
     """
     kinds: dict[str, list[int]] = {}
-    for index, record in enumerate(records):
-        kinds.setdefault(record.phase.split("_")[0], []).append(index)
-    carried = {i for i in range(len(records)) if i + 1 < len(records) and records[i + 1].continues}
-    chosen = [
-        index
-        for members in kinds.values()
-        for index in members[SHARE // 2 :: SHARE][: len(members) // SHARE]
-        if index not in carried and not records[index].continues
-    ]
-    return tuple(sorted(chosen))
+    for index in usable:
+        kinds.setdefault(records[index].phase.split("_")[0], []).append(index)
+    validation = kinds.pop("validation", [])
+    if len(validation) == len(usable):
+        return ()
+    chosen = [i for members in kinds.values() for i in members[SHARE // 2 :: SHARE][: len(members) // SHARE]]
+    return tuple(sorted(chosen + validation))

@@ -1,0 +1,231 @@
+"""`diagnose`: floor → where → candidates → add → gap → next experiment; each step a function of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects import CATALOGUE, Effect, Offset, PublishedBoucWen
+from ..effects.bouc_wen import BoucWen
+from ..effects.extent import Extent
+from ..errors import IdentificationError, ModelError
+from ..identification.fit import Fit, fit
+from ..identification.identify import identify
+from ..identification.normal_equations import Nuisance, residuals
+from ..identification.roles import CARRYING
+from ..model import Model
+from ..record import Experiment, Notice, Record
+from .candidates import Evidence, free_numbers, score_model
+from .diagnosis import Diagnosis, Verdict
+from .gap import measure_gap
+from .localise import localise
+from .next_experiment import NextExperiment, propose
+from .noise_floor import floors, noise_floors, stroke
+from .selection import ADEQUATE, NAMED, Selection, select
+from .split import reporting
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+FEWEST = 4
+"""Records below which nothing can be held out and no name is given."""
+IDLE = ("idle", "hold", *CARRYING)
+"""Phases that only bring the stage from one state to another."""
+
+
+def diagnose(
+    experiment: Experiment,
+    model: Model | None = None,
+    *,
+    effects: Collection[type[Effect]] = CATALOGUE,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Find where simulation and measurement disagree, name the missing effect, add it, and show the gap shrink.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Records of any kind; the more kinds, and the more realisations of each, the surer the name.
+    model : Model, optional
+        Where the search begins; identified from the experiment by default.
+    effects : collection of Effect classes
+        The library to choose from; the whole catalogue by default.
+    progress : callable, optional
+        Called with a word and the fraction done.
+
+    Returns
+    -------
+    Diagnosis
+        Named, nothing missing, or unknown, with the extended model.
+
+    Raises
+    ------
+    IdentificationError
+        If nothing in the experiment moves.
+    ModelError
+        If the records are faster than the model.
+    """
+    tell = progress or (lambda word, fraction: None)
+    records = experiment.records
+    severe = [n for n in experiment.notices if n.severe]
+    usable = [i for i, r in enumerate(records) if r.phase not in IDLE and not r.truncated]
+    moving = [i for i in usable if np.ptp(np.append(records[i].voltage, records[i].settled_voltage)) > 0.0]
+    if not moving:
+        raise IdentificationError("diagnose: the drive does not move in any record; expected loops, steps or noise")
+    if severe or len(moving) < FEWEST:
+        return _undecided(experiment, model, severe, len(moving))
+
+    tell("baseline", 0.0)
+    spared = reporting(records, usable)
+    fitted = [i for i in usable if i not in spared]
+    noise, least, span = noise_floors(records), floors(records), stroke(records)
+    weights = np.array([least[i] if i in fitted else np.inf for i in range(len(records))])
+    start = model or identify(
+        Experiment(records[: max(fitted) + 1], experiment.source),
+        held_out=("validation",),
+        progress=lambda word, part: tell(word, 0.25 * part),
+    ).model
+    start = _exact(start)
+    evidence = Evidence(records, weights, Nuisance(), extent_of([records[i] for i in usable], start))
+    tell("baseline, jointly", 0.25)
+    baseline = _joint(start, evidence)
+    score = score_model(baseline.model, evidence)
+    null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
+
+    tell("where", 0.35)
+    left = residuals(baseline.model, records, evidence.nuisance)
+    where = localise([records[i] for i in usable], [left[i] for i in usable], [least[i] for i in usable])
+    selection = select(
+        baseline.model,
+        evidence.with_peaks(peaks_of([records[i] for i in fitted], [left[i] for i in fitted])),
+        score,
+        null,
+        effects,
+        lambda word, part: tell(word, 0.4 + 0.4 * part),
+    )
+    tell("gap", 0.85)
+    named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED
+    final_evidence = selection.accepted[-1].best.evidence if named else evidence
+    final = _joint(selection.model, final_evidence) if named else baseline
+    chosen = spared or tuple(fitted)
+    gap = measure_gap(
+        (baseline.model, final.model),
+        records,
+        chosen,
+        least.tolist(),
+        span,
+        (evidence.nuisance, final_evidence.nuisance),
+        bool(spared),
+    )
+    tell("next experiment", 0.95)
+    verdict, reason = _verdict(selection, named)
+    return Diagnosis(
+        verdict=verdict,
+        reason=reason,
+        model=final.model,
+        baseline=baseline.model,
+        selection=selection,
+        fit=final,
+        where=where,
+        gap=gap,
+        next_experiment=_next(selection, evidence),
+        notices=experiment.notices,
+    )
+
+
+def extent_of(records: list[Record], model: Model) -> Extent:
+    """What the records span."""
+    return Extent(
+        voltage_min=min(float(r.voltage.min()) for r in records),
+        voltage_max=max(float(r.voltage.max()) for r in records),
+        max_slew=max(float(np.abs(np.diff(r.voltage)).max(initial=0.0)) / r.sample_period for r in records),
+        voltage_scale=model.voltage_scale,
+        displacement_scale=model.displacement_scale,
+        fastest_period=min(r.sample_period for r in records),
+        duration=max(r.start_time + r.duration for r in records) - min(r.start_time for r in records),
+        longest_record=max(r.duration for r in records),
+    )
+
+
+def peaks_of(records: list[Record], left: list[Array], most: int = 3) -> tuple[float, ...]:
+    """Frequencies at which the residual stands out of the displacement most [Hz]: seeds for a resonance."""
+    period = min(r.sample_period for r in records)
+    grid = np.geomspace(20.0, 0.4 / period, 160)
+    power, reach = np.zeros(grid.size), np.zeros(grid.size)
+    for record, e in zip(records, left, strict=True):
+        if record.sample_period > 1.001 * period or e.size < 256:
+            continue
+        window = np.hanning(e.size)
+        frequency = np.fft.rfftfreq(e.size, record.sample_period)
+        index = np.searchsorted(grid, frequency)
+        inside = (index > 0) & (index < grid.size)
+        for total, signal in ((power, e), (reach, record.displacement)):
+            spectrum = np.abs(np.fft.rfft(window * (signal - signal.mean()))) ** 2
+            total += np.bincount(index[inside], spectrum[inside], grid.size)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(reach > 0, power / reach, 0.0)
+    inner = (ratio[1:-1] >= ratio[:-2]) & (ratio[1:-1] > ratio[2:])
+    tops = 1 + np.flatnonzero(inner)
+    return tuple(float(grid[k]) for k in tops[np.argsort(-ratio[tops])][:most])
+
+
+def _joint(model: Model, evidence: Evidence) -> Fit:
+    return fit(
+        model,
+        evidence.records,
+        free_numbers(model, evidence.nuisance),
+        floors=evidence.floors.tolist(),
+        nuisance=evidence.nuisance,
+        max_iterations=25,
+        tolerance=1e-4,
+    )
+
+
+def _exact(model: Model) -> Model:
+    """The model with the exact loop, which the terms of the catalogue join, and with a sensor zero."""
+    if PublishedBoucWen.name in model:
+        published = model[PublishedBoucWen.name]
+        if published["n"] != 1.0:
+            raise ModelError(f"diagnose: got published_bouc_wen.n = {published['n']:g}, expected 1")
+        values = {n: v for n, v in published.values.items() if n != "n"}
+        model = model.without(PublishedBoucWen.name).with_effect(BoucWen(**values))
+    return model if Offset.name in model else model.with_effect(Offset())
+
+
+def _verdict(selection: Selection, named: bool) -> tuple[Verdict, str]:
+    if named:
+        names = " and ".join(s.best.name for s in selection.accepted)
+        closed = selection.explained(selection.score)
+        rest = (
+            "what remains is at the floor"
+            if selection.score.excess <= ADEQUATE
+            else f"a gap of {np.sqrt(selection.score.excess):.1f} floors remains unexplained"
+        )
+        return Verdict.NAMED, f"The model misses {names}: {100 * closed:.0f} % of the gap is explained; {rest}."
+    if selection.score.excess <= ADEQUATE and not selection.accepted:
+        return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
+    closest = selection.steps[0].best if selection.steps else None
+    told = "" if closest is None else f"; closest is {closest.name}, which explains {100 * selection.explained(closest.score):.0f} %"
+    return Verdict.UNKNOWN, f"The model misses an effect that the catalogue does not explain{told}."
+
+
+def _next(selection: Selection, evidence: Evidence) -> NextExperiment | None:
+    """For the first named effect with a rival, or for a closest that does not suffice and the one behind it."""
+    for step in selection.steps:
+        if step.accepted and step.rivals and step.best.fit is not None and step.rivals[0].fit is not None:
+            pair = (step.best.name, step.rivals[0].name)
+            return propose(step.best.fit.model, step.rivals[0].fit.model, pair, evidence)
+    return None
+
+
+def _undecided(experiment: Experiment, model: Model | None, severe: list[Notice], moving: int) -> Diagnosis:
+    if severe:
+        reason = f"No verdict: {severe[0].message}."
+    else:
+        reason = (
+            f"No verdict: got {moving} records in which the drive moves, expected at least {FEWEST} to fit some and hold "
+            "out others; record more phases."
+        )
+    return Diagnosis(Verdict.UNKNOWN, reason, model, model, None, None, (), None, None, experiment.notices)

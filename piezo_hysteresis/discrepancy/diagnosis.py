@@ -1,0 +1,177 @@
+"""`Diagnosis`: the answer, as data, as text, and in the stable form of ``answer.json``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from ..identification.fit import Fit
+from ..model import Model
+from ..record import Notice
+from .gap import Gap
+from .localise import Place
+from .next_experiment import NextExperiment
+from .selection import Rejection, Selection
+
+SCHEMA = 1
+
+
+class Verdict(StrEnum):
+    """The three outcomes, all first class."""
+
+    NAMED = "named"
+    NOTHING_MISSING = "nothing_missing"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Diagnosis:
+    """Where a model is wrong, which effect it misses, and the gap after adding it.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        Named, nothing missing, or unknown.
+    reason : str
+        The verdict in one plain sentence.
+    model : Model
+        Extended where effects are named, else the refitted baseline.
+    baseline : Model
+        Refitted, without the effects.
+    selection : Selection or None
+        Every turn of the search; None where the data did not allow one.
+    fit : Fit or None
+        Last joint fit, with uncertainties.
+    where : tuple of Place
+        Where the baseline disagrees with the measurement.
+    gap : Gap or None
+        Before and after.
+    next_experiment : NextExperiment or None
+        What would separate explanations that the data could not.
+    notices : tuple of Notice
+        Quality of the data.
+    """
+
+    verdict: Verdict
+    reason: str
+    model: Model | None
+    baseline: Model | None
+    selection: Selection | None
+    fit: Fit | None
+    where: tuple[Place, ...]
+    gap: Gap | None
+    next_experiment: NextExperiment | None
+    notices: tuple[Notice, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Identifiers of the effects named, in the order of the search."""
+        if self.verdict is not Verdict.NAMED or self.selection is None:
+            return ()
+        return tuple(s.best.name for s in self.selection.accepted)
+
+    @property
+    def rejected(self) -> tuple[Rejection, ...]:
+        """Effects that were not named, each once, with the reason of the last turn."""
+        if self.selection is None:
+            return ()
+        told: dict[str, Rejection] = {}
+        for step in self.selection.steps:
+            if self.verdict is Verdict.UNKNOWN and step.accepted:
+                closed = self.selection.explained(step.best.score)
+                told[step.best.name] = Rejection(step.best.name, f"closest, but explains {closed:.2f} of the gap only")
+            for rejection in step.rejected:
+                told[rejection.name] = rejection
+        return tuple(r for r in told.values() if r.name not in self.names)
+
+    def effects(self) -> list[dict[str, Any]]:
+        """The named effects, as in ``answer.json``."""
+        if self.verdict is not Verdict.NAMED or self.selection is None or self.fit is None:
+            return []
+        rows = []
+        for step in self.selection.accepted:
+            effect = self.fit.model[step.best.name]
+            rows.append(
+                {
+                    "name": effect.name,
+                    "family": effect.family,
+                    "member_certain": step.member_certain,
+                    "explained_fraction": round(self.selection.explained(step.best.score), 4),
+                    "parameters": self._parameters(effect.name),
+                    "confusable_with": list(step.confusable_with),
+                    "held_out_gain": round(step.before.cost - step.best.score.cost, 4),
+                }
+            )
+        return rows
+
+    def _parameters(self, effect: str) -> dict[str, dict[str, Any]]:
+        assert self.fit is not None
+        rows: dict[str, dict[str, Any]] = {}
+        for name, value in self.fit.model.values().items():
+            owner, _, parameter = name.partition(".")
+            row = self.fit.model.row(name)
+            if owner == effect and not row.fixed and not row.per_record:
+                interval = list(self.fit.interval(name)) if name in self.fit.names else [value, value]
+                rows[parameter] = {"value": value, "interval_95": interval, "unit": row.unit}
+        return rows
+
+    def answer(self, model_file: str = "") -> dict[str, Any]:
+        """The answer in its stable, versioned form.
+
+        Parameters
+        ----------
+        model_file : str
+            Where the extended model was written.
+        """
+        gap = self.gap
+        return {
+            "schema": SCHEMA,
+            "verdict": str(self.verdict),
+            "reason": self.reason,
+            "effects": self.effects(),
+            "where": [{"axis": p.axis, "share": round(p.share, 4), "detail": p.detail} for p in self.where],
+            "gap_percent_of_range": None
+            if gap is None
+            else {
+                "before": gap.before,
+                "after": gap.after,
+                "floor": gap.floor,
+                "after_interval_95": list(gap.interval_95),
+                "unseen": gap.unseen,
+                "per_phase": {
+                    f"{p.index:02d}_{p.phase}": {"before": p.before, "after": p.after, "floor": p.floor}
+                    for p in gap.per_phase
+                },
+            },
+            "rejected": [{"name": r.name, "reason": r.reason} for r in self.rejected],
+            "next_experiment": None
+            if self.next_experiment is None
+            else {"phase": self.next_experiment.phase, "separates": list(self.next_experiment.separates)},
+            "data_quality": [
+                {"kind": n.kind, "phase": n.phase, "message": n.message, "severe": n.severe} for n in self.notices
+            ],
+            "model": model_file,
+        }
+
+    def summary(self) -> str:
+        """The answer in plain words, several lines."""
+        lines = [self.reason]
+        for row in self.effects():
+            lines.append(f"  {row['name']} ({row['family']}): explains {100 * row['explained_fraction']:.0f} % of the gap")
+            for name, p in row["parameters"].items():
+                low, high = p["interval_95"]
+                lines.append(f"    {name} = {p['value']:.5g} {p['unit']} (95 %: {low:.5g} to {high:.5g})")
+            if row["confusable_with"]:
+                lines.append(f"    could also be {', '.join(row['confusable_with'])}")
+        if self.gap is not None:
+            g = self.gap
+            seen = "on records neither fitted nor chosen by" if g.unseen else "on the fitted records, none could be spared"
+            lines.append(f"  gap {g.before:.3g} % → {g.after:.3g} % of range, floor {g.floor:.3g} % ({seen})")
+        lines += [f"  where: {p.axis.replace('_', ' ')}: {p.detail}" for p in self.where[:3]]
+        if self.next_experiment is not None:
+            lines.append(
+                f"  next: record '{self.next_experiment.phase}' to separate {' and '.join(self.next_experiment.separates)}"
+            )
+        lines += [f"  {n.kind}: {n.message}" for n in self.notices if n.severe]
+        return "\n".join(lines)

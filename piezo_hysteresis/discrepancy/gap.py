@@ -1,0 +1,100 @@
+"""The gap: free-run error before and after the effects were added, on records used neither to fit nor to choose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..identification.normal_equations import Nuisance, residuals
+from ..model import Model
+from ..record import Record
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseGap:
+    """Gap of one record, RMS in % of range."""
+
+    phase: str
+    index: int
+    before: float
+    after: float
+    floor: float
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """RMS over records, each counting the same, in % of the range of the experiment.
+
+    Parameters
+    ----------
+    before, after, floor : float
+        Of the baseline, of the extended model, and the floor [% of range].
+    interval_95 : (float, float)
+        Interval of `after` with records as units [% of range].
+    per_phase : tuple of PhaseGap
+        Record by record.
+    unseen : bool
+        True where none of the records was used for fitting or choosing; False where all had to be.
+    """
+
+    before: float
+    after: float
+    floor: float
+    interval_95: tuple[float, float]
+    per_phase: tuple[PhaseGap, ...]
+    unseen: bool
+
+
+def measure_gap(
+    models: tuple[Model, Model],
+    records: Sequence[Record],
+    chosen: Sequence[int],
+    floors: Sequence[float],
+    stroke: float,
+    nuisances: tuple[Nuisance, Nuisance],
+    unseen: bool,
+) -> Gap:
+    """Compare two models on the records `chosen`.
+
+    Parameters
+    ----------
+    models : (Model, Model)
+        Baseline and extended model.
+    records : sequence of Record
+        The whole experiment, so that the state is carried.
+    chosen : sequence of int
+        Indices of the records that report.
+    floors : sequence of float
+        Floor of every record [m].
+    stroke : float
+        Range of the experiment [m].
+    nuisances : (Nuisance, Nuisance)
+        What is free per record under each model.
+    unseen : bool
+        Whether the records chosen had no part in fitting and choosing.
+    """
+    rows: list[list[float]] = []
+    for model, nuisance in zip(models, nuisances, strict=True):
+        left = residuals(model, records, nuisance)
+        rows.append([100.0 * float(np.sqrt(np.mean(left[i] ** 2))) / stroke for i in chosen])
+    before, after = np.array(rows[0]), np.array(rows[1])
+    least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
+    squares = after**2
+    spread = 1.96 * float(squares.std(ddof=1)) / np.sqrt(squares.size) if squares.size > 1 else float(squares[0])
+    mean = float(squares.mean())
+    return Gap(
+        before=float(np.sqrt(np.mean(before**2))),
+        after=float(np.sqrt(mean)),
+        floor=float(np.sqrt(np.mean(least**2))),
+        interval_95=(float(np.sqrt(max(0.0, mean - spread))), float(np.sqrt(mean + spread))),
+        per_phase=tuple(
+            PhaseGap(records[i].phase, i, float(b), float(a), float(f))
+            for i, b, a, f in zip(chosen, before, after, least, strict=True)
+        ),
+        unseen=unseen,
+    )

@@ -1,0 +1,112 @@
+"""The next experiment: which phase would separate two explanations that the data could not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..identification import excitation
+from ..identification.drive import DriveLimits
+from ..identification.fit import gauge
+from ..identification.normal_equations import grams
+from ..model import Model
+from ..record import Record
+from .candidates import Evidence, free_numbers, weighted_sum
+
+Array = NDArray[np.float64]
+
+SLOW = 1e-2
+"""Sample period of slow phases of the menu [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class NextExperiment:
+    """A phase to record, and what it would separate.
+
+    Parameters
+    ----------
+    phase : str
+        Phase name.
+    separates : tuple of str
+        Effects between which it would decide.
+    power : float
+        Expected squared distance between the two, in floors per second of stage time.
+    """
+
+    phase: str
+    separates: tuple[str, ...]
+    power: float
+
+
+def menu(evidence: Evidence, model: Model) -> dict[str, Record]:
+    """Phases to choose from, inside the drive range that was recorded; displacement is zero, nothing is measured yet."""
+    extent, period = evidence.extent, model.sample_period
+    fast = DriveLimits(
+        sample_period=period,
+        voltage_min=extent.voltage_min,
+        voltage_max=extent.voltage_max,
+        safe_voltage=extent.voltage_min,
+        max_slew_rate=np.inf,
+        ramp_rate=extent.span,
+    )
+    slow = DriveLimits(
+        sample_period=max(period, SLOW),
+        voltage_min=extent.voltage_min,
+        voltage_max=extent.voltage_max,
+        safe_voltage=extent.voltage_min,
+        max_slew_rate=np.inf,
+        ramp_rate=extent.span,
+    )
+    top = min(400.0, 0.02 / period)
+    waves = {
+        "staircase": (excitation.steps(slow, (0.0, 0.5, 1.0, 0.5, 0.0), 10.0, slew_rate=extent.span), slow),
+        "triangle": (excitation.triangle(slow, (1.0, 0.75, 0.5, 0.25), 0.2), slow),
+        "minor_loops": (excitation.ramps(slow, excitation.nested_loops(0.45, 5), extent.span), slow),
+        "rest": (excitation.hold(slow, 0.0, 60.0), slow),
+        "hold": (excitation.hold(slow, 0.8, 60.0), slow),
+        "step": (excitation.steps(fast, (0.2, 0.8) * 4, 200 * period), fast),
+        f"sine_{top:g}hz": (excitation.sine(fast, top, 10.0 / top), fast),
+        "multisine": (
+            excitation.multisine(fast, top / 20, min(5 * top, 0.2 / period), 0.3, 2, centre=0.5, seed=0),
+            fast,
+        ),
+    }
+    return {
+        name: Record(wave, np.zeros(wave.size), limits.sample_period, phase=name)
+        for name, (wave, limits) in waves.items()
+    }
+
+
+def propose(first: Model, second: Model, names: tuple[str, str], evidence: Evidence) -> NextExperiment:
+    """Phase of the menu on which two fitted models differ most, beyond what either can still adjust.
+
+    Parameters
+    ----------
+    first, second : Model
+        Fitted, one with each effect.
+    names : (str, str)
+        The effects.
+    evidence : Evidence
+        What has been recorded: it binds the common parameters.
+    """
+    free = free_numbers(first, evidence.nuisance)
+    directions = gauge(first, free)
+    known = weighted_sum(grams(first, evidence.records, free, evidence.nuisance), evidence.floors)
+    prior = directions.T @ known[:-1, :-1] @ directions
+    floor = float(np.min(evidence.floors))
+    best = NextExperiment("", names, -1.0)
+    for name, record in menu(evidence, first).items():
+        (difference,) = (a - b for a, b in zip(second.simulate(record), first.simulate(record), strict=True))
+        (gram,) = grams(first, [record], free, evidence.nuisance, [difference[None, :]])
+        total = gram.matrix[:-1, :-1] / (gram.size * floor * floor)
+        q = len(free)
+        cross = directions.T @ total[:q, q]
+        inner = prior + directions.T @ total[:q, :q] @ directions
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
+        solved = np.linalg.lstsq(inner * np.outer(scale, scale), scale * cross, rcond=1e-9)[0] * scale
+        power = float(total[q, q] - cross @ solved) / record.duration
+        if power > best.power:
+            best = NextExperiment(name, names, power)
+    return best
