@@ -100,9 +100,7 @@ def gauge(model: Model, names: Sequence[str]) -> Array:
 
 def weighted(grams_: Sequence[Gram], floors: Array) -> Array:
     """Mean over the records of Gram/(size·floor²): every record counts the same."""
-    total: Array = sum(  # type: ignore[assignment]
-        g.matrix / (g.size * f * f) for g, f in zip(grams_, floors, strict=True)
-    )
+    total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(grams_, floors, strict=True))
     return total / len(grams_)
 
 
@@ -204,7 +202,7 @@ def fit(
     )
 
 
-def _held(theta: Array, lower: Array, upper: Array, directions: Array, slope: Array) -> Array:
+def _held(theta: Array, lower: Array, upper: Array, directions: Array, slope: Array) -> NDArray[np.bool_]:
     """Directions of a single number that would leave its bound."""
     held = np.zeros(directions.shape[1], dtype=bool)
     for j, column in enumerate(directions.T):
@@ -215,7 +213,7 @@ def _held(theta: Array, lower: Array, upper: Array, directions: Array, slope: Ar
     return held
 
 
-def _solve(hessian: Array, slope: Array, damping: Array, held: Array) -> Array:
+def _solve(hessian: Array, slope: Array, damping: Array, held: NDArray[np.bool_]) -> Array:
     step = np.zeros(slope.size)
     free = ~held
     # unit diagonal: columns differ by many orders of magnitude

@@ -111,7 +111,7 @@ def grams(
     result = []
     for record, total in zip(records, sums, strict=True):
         inner, cross, free = total[: q + 1, : q + 1], total[q + 1 :, : q + 1], total[q + 1 :, q + 1 :]
-        amplitudes = np.linalg.lstsq(free, cross, rcond=None)[0] if len(free) else cross
+        amplitudes: Array = np.linalg.lstsq(free, cross, rcond=None)[0].astype(np.float64) if len(free) else cross
         result.append(Gram(record.size, inner - cross.T @ amplitudes, amplitudes[:, -1].copy()))
     return result
 
