@@ -155,15 +155,15 @@ class Record:
             raise RecordError(f"decimate: got factor {factor}, expected 1 to {self.size}")
         blocks = self.size // factor
 
-        def mean(channel: Samples | None) -> Samples | None:
-            return None if channel is None else channel[: blocks * factor].reshape(blocks, factor).mean(axis=1)
+        def mean(channel: Samples) -> Samples:
+            return np.asarray(channel[: blocks * factor].reshape(blocks, factor).mean(axis=1))
 
         return replace(
             self,
             voltage=mean(self.voltage),
             displacement=mean(self.displacement),
-            other_displacement=mean(self.other_displacement),
-            temperature=mean(self.temperature),
+            other_displacement=None if self.other_displacement is None else mean(self.other_displacement),
+            temperature=None if self.temperature is None else mean(self.temperature),
             sample_period=self.sample_period * factor,
             initial_voltage=self.settled_voltage,
         )

@@ -25,7 +25,7 @@ def split(a: Array, b: Array) -> tuple[Array, Array, Array]:
     ModelError
         If A has no complex pole pair.
 
-    >>> mode, rest, _ = split(np.array([-1.7, 1.1, -0.15]), np.ones(1))
+    >>> mode, rest, _ = split(np.array([-1.7, 1.1, -0.16]), np.ones(1))
     >>> mode.round(9).tolist(), rest.round(9).tolist()
     ([-1.5, 0.8], [-0.2])
     """
