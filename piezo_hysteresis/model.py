@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .chain import Chain, ChainState, Channels
+from .chain import Chain, ChainState, ChainTangent, Channels
 from .effects import BY_NAME, CHAIN, Effect, Offset, Setting
 from .errors import ModelError
 from .parameter import Parameter, Value
@@ -135,9 +135,7 @@ class Model:
 
     def values(self) -> dict[str, float]:
         """All numbers by name, ``"bouc_wen.A"``, ``"arx.a[0]"``."""
-        return {
-            f"{e.name}.{n}": float(v) for e in self.effects for n, v in zip(e.free_names(), _flat(e), strict=True)
-        }
+        return {f"{e.name}.{n}": float(v) for e in self.effects for n, v in zip(e.free_names(), _flat(e), strict=True)}
 
     def row(self, name: str) -> Parameter:
         """The table row of a number."""
@@ -171,9 +169,7 @@ class Model:
         """State of a stage settled at `voltage` [V], at its own sample period."""
         return self.at(self.sample_period).rest(voltage, time)
 
-    def run(
-        self, voltage: ArrayLike, state: ChainState, channels: Channels | None = None
-    ) -> tuple[Array, ChainState]:
+    def run(self, voltage: ArrayLike, state: ChainState, channels: Channels | None = None) -> tuple[Array, ChainState]:
         """Displacement [m] of the next samples at the model's sample period, and the state after them.
 
         Bit-identical for every way of cutting the voltage into blocks.
@@ -202,7 +198,8 @@ class Model:
         A record starts from a stage at rest at its `settled_voltage`, unless it continues the one before it.
         """
         outputs: list[Array] = []
-        state, chain = None, None
+        state: ChainState | None = None
+        chain: Chain | None = None
         for record in [records] if isinstance(records, Record) else records:
             before, chain = chain, self.at(record.sample_period)
             if state is None or not record.continues:
@@ -229,7 +226,9 @@ class Model:
         slopes : dict of str to (k,) ndarray
             ∂y/∂θ for every number `wanted`.
         """
-        state, tangent, chain = None, None, None
+        state: ChainState | None = None
+        tangent: ChainTangent | None = None
+        chain: Chain | None = None
         for index, record in enumerate(records):
             before, chain = chain, self.at(record.sample_period)
             if state is None or tangent is None or not record.continues:
@@ -255,9 +254,7 @@ class Model:
         """How much each effect beyond hysteresis, dynamics and offset adds to the displacement [m], shape (n,)."""
         (whole,) = self.simulate(record)
         core = {e.name for e in self.effects if not any(p.off is not None for p in e.parameters)} | {Offset.name}
-        return {
-            e.name: whole - self.without(e.name).simulate(record)[0] for e in self.effects if e.name not in core
-        }
+        return {e.name: whole - self.without(e.name).simulate(record)[0] for e in self.effects if e.name not in core}
 
 
 def _flat(effect: Effect) -> Iterator[float]:
