@@ -172,6 +172,12 @@ class Lab:
             time.sleep(0.005)
         return value
 
+    def do(self, function: Callable[[], Any]) -> Any:
+        """Call a function in the thread of the node, where what it takes part in can be taken away."""
+        task = self._executor.create_task(function)
+        self.wait(task.done, "a call in the thread of the node")
+        return task.result()
+
     def listen(self, kind: type, topic: str, quality: Any = COMMAND) -> list:
         """A list that fills with the messages of a topic."""
         messages: list = []

@@ -91,9 +91,9 @@ def test_from_an_unknown_stage_to_a_live_model(lab):
     recorder = BagRecorder(lab.node, lab.folder / "everything")
     path = identification.begin()
     assert identification.ask("identify").message.startswith("busy")
-    ended = identification.await_state("fitting", "failed", timeout=90.0)
-    recorder.close()
-    assert "% of range" in identification.await_state("done", "failed", timeout=90.0).message, ended.message
+    ended = identification.await_state("fitting", "failed", timeout=240.0)
+    lab.do(recorder.close)
+    assert "% of range" in identification.await_state("done", "failed", timeout=240.0).message, ended.message
 
     model = load(path / "identification.yaml")
     assert dumps(from_parameters(identification.served())) == dumps(model)
@@ -153,47 +153,52 @@ def test_every_early_end_leaves_the_stage_safe_and_the_recording_readable(lab):
     samples = lab.streaming()
 
     def moving():
-        return samples.voltage[-1] > 4.0
+        return samples.newest.voltage[-1] > 4.0
 
     def recorded(path):
         """The phase that was cut short, which is all there is."""
         (record,) = read(path)
         assert record.phase == "conditioning"
+        assert record.voltage.max() > 1.0
         return record
 
     def at_rest():
-        lab.wait(lambda: np.ptp(samples.voltage[-5000:]) == 0.0 and samples.voltage[-1] < 1e-3, "rest")
+        lab.wait(lambda: all((b.voltage < 1e-3).all() for b in samples.blocks[-50:]), "half a second of rest")
 
     path = identification.begin()
     lab.wait(moving, "the first phase")
     assert identification.ask("abort").success
     identification.await_state("aborted")
     at_rest()
-    assert recorded(path).voltage.max() > 4.0
+    recorded(path)
 
     path = identification.begin()
     lab.wait(moving, "the first phase")
     assert lab.call(Trigger, "driver_node/stop").success
     assert "stopped" in identification.await_state("failed").message
     at_rest()
-    assert recorded(path).voltage.max() > 4.0
+    recorded(path)
 
     path = identification.begin()
     lab.wait(moving, "the first phase")
     identification.process.signal(signal.SIGINT)
     assert identification.process.wait() == 0
     at_rest()
-    assert recorded(path).voltage.max() > 4.0
+    recorded(path)
 
     identification = Identification(lab)
     path = identification.begin()
-    longest = short(DriveLimits(sample_period=PERIOD)).phases[0].voltage.size
-    lab.wait(lambda: np.sum(samples.phase == samples.phase[-1]) > 0.8 * longest, "most of the first phase")
-    number, last = samples.phase[-1], samples.index[-1]
+    lab.wait(moving, "the first phase")
+    number = samples.newest.phase[-1]
+    began = int(samples.index[samples.phase == number][0])
+    size = short(DriveLimits(sample_period=PERIOD)).phases[0].voltage.size
+    lab.wait(lambda: samples.newest.index[-1] > began + 0.8 * size, "most of the first phase")
+    assert samples.newest.phase[-1] == number
+    last = int(samples.newest.index[-1])
     identification.process.signal(signal.SIGKILL)
-    lab.wait(lambda: samples.phase[-1] > number, "the end of the phase, which the driver plays whole")
+    lab.wait(lambda: samples.newest.phase[-1] > number, "the end of the phase, which the driver plays whole")
     at_rest()
     record = recorded(path)
-    began = samples.index[samples.phase == number][0]
-    assert record.size >= last - began - 1.05 / PERIOD
+    # a second is what the recorder keeps in memory, a quarter what may be on its way while the computer is busy
+    assert record.size >= last - began - 1.25 / PERIOD
     np.testing.assert_array_equal(record.voltage, samples.voltage[samples.phase == number][: record.size])

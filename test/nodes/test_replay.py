@@ -63,7 +63,7 @@ def test_a_bag_of_everything_predicts_the_same_and_its_commands_move_nothing(lab
     lab.wait(lambda: recorder.counts["predicted_samples"] >= blocks, "its predictions")
     driver.end()
     live.end()
-    recorder.close()
+    lab.do(recorder.close)
 
     bag = Bag(lab.folder / "bag")
     messages = {name: list(bag.messages([name])) for name in ("/samples", "/predicted_samples", "/command")}
