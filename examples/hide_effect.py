@@ -1,6 +1,7 @@
 """Write the plant file of a simulated stage in which a physical effect is hidden, and say nothing.
 
-The demo starts this before the driver, gives the driver the path, and reads the file only after the verdict.
+No two stages are alike: loop, gain and mechanics differ from those of the paper as well, which identification has to
+find. The demo starts this before the driver, gives the driver the path, and reads the file only after the verdict.
 """
 
 from __future__ import annotations
@@ -8,12 +9,32 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from piezo_hysteresis.stage.hidden import HIDDEN_EFFECTS, hidden_effect
+from piezo_hysteresis.stage.plant import PlantParameters
 
 HIGHEST_VOLTAGE = 10.0
 """Top of the range that the protocols use [V]."""
+
+INDIVIDUAL = (
+    "hysteresis.A",
+    "hysteresis.beta",
+    "hysteresis.p1",
+    "hysteresis.p2",
+    "structure.dc_gain",
+    "structure.frequency1",
+    "structure.damping1",
+)
+"""What differs from stage to stage, by some per cent."""
+
+
+def individual_stage(seed: int) -> PlantParameters:
+    """The stage of the paper with its own numbers, nothing hidden."""
+    usual = PlantParameters().to_mapping()
+    factors = np.exp(np.random.default_rng([seed, 1]).normal(0.0, 0.05, len(INDIVIDUAL)))
+    return PlantParameters().with_values({name: usual[name] * f for name, f in zip(INDIVIDUAL, factors, strict=True)})
 
 
 def main() -> None:
@@ -23,7 +44,8 @@ def main() -> None:
     parser.add_argument("file", type=Path, help="plant file to write")
     parser.add_argument("--name", choices=HIDDEN_EFFECTS, help="hide this effect; only its size is drawn")
     arguments = parser.parse_args()
-    hidden = hidden_effect(arguments.seed, name=arguments.name, highest_voltage=HIGHEST_VOLTAGE)
+    stage = individual_stage(arguments.seed)
+    hidden = hidden_effect(arguments.seed, stage, name=arguments.name, highest_voltage=HIGHEST_VOLTAGE)
     mapping = {key: list(v) if isinstance(v, tuple) else v for key, v in hidden.parameters.to_mapping().items()}
     sizes = ", ".join(f"{name} = {value}" for name, value in hidden.changes.items())
     arguments.file.write_text(f"# hidden: {hidden.name} ({sizes})\n" + yaml.safe_dump(mapping, sort_keys=False))

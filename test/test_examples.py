@@ -35,4 +35,5 @@ def test_hide_effect_says_nothing_and_writes_the_plant_that_the_seed_draws(tmp_p
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout + done.stderr == ""
     written = PlantParameters.from_mapping(yaml.safe_load((tmp_path / "plant.yaml").read_text()))
-    assert written == hidden_effect(3, highest_voltage=10.0).parameters
+    assert written.full_stroke != PlantParameters().full_stroke
+    assert written == hidden_effect(3, written, highest_voltage=10.0).parameters

@@ -27,7 +27,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from piezo_hysteresis.identification.drive import DriveLimits
-from piezo_hysteresis.model_file import load, loads
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.model_file import load
 from piezo_hysteresis.nodes.conversions import values_of
 
 ROOT = Path(__file__).parents[2]
@@ -73,12 +74,13 @@ class Demo:
         self.say(f"three processes in {NAMESPACE}, ROS domain {os.environ['ROS_DOMAIN_ID']}: {ids}")
         return Bench(NAMESPACE, LIMITS.sample_period, processes.check)
 
-    def look(self, bench: Bench, name: str, chain: str) -> None:
-        """Play the probe and show what the model node leaves of it."""
+    def look(self, bench: Bench, name: str, model: Model) -> None:
+        """Play the probe and show what the model node, which follows `model`, leaves of it."""
         trace = bench.play(self.voltage, "probe")
         self.traces[name] = trace
         before = next(iter(self.traces.values())).rms
         bar = "█" * max(1, round(40 * trace.rms / before))
+        chain = ", ".join(effect.name for effect in model.effects)
         self.say(f"[bold]live residual {trace.rms * 1e9:7.1f} nm[/bold] rms  {bar}  {name}: {chain}")
 
     def plan(self, bench: Bench) -> str:
@@ -114,27 +116,21 @@ class Demo:
             raise RuntimeError(f"{service} {told['state']}: {bench.status.message}")
         return {**told, "verdict": bench.status.message}
 
-    def follow(self, bench: Bench, name: str, models_before: int) -> None:
-        """Wait for the new model on the topic, then look at the live residual under it."""
-        bench.wait(lambda: len(bench.models) > models_before, "the new model", 30.0)
-        self.look(bench, name, ", ".join(e.name for e in loads(bench.models[-1]).effects))
-
     def run(self, bench: Bench) -> Path:
         """From the published numbers to the verdict; returns the path of the experiment."""
-        paper = load(ROOT / "config" / "published_stage.yaml")
-        self.look(bench, "paper", ", ".join(e.name for e in paper.effects))
+        self.look(bench, "paper", load(ROOT / "config" / "published_stage.yaml"))
         self.say(f"plan: {self.plan(bench)}")
 
         count = len(bench.models)
         told = self.run_job(bench, "identify")
         experiment = Path(told["experiment"])
         self.say(f"identified: {told['verdict']}; recorded in {os.path.relpath(experiment)}")
-        self.follow(bench, "identified", count)
+        self.look(bench, "identified", bench.new_model(count))
 
         count = len(bench.models)
         told = self.run_job(bench, "diagnose")
         self.say(f"[bold]verdict: {told['verdict']}[/bold]")
-        self.follow(bench, "extended", count)
+        self.look(bench, "extended", bench.new_model(count))
         return experiment
 
     def report(self, experiment: Path) -> None:

@@ -15,6 +15,9 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.model_file import loads
+from piezo_hysteresis.model_parameters import hash_number
 from piezo_hysteresis.nodes.cloud import from_cloud
 from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
@@ -65,6 +68,7 @@ class Bench:
         self.models: list[str] = []
         self._blocks: list[tuple[NDArray[np.uint32], Array]] | None = None
         self._live_rms: list[float] = []
+        self._followed: int | None = None
         self._ended: dict[str, DiagnosticStatus] = {}
         self._command = self.node.create_publisher(PointCloud2, "command", COMMAND)
         subscribe = self.node.create_subscription
@@ -89,8 +93,9 @@ class Bench:
         self._live_rms.append(message.data)
 
     def _on_predicted(self, cloud: PointCloud2) -> None:
+        columns = from_cloud(cloud, {"index": "u4", "residual": "f8", "model": "u4"})
+        self._followed = int(columns["model"][-1])
         if self._blocks is not None:
-            columns = from_cloud(cloud, {"index": "u4", "residual": "f8"})
             self._blocks.append((columns["index"], columns["residual"]))
 
     def until(self, done: Callable[[], bool], what: str, timeout: float) -> Iterator[None]:
@@ -115,6 +120,13 @@ class Bench:
         """Spin until `done`."""
         for _ in self.until(done, what, timeout):
             pass
+
+    def new_model(self, before: int) -> Model:
+        """The model published after the first `before` ones, once the model node predicts with it."""
+        self.wait(lambda: len(self.models) > before, "a new model", 60.0)
+        model = loads(self.models[-1])
+        self.wait(lambda: self._followed == hash_number(model), "the model node to change over", 60.0)
+        return model
 
     def pause(self, duration: float) -> None:
         """Spin for `duration` [s]."""

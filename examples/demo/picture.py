@@ -25,6 +25,6 @@ def save(path: Path, voltage: NDArray, sample_period: float, traces: Mapping[str
         reach = 1.05e9 * max(float(np.abs(trace.residual).max()) for trace in traces.values())
         for ax, (name, trace) in zip(residuals, traces.items(), strict=True):
             ax.plot(time[every], trace.residual[every] * 1e9, color=BLACK, linewidth=0.5)
-            ax.set(ylabel="residual [nm]", ylim=(-reach, reach), title=f"{name}: {trace.rms * 1e9:.3g} nm rms")
+            ax.set(ylabel="residual [nm]", ylim=(-reach, reach), title=f"{name}: {trace.rms * 1e9:.0f} nm rms")
         axes[-1, 0].set_xlabel("time [s]")
         figure.savefig(path)
