@@ -84,6 +84,8 @@ def read(
     layout = Layout(axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include)
     experiment = _format(place, format).read(place, layout)
     records = experiment.records
+    if records[0].continues:  # what it continues is not here
+        records = (replace(records[0], continues=False, truncated=True), *records[1:])
     if initial_voltage is not None:
         records = tuple(
             r if r.continues or r.truncated else replace(r, initial_voltage=initial_voltage) for r in records

@@ -39,7 +39,8 @@ class Layout:
     initial_voltage : float, optional
         Voltage at which the stage had settled before every phase that does not continue another [V].
     rows : (int, int), optional
-        First sample and the one after the last of a table or of a record in one piece; as a Python slice.
+        First sample and the one after the last of a table or of a record in one piece; as a Python slice. Without its
+        first samples, and without `initial_voltage`, a record is `truncated`.
     phases : str or sequence of (float, str), optional
         Name of the only phase, or start time [s] and name of each one, instead of what the data propose.
     include : sequence of str
@@ -91,6 +92,10 @@ class Layout:
         if stop <= start:
             raise RecordingError(f"rows: got {self.rows}, expected a part of {size} rows that is not empty")
         return slice(start, stop)
+
+    def truncates(self, part: slice) -> bool:
+        """True where a part of a record leaves its beginning, and so its initial state, unknown."""
+        return bool(part.start) and self.initial_voltage is None
 
     def with_period(self, sample_period: float | None) -> Layout:
         """The same layout with a sample period [s] that the file tells."""

@@ -13,11 +13,13 @@ from ..errors import RecordingError
 from ..record import Experiment, Notice, Record, Samples
 from .damage import naming
 from .finite import finite_records
-from .layout import Layout
+from .layout import CHANNELS, LABELS, Layout
+from .phases import labelled
 
 _MAGIC_READERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 _LARGEST_EXPANSION = 100
 _SMALL = 1 << 26
+_NUMBERED = re.compile(r"\d+[_ -]")
 
 
 class Npz:
@@ -37,40 +39,16 @@ class Npz:
         files = [path] if path.is_file() else sorted(path.glob("*.npz"), key=_order)
         records: list[Record] = []
         notices: list[Notice] = []
+        if len(files) > 1 and not isinstance(layout.phases, str | None):
+            raise RecordingError(f"{path}: got start times of phases for {len(files)} files, expected one record")
         end = 0.0
         for file in files:
             with naming(file, "an .npz file with voltage, displacement and sample_period"):
-                parts, told = self._phase(file, layout, end)
+                parts, told = _phase(file, layout, end)
             records += parts
             notices += told
             end = parts[-1].start_time + parts[-1].duration
         return Experiment(tuple(records), str(path), tuple(notices))
-
-    def _phase(self, file: Path, layout: Layout, end: float) -> tuple[list[Record], list[Notice]]:
-        with zipfile.ZipFile(file) as archive:
-            values = _Members(archive, file.stat().st_size)
-            place = {name: str(column) for name, column in layout.columns.items()}
-
-            def channel(name: str) -> Samples:
-                samples = values.numbers(place.get(name, name))
-                samples = samples[layout.part(samples.size)] if samples.ndim == 1 and layout.rows else samples
-                return layout.in_si(name, samples)
-
-            def number(name: str, default: float | None) -> float | None:
-                return values.number(name) if name in values else default
-
-            period = layout.sample_period or layout.in_si("sample_period", values.numbers("sample_period"))
-            name = layout.phases if isinstance(layout.phases, str) else values.text("phase", _stem(file))
-            optional = [key for key in ("other_displacement", "temperature") if place.get(key, key) in values]
-            return finite_records(
-                {key: channel(key) for key in ("voltage", "displacement", *optional)},
-                _scalar("sample_period", np.asarray(period)),
-                phase=name,
-                start_time=number("start_time", end),
-                continues=bool(number("continues", 0.0)),
-                truncated=bool(number("truncated", 0.0)),
-                initial_voltage=number("initial_voltage", None),
-            )
 
     def write(self, experiment: Experiment, path: Path) -> None:
         """Write every record to its file in a folder that holds no other experiment.
@@ -89,6 +67,41 @@ class Npz:
                 np.savez(path / f"{number:02d}_{name}.npz", **_keys(record))
 
 
+def _phase(file: Path, layout: Layout, end: float) -> tuple[list[Record], list[Notice]]:
+    """Records of one file; `end` is where the one before it ended [s]."""
+    with zipfile.ZipFile(file) as archive:
+        values = _Members(archive, file.stat().st_size)
+        place = {name: str(layout.columns.get(name, name)) for name in (*CHANNELS, *LABELS)}
+        whole = values.numbers(place["voltage"])
+        part = layout.part(whole.size)
+
+        def channel(name: str) -> Samples:
+            samples = whole if name == "voltage" else values.numbers(place[name])
+            return layout.in_si(name, samples[part] if layout.rows else samples)
+
+        def number(name: str, default: float | None) -> float | None:
+            return values.number(place[name]) if place[name] in values else default
+
+        period = layout.sample_period
+        if period is None:
+            period = float(layout.in_si("sample_period", np.array(values.number(place["sample_period"]))))
+        optional = [name for name in ("other_displacement", "temperature") if place[name] in values]
+        named = place["phase"] in values or _NUMBERED.match(file.name)
+        records, notices = finite_records(
+            {name: channel(name) for name in ("voltage", "displacement", *optional)},
+            period,
+            phase=values.text(place["phase"], _NUMBERED.sub("", file.stem)),
+            start_time=number("start_time", end),
+            continues=bool(number("continues", 0.0)),
+            truncated=bool(number("truncated", 0.0)) or layout.truncates(part),
+            initial_voltage=number("initial_voltage", None),
+        )
+    if named and layout.phases is None:
+        return records, notices
+    records, told = labelled(records, layout.phases)
+    return records, [*notices, *told]
+
+
 def _keys(record: Record) -> dict[str, Any]:
     keys: dict[str, Any] = {
         "voltage": record.voltage,
@@ -105,10 +118,6 @@ def _keys(record: Record) -> dict[str, Any]:
 def _order(file: Path) -> tuple[float, str]:
     number = re.match(r"\d{1,9}", file.name)
     return (float(number[0]) if number else float("inf"), file.name)
-
-
-def _stem(file: Path) -> str:
-    return re.sub(r"^\d+[_ -]", "", file.stem)
 
 
 def _scalar(name: str, value: Samples) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from ..errors import RecordingError
 from ..record import Notice, Record, Samples
@@ -108,6 +109,8 @@ def table_records(
     marks = marks or [(0, {})]
     if layout.phases is not None or not any("phase" in labels for _, labels in marks):
         records, notices = _stretch(columns, marks[0][1], layout, before)
+        if layout.truncates(part):
+            records[0] = replace(records[0], truncated=True)
         named, told = labelled(records, layout.phases)
         return named, [*notices, *told]
     starts = [max(row - part.start, 0) for row, _ in marks]
@@ -118,6 +121,8 @@ def table_records(
             parts, told = _stretch(piece, labels, layout, [*before, *records[-1:]])
             records += parts
             notices += told
+    if layout.truncates(part):
+        records[0] = replace(records[0], truncated=True)
     return records, notices
 
 

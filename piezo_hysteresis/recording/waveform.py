@@ -53,7 +53,7 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
         return "steps"
     if _is_chirp(wave):
         return "chirp"
-    if np.median(np.diff(turns)) < 8 * max(1, voltage.size // _POINTS):  # too fast for the coarse turning points
+    if np.median(np.diff(turns)) < 8 * (voltage.size // _POINTS):  # too fast for the coarse turning points
         middle = wave.size // 2
         voltage = wave[max(0, middle - _POINTS // 2) : middle + _POINTS // 2]
         turns = turning_points(voltage, _LEAST_SWING * span)
@@ -113,11 +113,12 @@ def _straightness(voltage: Samples, turns: NDArray[np.int64]) -> float:
     """Deviation of the swings from straight lines: rms relative to the swing, median over swings."""
     swings = list(itertools.pairwise(turns.tolist()))
     whole = swings[1:-1] or swings
-    deviations = []
+    deviations = [1.0]
     for a, b in whole[:: max(1, len(whole) // 200)]:
-        way = (voltage[a : b + 1] - voltage[a]) / (voltage[b] - voltage[a])
-        deviations.append(float(np.sqrt(np.mean((way - np.linspace(0.0, 1.0, b - a + 1)) ** 2))))
-    return float(np.median(deviations))
+        if voltage[b] != voltage[a]:
+            way = (voltage[a : b + 1] - voltage[a]) / (voltage[b] - voltage[a])
+            deviations.append(float(np.sqrt(np.mean((way - np.linspace(0.0, 1.0, b - a + 1)) ** 2))))
+    return float(np.median(deviations[1:] or deviations))
 
 
 def _is_sine(voltage: Samples, period: float) -> bool:

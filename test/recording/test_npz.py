@@ -121,3 +121,24 @@ def test_keys_units_and_period_of_a_foreign_archive_can_be_named(tmp_path):
     )
     assert record.phase == "triangle" and record.sample_period == 2e-5 and record.initial_voltage == -1.0
     np.testing.assert_array_equal(record.displacement, np.arange(4.0) * 1e-9)
+
+
+def test_a_first_phase_that_continues_another_is_truncated(tmp_path):
+    np.savez(tmp_path / "07_triangle.npz", **keys(continues=True))
+    assert (read(tmp_path)[0].continues, read(tmp_path)[0].truncated) == (False, True)
+
+
+def test_an_archive_without_a_name_is_split_by_its_drive(tmp_path):
+    drive = np.concatenate((np.zeros(1000), 1 - np.cos(np.arange(3000) * 2 * np.pi / 100)))
+    np.savez(tmp_path / "scan.npz", **keys(voltage=drive, displacement=drive * 1e-6))
+    assert [r.phase for r in read(tmp_path / "scan.npz")] == ["rest", "sine_10hz"]
+    np.savez(tmp_path / "more.npz", **keys())
+    with pytest.raises(RecordingError, match="2 files"):
+        read(tmp_path, phases=[(0.0, "a"), (1.0, "b")])
+
+
+def test_a_part_that_leaves_out_the_beginning_is_truncated(tmp_path):
+    np.savez(tmp_path / "01_x.npz", **keys())
+    assert read(tmp_path, rows=(1, None))[0].truncated
+    assert not read(tmp_path, rows=(0, 3))[0].truncated
+    assert not read(tmp_path, rows=(1, None), initial_voltage=0.0)[0].truncated
