@@ -6,16 +6,15 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from ..discrepancy.diagnose import diagnose
 from ..errors import IdentificationError, PiezoError
 from ..identification.identify import identify
 from ..model_file import dumps, loads
-from ..provenance import provenance
 from ..recording import read
-from ..recording.decimation import load_decimation
 
 Report = Callable[[str, float], None]
 
@@ -45,20 +44,17 @@ Job = Callable[[Path, str, Report], Outcome]
 
 def identification(path: Path, model: str, report: Report) -> Outcome:
     """Identify the model of a recorded experiment; the model so far does not count."""
-    experiment = read(path, decimate=load_decimation(path))
-    found = identify(experiment, progress=report)
-    told = provenance(experiment, found.free_run_error, found.free_run_percent)
+    found = identify(read(path), progress=report)
     verdict = f"free-run error {found.free_run_percent:.3g} % of range ({found.free_run_error * 1e9:.3g} nm)"
-    return Outcome(dumps(replace(found.model, provenance=told)), str(found), verdict)
+    return Outcome(dumps(found.model), str(found), verdict)
 
 
 def diagnosis(path: Path, model: str, report: Report) -> Outcome:
     """Find what the model so far lacks, or a new one where there is none, and extend it."""
-    from ..discrepancy.diagnose import diagnose
-
-    experiment = read(path, decimate=load_decimation(path))
-    found = diagnose(experiment, model=loads(model) if model else None, progress=report)
-    return Outcome(dumps(found.model), found.summary(), str(found.verdict))
+    found = diagnose(read(path), loads(model) if model else None, progress=report)
+    if found.model is None:
+        raise IdentificationError(found.reason)
+    return Outcome(dumps(found.model), found.summary(), f"{found.verdict}: {found.reason}")
 
 
 class FitProcess:
@@ -83,6 +79,11 @@ class FitProcess:
         self._process.start()
         answers.close()
         self.progress: tuple[str, float] = ("starting", 0.0)
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process."""
+        return self._process.pid
 
     def poll(self) -> Outcome | None:
         """The outcome, or None while the fit goes on.

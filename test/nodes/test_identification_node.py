@@ -132,7 +132,13 @@ def test_from_an_unknown_stage_to_a_live_model(lab):
         np.testing.assert_array_equal(one.displacement, other.displacement)
     assert not own.notices
 
-    again = lab.start(NODE, "--params-file", str(path / "identification.yaml"), namespace="/again")
+    assert identification.ask("diagnose").message == f"diagnosing {path}"
+    identification.await_state("fitting")
+    told = identification.await_state("done", "failed", timeout=240.0)
+    assert told.message.startswith("nothing_missing: "), told.message
+    assert dumps(load(path / "diagnosis.yaml")) == dumps(from_parameters(identification.served())) == models[-1].data
+
+    again = lab.start(NODE, "--params-file", str(path / "diagnosis.yaml"), namespace="/again")
     resumed = lab.listen(String, "/again/model", LATCHED)
     lab.wait(lambda: resumed, "the model of a node started with it")
     assert resumed[-1].data == models[-1].data
@@ -140,8 +146,9 @@ def test_from_an_unknown_stage_to_a_live_model(lab):
 
 
 def test_every_early_end_leaves_the_stage_safe_and_the_recording_readable(lab):
-    """Abort, a stop at the driver, SIGKILL and SIGINT, each in the middle of a phase."""
-    identification = Identification(lab)
+    """Abort, a stop at the driver, SIGINT and SIGKILL, each in the middle of a phase, by a node that began badly."""
+    identification = Identification(lab, model__effects=["bouc_wen"])
+    assert "'model.sample_period' is missing" in identification.await_state("failed").message
     assert "configured 'driver_node'" in lab.wait(lambda: identification.ask("plan"), "an answer").message
     assert identification.ask("identify").success
     assert "driver_node" in identification.await_state("waiting").message
