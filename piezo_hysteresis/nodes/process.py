@@ -37,7 +37,7 @@ def run(
     Parameters
     ----------
     make : callable
-        Makes the node.
+        Makes the node; nothing may be set in motion yet, a signal ends it at once.
     arguments : sequence of str, optional
         Command line; default that of the process.
     begin : callable
@@ -48,12 +48,16 @@ def run(
     Returns
     -------
     int
-        0, or 2 where the node could not be made from its parameters; the reason is one line on stderr.
+        0, 2 where the node could not be made from its parameters (the reason is one line on stderr), or 130 where it
+        was interrupted while it was made.
     """
-    stop = _signalled()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
+        stop = _signalled()
+    except KeyboardInterrupt:
+        rclpy.try_shutdown()
+        return 128 + signal.SIGINT
     except _BAD_START as error:
         sys.stderr.write(f"{' '.join(str(error).split())}\n")
         rclpy.try_shutdown()
@@ -81,8 +85,9 @@ def _signalled() -> Future:
     signal.set_wakeup_fd(theirs.fileno())
 
     def wait() -> None:
-        ours.recv(1)
-        stop.set_result(theirs)
+        while ours.recv(1):
+            if not stop.done():
+                stop.set_result(theirs)
 
     threading.Thread(target=wait, name="signals", daemon=True).start()
     return stop
