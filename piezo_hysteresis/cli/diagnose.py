@@ -6,9 +6,10 @@ import argparse
 from pathlib import Path
 
 from .. import model_file
-from ..discrepancy.diagnose import diagnose
+from ..discrepancy import Diagnosis, diagnose
+from ..record import Experiment
 from ..report.answer_tables import effect_table, gap_table, rejection_table, where_table
-from ..report.comparison import compare
+from ..report.comparison import Comparison, compare
 from ..report.page import page
 from ..report.verdict import answer_verdict
 from . import reading
@@ -39,8 +40,10 @@ def run(args: argparse.Namespace) -> int:
     experiment = reading.read(args)
     with progress("diagnose") as tell:
         found = diagnose(experiment, start, progress=tell)
-    path = None if args.output is None else str(model_file.save(found.model, args.output))
-    answer = {**found.to_json(), "model": path}
+    path = ""
+    if args.output is not None and found.model is not None:
+        path = str(model_file.save(found.model, args.output))
+    answer = found.answer(path)
     out = console()
     said = answer_verdict(answer)
     out.print(said.headline, style="bold")
@@ -52,13 +55,22 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(args.json, answer)
     if args.report is not None:
-        models = {"before": found.baseline}
-        if found.model is not found.baseline:
-            models["after"] = found.model
         with progress("report") as tell:
-            drawn = page(compare(experiment, models), answer=answer, progress=tell)
+            drawn = page(_comparison(experiment, found), fit=found.fit, answer=answer, progress=tell)
         drawn.save(Path(args.report).expanduser())
     for written in (path, args.json, args.report):
-        if written is not None:
+        if written:
             out.print(f"wrote {written}")
     return 0
+
+
+def _comparison(experiment: Experiment, found: Diagnosis) -> Comparison:
+    models, nuisances = {}, {}
+    if found.baseline is not None:
+        models["before"] = found.baseline
+    if found.names and found.model is not None and found.selection is not None:
+        models["after"] = found.model
+        free = found.selection.accepted[-1].best.evidence.nuisance
+        # hum has an amplitude and a phase of its own in every record
+        nuisances = {"after": free} if free.hum_frequency is not None else {}
+    return compare(experiment, models, nuisances)

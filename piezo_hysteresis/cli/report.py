@@ -46,9 +46,9 @@ def run(args: argparse.Namespace) -> int:
         models[label if equals else Path(path).stem] = model_file.load(path)
     answer = None if args.answer is None else read_json(args.answer)
     experiment = reading.read(args)
-    nuisance = Nuisance(offset=True) if args.zero_per_phase else None
+    nuisances = dict.fromkeys(models, Nuisance(offset=True)) if args.zero_per_phase else None
     with progress("report") as tell:
-        drawn = page(compare(experiment, models, nuisance), answer=answer, title=args.title, progress=tell)
+        drawn = page(compare(experiment, models, nuisances), answer=answer, title=args.title, progress=tell)
     path = Path(args.output).expanduser()
     drawn.save(path)
     console().print(f"wrote {path} and {len(drawn.drawings)} figures beside it")

@@ -39,8 +39,8 @@ def run(args: argparse.Namespace) -> int:
     """
     model = model_file.load(args.model)
     experiment = reading.read(args)
-    nuisance = Nuisance(offset=True) if args.zero_per_phase else None
-    comparison = compare(experiment, {"error": model}, nuisance)
+    nuisances = {"error": Nuisance(offset=True)} if args.zero_per_phase else None
+    comparison = compare(experiment, {"error": model}, nuisances)
     tests = _tests(comparison)
     show(error_table(comparison), frequency_table(comparison), _test_table(tests))
     show_notices(experiment.notices)

@@ -43,7 +43,8 @@ def gap_table(answer: Mapping[str, Any]) -> Table | None:
     rows = [(name, *(_percent(value.get(key)) for key in _GAP)) for name, value in phases.items()]
     if gap.get("before") is not None:
         rows.append(("all phases", *(_percent(gap.get(key)) for key in _GAP)))
-    note = "Per cent of range, on data used neither for fitting nor for choosing."
+    seen = "data used neither for fitting nor for choosing" if gap.get("unseen", True) else "the fitted data"
+    note = f"Per cent of range, on {seen}."
     return Table("Gap", ("phase", *_GAP), tuple(rows), note, frozenset({1, 2, 3})) if rows else None
 
 

@@ -69,7 +69,7 @@ class Comparison:
 def compare(
     experiment: Experiment,
     models: Mapping[str, Model] | None = None,
-    nuisance: Nuisance | None = None,
+    nuisances: Mapping[str, Nuisance] | None = None,
     record_floors: Sequence[float] | None = None,
 ) -> Comparison:
     """Simulate every model over the experiment.
@@ -80,17 +80,17 @@ def compare(
         The measurement.
     models : mapping of str to Model, optional
         Label to model, the one to report last.
-    nuisance : Nuisance, optional
-        What is free per record, as for `errors`.
+    nuisances : mapping of str to Nuisance, optional
+        Label to what is free per record, as for `errors`; for the others one zero of the sensor is free.
     record_floors : sequence of float, optional
         Floor of every record [m] where a diagnosis has found it.
     """
-    models = dict(models or {})
+    models, nuisances = dict(models or {}), nuisances or {}
     records = experiment.records
     return Comparison(
         experiment=experiment,
         models=models,
-        errors={label: errors(model, experiment, nuisance) for label, model in models.items()},
+        errors={label: errors(model, experiment, nuisances.get(label)) for label, model in models.items()},
         noise=noise_floors(records),
         floors=floors(records) if record_floors is None else np.asarray(record_floors, dtype=float),
     )

@@ -55,7 +55,8 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
 
 def correlation_table(fit: Fit) -> Table | None:
     """Pairs of fitted numbers whose estimates move together, the strongest first; ARX coefficients left out."""
-    names = [n for n in fit.names if not n.startswith(("arx.a", "arx.b"))]
+    sure = fit.standard_errors
+    names = [n for n in fit.names if sure[n] > 0.0 and not n.startswith(("arx.a", "arx.b"))]
     pairs = [(a, b, fit.correlation(a, b)) for i, a in enumerate(names) for b in names[:i]]
     strong = sorted((p for p in pairs if abs(p[2]) > ALIKE), key=lambda p: -abs(p[2]))
     if not strong:

@@ -79,6 +79,15 @@ def _fit_sentences(comparison: Comparison) -> tuple[str, ...]:
     return tuple(sentences)
 
 
+def sentence(text: str) -> str:
+    """A phrase as a sentence.
+
+    >>> sentence("nothing is missing")
+    'Nothing is missing.'
+    """
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
 def _headline(answer: Mapping[str, Any]) -> str:
     names = [effect["name"].replace("_", " ") for effect in answer.get("effects", ())]
     if answer["verdict"] == "named" and names:
@@ -91,7 +100,7 @@ def _headline(answer: Mapping[str, Any]) -> str:
 
 
 def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
-    found = []
+    found = [sentence(answer["reason"])] if answer.get("reason") else []
     for effect in answer.get("effects", ()):
         name = effect["name"].replace("_", " ")
         found.append(f"{name.capitalize()} explains {100 * effect['explained_fraction']:.0f} % of what was missing.")
@@ -100,13 +109,14 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
             others = f": {twins} would do as well" if twins else ""
             found.append(f"The family ({effect['family']}) is certain, the member is not{others}.")
     places = [place for place in answer.get("where", ()) if place.get("detail")]
-    if places:
-        found.append(f"The residual sits mostly here: {places[0]['detail']}.")
+    if places and answer["verdict"] != "nothing_missing":
+        found.append(f"The residual sits mostly here: {places[0]['detail'].rstrip('.')}.")
     gap = answer.get("gap_percent_of_range") or {}
     if gap.get("after") is not None:
+        seen = "On data used neither for fitting nor for choosing" if gap.get("unseen", True) else "On the fitted data"
         found.append(
-            f"On data used neither for fitting nor for choosing the gap goes from {gap['before']:.3g} % to "
-            f"{gap['after']:.3g} % of range, floor {gap['floor']:.3g} %."
+            f"{seen} the gap goes from {gap['before']:.3g} % to {gap['after']:.3g} % of range, "
+            f"floor {gap['floor']:.3g} %."
         )
     following = answer.get("next_experiment")
     if following:
