@@ -103,7 +103,7 @@ def free_numbers(model: Model, nuisance: Nuisance) -> list[str]:
 
 
 def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
-    """Columns for `held_out`: the free numbers with the gauge held, then `extra` rows, then nothing for the residual."""
+    """Columns for `held_out`: free numbers with the gauge held, then `extra` rows, and nothing for the residual."""
     free = gauge(model, names)
     columns = np.zeros((len(names) + extra + 1, free.shape[1] + extra))
     columns[: len(names), : free.shape[1]] = free
@@ -200,9 +200,10 @@ def refit(model: Model, candidate: Candidate, max_iterations: int = 8, tolerance
     evidence = candidate.evidence
     try:
         result = _joint(model.with_effect(candidate.effect), evidence, max_iterations, tolerance)
-        return replace(candidate, effect=result.model[candidate.name], score=score_model(result.model, evidence), fit=result)
+        score = score_model(result.model, evidence)
     except (DivergenceError, ParameterError, ModelError, IdentificationError):
         return None
+    return replace(candidate, effect=result.model[candidate.name], score=score, fit=result)
 
 
 def restart(candidate: Candidate, max_iterations: int = 8, tolerance: float = 1e-3) -> Candidate:

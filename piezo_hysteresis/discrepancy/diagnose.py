@@ -82,11 +82,14 @@ def diagnose(
     fitted = [i for i in usable if i not in spared]
     noise, least, span = noise_floors(records), floors(records), stroke(records)
     weights = np.array([least[i] if i in fitted else np.inf for i in range(len(records))])
-    start = model or identify(
-        Experiment(records[: max(fitted) + 1], experiment.source),
-        held_out=("validation",),
-        progress=lambda word, part: tell(word, 0.25 * part),
-    ).model
+    start = (
+        model
+        or identify(
+            Experiment(records[: max(fitted) + 1], experiment.source),
+            held_out=("validation",),
+            progress=lambda word, part: tell(word, 0.25 * part),
+        ).model
+    )
     start = _exact(start)
     evidence = Evidence(records, weights, Nuisance(), extent_of([records[i] for i in usable], start))
     tell("baseline, jointly", 0.25)
@@ -196,7 +199,7 @@ def _exact(model: Model) -> Model:
 
 def _verdict(selection: Selection, named: bool) -> tuple[Verdict, str]:
     if named:
-        names = " and ".join(s.best.name for s in selection.accepted)
+        names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
         closed = selection.explained(selection.score)
         rest = (
             "what remains is at the floor"
@@ -207,7 +210,10 @@ def _verdict(selection: Selection, named: bool) -> tuple[Verdict, str]:
     if selection.score.excess <= ADEQUATE and not selection.accepted:
         return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
     closest = selection.steps[0].best if selection.steps else None
-    told = "" if closest is None else f"; closest is {closest.name}, which explains {100 * selection.explained(closest.score):.0f} %"
+    told = ""
+    if closest is not None:
+        share = 100 * selection.explained(closest.score)
+        told = f"; closest is {closest.effect.public_name()}, which explains {share:.0f} %"
     return Verdict.UNKNOWN, f"The model misses an effect that the catalogue does not explain{told}."
 
 
@@ -215,7 +221,7 @@ def _next(selection: Selection, evidence: Evidence) -> NextExperiment | None:
     """For the first named effect with a rival, or for a closest that does not suffice and the one behind it."""
     for step in selection.steps:
         if step.accepted and step.rivals and step.best.fit is not None and step.rivals[0].fit is not None:
-            pair = (step.best.name, step.rivals[0].name)
+            pair = (step.best.effect.public_name(), step.rivals[0].effect.public_name())
             return propose(step.best.fit.model, step.rivals[0].fit.model, pair, evidence)
     return None
 
@@ -225,7 +231,7 @@ def _undecided(experiment: Experiment, model: Model | None, severe: list[Notice]
         reason = f"No verdict: {severe[0].message}."
     else:
         reason = (
-            f"No verdict: got {moving} records in which the drive moves, expected at least {FEWEST} to fit some and hold "
-            "out others; record more phases."
+            f"No verdict: got {moving} records in which the drive moves, expected at least {FEWEST} to fit some and "
+            "hold out others; record more phases."
         )
     return Diagnosis(Verdict.UNKNOWN, reason, model, model, None, None, (), None, None, experiment.notices)

@@ -69,7 +69,7 @@ class Diagnosis:
         """Identifiers of the effects named, in the order of the search."""
         if self.verdict is not Verdict.NAMED or self.selection is None:
             return ()
-        return tuple(s.best.name for s in self.selection.accepted)
+        return tuple(s.best.effect.public_name() for s in self.selection.accepted)
 
     @property
     def rejected(self) -> tuple[Rejection, ...]:
@@ -83,7 +83,8 @@ class Diagnosis:
                 told[step.best.name] = Rejection(step.best.name, f"closest, but explains {closed:.2f} of the gap only")
             for rejection in step.rejected:
                 told[rejection.name] = rejection
-        return tuple(r for r in told.values() if r.name not in self.names)
+        named = {s.best.name for s in self.selection.accepted} if self.names else set()
+        return tuple(r for r in told.values() if r.name not in named)
 
     def effects(self) -> list[dict[str, Any]]:
         """The named effects, as in ``answer.json``."""
@@ -94,7 +95,8 @@ class Diagnosis:
             effect = self.fit.model[step.best.name]
             rows.append(
                 {
-                    "name": effect.name,
+                    "name": effect.public_name(),
+                    "law": effect.name,
                     "family": effect.family,
                     "member_certain": step.member_certain,
                     "explained_fraction": round(self.selection.explained(step.best.score), 4),
@@ -158,7 +160,8 @@ class Diagnosis:
         """The answer in plain words, several lines."""
         lines = [self.reason]
         for row in self.effects():
-            lines.append(f"  {row['name']} ({row['family']}): explains {100 * row['explained_fraction']:.0f} % of the gap")
+            closed = 100 * row["explained_fraction"]
+            lines.append(f"  {row['name']} ({row['family']}): explains {closed:.0f} % of the gap")
             for name, p in row["parameters"].items():
                 low, high = p["interval_95"]
                 lines.append(f"    {name} = {p['value']:.5g} {p['unit']} (95 %: {low:.5g} to {high:.5g})")
@@ -166,12 +169,11 @@ class Diagnosis:
                 lines.append(f"    could also be {', '.join(row['confusable_with'])}")
         if self.gap is not None:
             g = self.gap
-            seen = "on records neither fitted nor chosen by" if g.unseen else "on the fitted records, none could be spared"
+            seen = "on records set aside" if g.unseen else "on the fitted records, none could be set aside"
             lines.append(f"  gap {g.before:.3g} % → {g.after:.3g} % of range, floor {g.floor:.3g} % ({seen})")
         lines += [f"  where: {p.axis.replace('_', ' ')}: {p.detail}" for p in self.where[:3]]
         if self.next_experiment is not None:
-            lines.append(
-                f"  next: record '{self.next_experiment.phase}' to separate {' and '.join(self.next_experiment.separates)}"
-            )
+            pair = " and ".join(self.next_experiment.separates)
+            lines.append(f"  next: record '{self.next_experiment.phase}' to separate {pair}")
         lines += [f"  {n.kind}: {n.message}" for n in self.notices if n.severe]
         return "\n".join(lines)

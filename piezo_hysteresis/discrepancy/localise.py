@@ -75,7 +75,8 @@ def localise(records: Sequence[Record], residuals: Sequence[Array], floors: Sequ
     places.append(
         _gather("absolute_time", tenth, power, [f"{k * end / 10:.3g} to {(k + 1) * end / 10:.3g} s" for k in range(10)])
     )
-    return tuple(sorted((p for p, _ in places), key=lambda p: -dict((q.axis, c) for q, c in places)[p.axis]))
+    concentrations = {place.axis: concentration for place, concentration in places}
+    return tuple(sorted((p for p, _ in places), key=lambda p: -concentrations[p.axis]))
 
 
 def _gather(axis: str, bins: Sequence[Array], power: Sequence[Array], labels: Sequence[str]) -> tuple[Place, float]:

@@ -41,7 +41,7 @@ class NextExperiment:
 
 
 def menu(evidence: Evidence, model: Model) -> dict[str, Record]:
-    """Phases to choose from, inside the drive range that was recorded; displacement is zero, nothing is measured yet."""
+    """Phases to choose from, inside the drive range that was recorded; their displacement, not yet measured, is 0."""
     extent, period = evidence.extent, model.sample_period
     fast = DriveLimits(
         sample_period=period,

@@ -1,6 +1,6 @@
-"""Forward selection of missing effects: screen, refit the best, choose on records left out, add, repeat; know when to stop.
+"""Forward selection of missing effects: screen, refit the best, choose on records left out, add, repeat, stop.
 
-Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 2014 for why discrepancy must be structured.
+Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 2014 for why discrepancy needs structure.
 """
 
 from __future__ import annotations
@@ -75,12 +75,14 @@ class Step:
     @property
     def confusable_with(self) -> tuple[str, ...]:
         """Effects that would explain the same."""
-        return tuple(r.name for r in self.rivals)
+        names = dict.fromkeys(r.effect.public_name() for r in self.rivals)
+        return tuple(n for n in names if n != self.best.effect.public_name())
 
     @property
     def member_certain(self) -> bool:
         """True where no other member of the same family is a rival."""
-        return all(r.effect.family != self.best.effect.family for r in self.rivals)
+        mine = self.best.effect
+        return all(r.effect.family != mine.family or r.effect.public_name() == mine.public_name() for r in self.rivals)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -175,7 +177,8 @@ def _turn(
             progress(word, fraction)
 
     tell("score test of the catalogue", 0.0)
-    screened = screen(model, evidence, [e for e in effects if e.name not in model])
+    present = {e.public_name() for e in model.effects}
+    screened = screen(model, evidence, [e for e in effects if e.public_name() not in present])
     refits = []
     for k, candidate in enumerate(screened[:REFITS]):
         tell(f"refit with {candidate.name}", (k + 1) / (REFITS + 1))
@@ -206,7 +209,8 @@ def _turn(
         for c in screened[REFITS:]
     ]
     if not accepted:
-        reason = f"closest, but held-out gain {gain:.2f} and remaining V {best.score.excess / before.excess:.2f} do not suffice"
+        left = best.score.excess / before.excess
+        reason = f"closest, but a held-out gain of {gain:.2f} and {left:.2f} of V left do not suffice"
         rejected.insert(0, Rejection(best.name, reason))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected))
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from ..errors import ParameterError
 from ..parameter import Parameter
 from .block import Array, Block, MemorylessBlock
 from .effect import Effect, Place, Setting
+from .extent import Extent
 
 UNLIMITED = 1e9
 
@@ -34,6 +37,13 @@ class AmplifierSaturation(Effect):
         Parameter("upper", "u_max", "V", UNLIMITED, -1e3, UNLIMITED, "upper limit", "data sheets", UNLIMITED, 1.0),
         Parameter("corner", "c", "V", 0.1, 0.0, 1e2, "half width of the bend", "data sheets", scale=0.1),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        margins = [share * extent.span for share in (0.01, 0.03, 0.1)]
+        corner = 0.01 * extent.span
+        above = [cls(upper=extent.voltage_max - margin, corner=corner) for margin in margins]
+        return *above, *(cls(lower=extent.voltage_min + margin, corner=corner) for margin in margins)
 
     def check(self) -> None:
         if self["lower"] >= self["upper"]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from ..kernel import kernel
 from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
+from .extent import Extent
 
 UNLIMITED = 1e9
 
@@ -30,6 +33,10 @@ class AmplifierSlewLimit(Effect):
     parameters = (
         Parameter("S", "S", "V/s", UNLIMITED, 1e-2, UNLIMITED, "largest slope of the drive", "I_max/C", UNLIMITED, 1e3),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return tuple(cls(S=extent.max_slew / 2.0**k) for k in range(1, 12) if extent.max_slew / 2.0**k > extent.span)
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         return AmplifierSlewLimitBlock(self["S"], setting.sample_period)

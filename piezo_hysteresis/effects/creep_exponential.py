@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from ..errors import ParameterError
 from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
+from .extent import Extent
 from .linear_block import AddedBlock
 from .pole import PoleBlock
 
@@ -24,6 +27,7 @@ class CreepExponential(Effect):
     """
 
     name = "creep_exponential"
+    entry = "creep"
     family = "creep"
     place = Place.MATERIAL
     equation = "Y/W = 1 + Σ_k c_k/(1 + τ_k s)"
@@ -33,6 +37,11 @@ class CreepExponential(Effect):
         Parameter("c", "c_k", "1", (0.0, 0.0), -0.2, 0.2, "final share of each relaxation", "Croft 2001", 0.0, 0.01),
         Parameter("tau", "τ_k", "s", (0.3, 10.0), 1e-4, 1e5, "time constants", "Croft 2001", scale=1.0),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        longest = extent.longest_record
+        return tuple(cls(tau=(share * longest, 20.0 * share * longest)) for share in (0.001, 0.01, 0.1))
 
     def check(self) -> None:
         if self.array("c").size != self.array("tau").size:

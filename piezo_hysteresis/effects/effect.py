@@ -81,6 +81,8 @@ class Effect(ABC):
     name: ClassVar[str]
     family: ClassVar[str]
     place: ClassVar[Place]
+    entry: ClassVar[str] = ""
+    """Entry of the catalogue that this is another law of (`creep_exponential` of ``creep``); empty for its own."""
     host: ClassVar[str | None] = None
     """Effect whose kernel holds this one as a term (terms of the Bouc-Wen loop, softening of the ARX mode)."""
     channel: ClassVar[str | None] = None
@@ -142,6 +144,11 @@ class Effect(ABC):
                 yield from (f"{row.name}[{i}]" for i in range(len(value)))
             else:
                 yield row.name
+
+    @classmethod
+    def public_name(cls) -> str:
+        """Identifier under which the catalogue knows the effect."""
+        return cls.entry or cls.name
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:

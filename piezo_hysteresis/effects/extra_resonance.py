@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 from scipy.linalg import expm, expm_frechet
 
@@ -9,6 +11,7 @@ from ..kernel import kernel
 from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
+from .extent import Extent
 from .linear_block import AddedBlock
 from .taps import TapsBlock
 
@@ -44,6 +47,10 @@ class ExtraResonance(Effect):
         Parameter("f0", "f0", "Hz", 500.0, 1.0, 1e5, "natural frequency", "modal superposition", scale=10.0),
         Parameter("zeta", "ζ", "1", 0.01, 1e-4, 1.0, "damping ratio", "0.005–0.03 in structures", scale=0.005),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return tuple(cls(f0=peak, zeta=0.02) for peak in extent.peaks)
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         if self["f0"] * setting.sample_period <= RESOLVED:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from ..errors import ParameterError
@@ -9,6 +11,7 @@ from ..kernel import kernel
 from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
+from .extent import Extent
 
 SPAN = 32.0
 """Largest radius over the smallest."""
@@ -39,6 +42,10 @@ class HysteresisMemory(Effect):
         Parameter("c", "c_j", "1", (0.0,) * 8, -10.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
         Parameter("reach", "r_max", "1", 0.5, 1e-3, 10.0, "half width of the widest play", "Gu 2016", fixed=True),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return (cls(reach=extent.span / (2.0 * extent.voltage_scale)),)
 
     def check(self) -> None:
         if self.array("c").size < 2:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from ..errors import ParameterError
 from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
+from .extent import Extent
 from .time_block import TimeBlock
 
 
@@ -52,6 +55,10 @@ class MainsHum(Effect):
             "sine", "s_k", "m", (0.0, 0.0, 0.0), -1e-5, 1e-5, "sine amplitudes", "Fourier", 0.0, 1e-9, per_record=True
         ),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return cls(f=50.0), cls(f=60.0)
 
     def check(self) -> None:
         if self.array("cosine").size != self.array("sine").size:

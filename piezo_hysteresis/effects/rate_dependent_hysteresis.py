@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from ..parameter import Parameter
 from .effect import Place, Term
+from .extent import Extent
 
 
 class RateDependentHysteresis(Term):
@@ -35,3 +38,7 @@ class RateDependentHysteresis(Term):
             "a", "a", "1", 0.5, -0.5, 1.0, "exponent of the rate law; 0 is logarithmic", "Al Janaideh 2011", scale=0.3
         ),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return cls(a=0.5), cls(a=0.1)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from ..parameter import Parameter
 from .block import Array, Block
 from .effect import Effect, Place, Setting
+from .extent import Extent
 from .time_block import TimeBlock
 
 
@@ -35,6 +38,10 @@ class ThermalDrift(Effect):
         Parameter("D", "D", "m", 0.0, -1e-4, 1e-4, "final drift", "first-order warm-up", 0.0, 1e-7),
         Parameter("tau", "τ", "s", 600.0, 1.0, 1e5, "time constant of the warm-up", "first-order warm-up", scale=300.0),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return tuple(cls(tau=max(1.0, share * extent.duration)) for share in (0.1, 0.4, 1.5))
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         return ThermalDriftBlock(self["D"], self["tau"], setting.sample_period)

@@ -26,6 +26,7 @@ class ThermalExpansion(Effect):
     """
 
     name = "thermal_expansion"
+    entry = "thermal_drift"
     family = "drift"
     place = Place.ENVIRONMENT
     channel = "temperature"
