@@ -270,5 +270,5 @@ def alikeness(first: Candidate, second: Candidate, model: Model) -> float:
 
 def weighted_sum(products: Sequence[Gram], floors: Array) -> Array:
     """Sum of the inner products, every record by its size and floor."""
-    total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(products, floors, strict=True))  # type: ignore[assignment]
+    total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(products, floors, strict=True))
     return total

@@ -56,14 +56,14 @@ class Score:
         return float(gain.mean()), float(gain.std(ddof=1) / np.sqrt(gain.size)) if gain.size > 1 else np.inf
 
 
-def held_out(grams: Sequence[Gram], floors: Sequence[float], columns: Array) -> Score:
+def held_out(grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array) -> Score:
     """Score of a model extended by `columns`, every record judged with parameters from the others.
 
     Parameters
     ----------
     grams : sequence of Gram
         Of the records, all over the same rows.
-    floors : sequence of float
+    floors : (r,) array_like
         Floor of every record [m]; those with an infinite one only carry the state of the stage and do not count.
     columns : (rows, q) ndarray
         Directions in which the parameters may move, as combinations of the rows of `grams`; the residual's row,
@@ -77,7 +77,7 @@ def held_out(grams: Sequence[Gram], floors: Sequence[float], columns: Array) -> 
         inner.append(weight * columns.T @ gram.matrix @ columns)
         cross.append(weight * columns.T @ gram.matrix[:, -1])
         power.append(weight * gram.matrix[-1, -1])
-    hessian, slope = sum(inner), sum(cross)
+    hessian, slope = np.sum(inner, axis=0), np.sum(cross, axis=0)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
     squares = []
     for h, g, e in zip(inner, cross, power, strict=True):

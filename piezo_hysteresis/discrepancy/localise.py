@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..record import Record
 
 Array = NDArray[np.float64]
+Bins = NDArray[np.intp]
 
 EDGES = {
     "frequency": np.array([0.0, 0.5, 5.0, 25.0, 75.0, 150.0, 250.0, 350.0, 600.0, 1.2e3, 2.5e3, np.inf]),
@@ -65,10 +66,12 @@ def localise(records: Sequence[Record], residuals: Sequence[Array], floors: Sequ
     span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
     end = max(r.start_time + r.duration for r in records)
     places = [_phases(records, power), _frequencies(records, residuals, floors)]
-    axes = {axis: [] for axis in ("amplitude", "direction", "turning_point_distance", "time_since_level_change")}
+    axes: dict[str, list[Bins]] = {
+        axis: [] for axis in ("amplitude", "direction", "turning_point_distance", "time_since_level_change")
+    }
     for record in records:
-        for axis, bins in _drive_bins(record, span).items():
-            axes[axis].append(bins)
+        for axis, index in _drive_bins(record, span).items():
+            axes[axis].append(index)
     for axis, bins in axes.items():
         places.append(_gather(axis, bins, power, _labels(axis)))
     tenth = [np.minimum((10 * r.time / end).astype(int), 9) for r in records]
@@ -79,7 +82,7 @@ def localise(records: Sequence[Record], residuals: Sequence[Array], floors: Sequ
     return tuple(sorted((p for p, _ in places), key=lambda p: -concentrations[p.axis]))
 
 
-def _gather(axis: str, bins: Sequence[Array], power: Sequence[Array], labels: Sequence[str]) -> tuple[Place, float]:
+def _gather(axis: str, bins: Sequence[Bins], power: Sequence[Array], labels: Sequence[str]) -> tuple[Place, float]:
     held = np.zeros(len(labels))
     room = np.zeros(len(labels))
     for index, p in zip(bins, power, strict=True):
@@ -134,7 +137,7 @@ def _labels(axis: str) -> list[str]:
     return [f"{a:.2g} to {b:.2g} s after a change of level" for a, b in zip(edges, edges[1:], strict=False)]
 
 
-def _drive_bins(record: Record, span: float) -> dict[str, Array]:
+def _drive_bins(record: Record, span: float) -> dict[str, Bins]:
     u = record.voltage
     scale = max(span, 1e-300)
     low = min(float(u.min()), 0.0)
