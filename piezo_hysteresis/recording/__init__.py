@@ -2,6 +2,26 @@
 
 >>> experiment = read("measured.csv", columns={"voltage": 1, "displacement": 5},
 ...                   units={"displacement": "um"}, sample_period=5e-3)          # doctest: +SKIP
+
+`read` mends nothing silently. What it found stands in `Experiment.notices`, by kind:
+
+====================  ==========================================================================================
+``gap`` ``split``     samples are missing; the phase is split there, the part behind it `truncated`
+``non_finite``        samples that are no number of this world, dropped in the same way
+``not_a_number``      cells of a table without a number
+``duplicate``         samples that came twice; the first ones count
+``non_monotonic``     samples that came out of order, or a time that runs back
+``restart``           the driver was started again within a bag
+``cut`` ``damaged``   the file ends early, or parts of it cannot be decoded
+``truncated``         a phase whose beginning is not recorded
+``history``           a phase before which others were played that are not recorded
+``moved``             the drive moved in a hold or idle that is left out
+``proposed``          names of phases that come from what the drive looks like
+``columns`` ``held``  how channels were found in a file of other software, and paired
+``time_base``         times that are uneven, overlap, or are those of reception
+====================  ==========================================================================================
+
+and what `inspect` finds in the samples themselves.
 """
 
 from __future__ import annotations

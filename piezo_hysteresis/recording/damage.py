@@ -46,5 +46,5 @@ def naming(path: Path, expected: str) -> Iterator[None]:
 
 
 def _named(path: Path, error: PiezoError) -> str:
-    text = str(error)
+    text = " ".join(str(error).split())
     return text if text.startswith(str(path)) else f"{path}: {text}"

@@ -18,13 +18,15 @@ from .foreign_topics import read_topics
 from .layout import Layout
 from .phase_topic import STRING, PhaseNames
 from .phases import labelled
-from .sample_stream import SampleStream, Stretch
+from .sample_stream import SampleStream
+from .stretch import Stretch
 from .waveform import phase_name
 
 IDLE, HOLD = "idle", "hold"
 """What the stage does before the first and after every phase; left out unless `Layout.include` names it."""
 
 _MOVED = 0.01
+_SEVERE_SHARE = 0.05
 _BLOCK_DURATION = 0.01
 
 
@@ -164,7 +166,9 @@ def _records(stretches: list[Stretch], names: PhaseNames, layout: Layout) -> tup
         name = "record" if unlabelled else _name(stretch, names, notices)
         if missing := stretch.lost + sum(stretch.breaks.values()):
             lost = f"{missing} samples ({missing * stretch.sample_period:.3g} s) were lost"
-            notices.append(Notice("gap", f"{lost} in {len(stretch.breaks) + (stretch.lost > 0)} places", name))
+            places = len(stretch.breaks) + (stretch.lost > 0)
+            severe = missing > _SEVERE_SHARE * (stretch.size + missing)
+            notices.append(Notice("gap", f"{lost} in {places} places", name, severe))
         if name in (IDLE, HOLD) and name not in layout.include:
             move = float(np.ptp(stretch.channels["voltage"]))
             text = f"the drive moved by {move:.3g} V in {name}, which is left out; include it to carry its state"

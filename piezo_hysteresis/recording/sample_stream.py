@@ -13,40 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
-from ..record import Notice, Samples
+from ..record import Notice
 from .block import Block
+from .stretch import Stretch
 from .time_base import round_period
 
 PERIOD_TOLERANCE = 0.01
 """Blocks whose sample periods differ by more than this share do not belong together."""
 
+UNEVEN = 0.1
+"""Deviation of a step in the times of a block from their mean, as a share of it, above which it is told."""
+
 LONGEST_SILENCE = 60.0
 """An index that runs ahead of the clock by more than this is no gap but another start of the driver [s]."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Stretch:
-    """Samples of one phase number and one sample period."""
-
-    channels: dict[str, Samples]
-    """Voltage [V], displacement [m] and what else the blocks hold."""
-    sample_period: float
-    phase: int
-    start_time: float
-    """Time of the first sample since the first one of the stream [s]."""
-    received_ns: int
-    """Time at which its first block was received [ns]."""
-    lost: int
-    """Samples missing just before it."""
-    breaks: dict[int, int]
-    """Sample before which others are missing, to their number."""
-    first: bool
-    """True for the first stretch since a start of the driver, or of the recording."""
-
-    @property
-    def size(self) -> int:
-        """Number of samples."""
-        return self.channels["voltage"].size
 
 
 @dataclass
@@ -79,6 +58,7 @@ class SampleStream:
         self._times_ns: list[int] = []
         self._periods: list[float] = []
         self._received_ns: list[int] = []
+        self._uneven = 0
 
     @property
     def size(self) -> int:
@@ -98,10 +78,10 @@ class SampleStream:
             values = block.channels[name] if name in block.channels else np.full(n, np.nan)
             self._channels[name].frombytes(values.tobytes())
         time = block.time
-        if self._given_period is not None or time is None or n < 2 or not np.isfinite(time).all():
-            period = self._given_period or np.nan
-        else:
+        period = self._given_period or np.nan
+        if self._given_period is None and time is not None and n > 1 and np.isfinite(time).all():
             period = float(time[-1] - time[0]) / (n - 1)
+            self._uneven += bool(np.abs(np.diff(time) - period).max() > UNEVEN * abs(period))
         offset = float(time[0]) if time is not None and abs(time[0]) < LONGEST_SILENCE else 0.0
         self._starts.append(begin)
         self._times_ns.append(block.stamp_ns + round(offset * 1e9))
@@ -129,6 +109,9 @@ class SampleStream:
         """
         stretches: list[Stretch] = []
         notices: list[Notice] = []
+        if self._uneven:
+            text = f"times within {self._uneven} of {len(self._starts)} blocks are uneven: taken as uniform"
+            notices.append(Notice("time_base", text))
         end = 0.0
         for run in self._runs():
             if run.first and stretches:

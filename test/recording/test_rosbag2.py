@@ -235,6 +235,26 @@ def test_a_move_in_a_hold_that_is_left_out_is_told(tmp_path):
     assert "moved" in kinds(read(tmp_path / "bag"))
 
 
+def test_uneven_times_and_undecodable_blocks_are_told(tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        driver = Driver(bag)
+        driver.phase(0, "idle")
+        driver.play(1, voltage=0.0)
+        driver.phase(1, "noise")
+        driver.play(4)
+        block = driver.block()
+        block.time[100:] += 0.5 * PERIOD
+        driver.send(block)
+        driver.advance(block)
+        bag.write("/samples", driver.clock_ns, block.to_cdr()[:1000])
+        driver.advance(driver.block())
+        driver.play(4)
+    experiment = read(tmp_path / "bag")
+    assert [r.size for r in experiment] == [5 * SIZE, 4 * SIZE]
+    assert {"time_base", "damaged", "gap"} <= kinds(experiment)
+    assert any(n.kind == "gap" and n.severe for n in experiment.notices)
+
+
 def test_the_model_that_a_bag_carries_is_found(whole, tmp_path):
     assert recorded_model(whole[0]) is None
     message = get_typestore(Stores.ROS2_KILTED)
