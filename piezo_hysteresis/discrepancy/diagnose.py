@@ -31,6 +31,8 @@ Progress = Callable[[str, float], None]
 
 FEWEST = 4
 """Records below which nothing can be held out and no name is given."""
+MOVES = 30.0
+"""Power over noise from which the spectrum of the displacement counts as motion."""
 IDLE = ("idle", "hold", *CARRYING)
 """Phases that only bring the stage from one state to another."""
 
@@ -153,25 +155,31 @@ def extent_of(records: list[Record], model: Model) -> Extent:
 
 
 def peaks_of(records: list[Record], left: list[Array], most: int = 3) -> tuple[float, ...]:
-    """Frequencies at which the residual stands out of the displacement most [Hz]: seeds for a resonance."""
+    """Frequencies at which the residual stands out of the displacement most [Hz]: seeds for a resonance.
+
+    Only where the stage moves well above the noise, which is read off the top of the band.
+    """
     period = min(r.sample_period for r in records)
-    grid = np.geomspace(20.0, 0.4 / period, 160)
-    power, reach = np.zeros(grid.size), np.zeros(grid.size)
+    grid = np.geomspace(20.0, 0.45 / period, 200)
+    power, reach, lines = np.zeros(grid.size), np.zeros(grid.size), np.zeros(grid.size)
     for record, e in zip(records, left, strict=True):
         if record.sample_period > 1.001 * period or e.size < 256:
             continue
         window = np.hanning(e.size)
-        frequency = np.fft.rfftfreq(e.size, record.sample_period)
-        index = np.searchsorted(grid, frequency)
+        index = np.searchsorted(grid, np.fft.rfftfreq(e.size, record.sample_period))
         inside = (index > 0) & (index < grid.size)
+        lines += np.bincount(index[inside], minlength=grid.size)
         for total, signal in ((power, e), (reach, record.displacement)):
-            spectrum = np.abs(np.fft.rfft(window * (signal - signal.mean()))) ** 2
+            spectrum = np.abs(np.fft.rfft(window * (signal - signal.mean()))) ** 2 / e.size
             total += np.bincount(index[inside], spectrum[inside], grid.size)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(reach > 0, power / reach, 0.0)
-    inner = (ratio[1:-1] >= ratio[:-2]) & (ratio[1:-1] > ratio[2:])
-    tops = 1 + np.flatnonzero(inner)
-    return tuple(float(grid[k]) for k in tops[np.argsort(-ratio[tops])][:most])
+    held = lines > 0
+    if held.sum() < 8:
+        return ()
+    frequency, power, reach = grid[held], power[held] / lines[held], reach[held] / lines[held]
+    noise = float(np.median(power[frequency > 0.3 / period]))
+    ratio = np.where(reach > MOVES * noise, np.maximum(power - noise, 0.0) / reach, 0.0)
+    tops = 1 + np.flatnonzero((ratio[1:-1] > ratio[:-2]) & (ratio[1:-1] >= ratio[2:]))
+    return tuple(float(frequency[k]) for k in tops[np.argsort(-ratio[tops])][:most])
 
 
 def _joint(model: Model, evidence: Evidence) -> Fit:
