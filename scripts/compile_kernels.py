@@ -1,0 +1,29 @@
+"""Compile every numba kernel once, so that nodes start in seconds; numba keeps the machine code beside the sources."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from piezo_hysteresis.effects import BASELINE, CATALOGUE, Arx, BoucWen, Offset, PublishedBoucWen
+from piezo_hysteresis.errors import PiezoError
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Record
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+PERIOD = 2e-5
+DRIVE = 3.0 + np.sin(np.arange(64.0))
+
+arx = Arx(a=(-1.6, 0.8), b=(0.1, 0.1), delay=3)
+eighth = Arx(a=(-1.6, 0.8, *(0.0,) * 6), b=(0.1, 0.1, *(0.0,) * 6), delay=3)
+base = Model((BoucWen(), arx, Offset()), PERIOD)
+models = [base, base.with_effect(eighth), Model((PublishedBoucWen(), arx), PERIOD)]
+models += [base.with_effect(effect()) for effect in CATALOGUE if effect not in BASELINE]
+for model in models:
+    for period in (PERIOD, 1e-3):
+        record = Record(DRIVE, DRIVE, period)
+        try:
+            model.simulate(record)
+            model.sensitivities(record, list(model.values()))
+        except PiezoError as error:
+            print(f"compile_kernels: {error}")
+SimulatedStage().play(DRIVE)
