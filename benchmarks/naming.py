@@ -1,0 +1,198 @@
+"""Naming benchmark: does the gap finder name what is hidden, and only that?
+
+Prints every case as it ends, then the confusion matrix, the figures of every group, the gaps and the time; writes all
+to a JSON file after every case, so that a campaign that was stopped is not lost.
+
+    python -m benchmarks.naming --quick
+    python -m benchmarks.naming --seeds 5 --json naming.json
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections import Counter, defaultdict
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.naming_cases import GROUPS, NOISES, Case, cases
+from piezo_hysteresis.discrepancy import diagnose
+from piezo_hysteresis.effects import BY_NAME
+from piezo_hysteresis.errors import PiezoError
+
+VISIBLE = 1.5
+"""V of the refitted baseline above which an effect can be seen."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One case, answered."""
+
+    group: str
+    truth: tuple[str, ...]
+    label: str
+    seed: int
+    noise: float
+    plant: str
+    layout: str
+    verdict: str
+    names: tuple[str, ...]
+    families: tuple[str, ...]
+    confusable: tuple[str, ...]
+    right_families: tuple[str, ...]
+    excess_before: float
+    excess_after: float
+    explained: float
+    gap_before: float
+    gap_after: float
+    gap_floor: float
+    seconds: float
+
+    @property
+    def visible(self) -> bool:
+        """Whether anything can be seen at all."""
+        return self.excess_before > VISIBLE
+
+    @property
+    def family_right(self) -> bool:
+        """All families of the truth, and no other."""
+        return set(self.families) == set(self.right_families)
+
+    @property
+    def name_right(self) -> bool:
+        """The truth exactly."""
+        return set(self.names) == set(self.truth)
+
+    @property
+    def is_false(self) -> bool:
+        """A family named that is not in the stage."""
+        return not set(self.families) <= set(self.right_families)
+
+
+def answer(case: Case) -> Outcome:
+    """Make the data of a case and diagnose them; the time is the processor time of the diagnosis."""
+    experiment = case.experiment()
+    begin = time.process_time()
+    try:
+        found = diagnose(experiment, effects=case.library)
+    except PiezoError as error:
+        Console().print(f"[red]{case.label}: {error}")
+        raise
+    seconds = time.process_time() - begin
+    selection, gap = found.selection, found.gap
+    steps = selection.steps if selection is not None else ()
+    last = selection.score.excess if selection is not None else np.nan
+    return Outcome(
+        group=case.group,
+        truth=case.truth,
+        label=case.label,
+        seed=case.seed,
+        noise=case.noise,
+        plant=case.plant,
+        layout=str(case.layout),
+        verdict=str(found.verdict),
+        names=found.names,
+        families=tuple(BY_NAME[row["law"]].family for row in found.effects()),
+        confusable=tuple(n for row in found.effects() for n in row["confusable_with"]),
+        right_families=tuple(sorted(case.nameable)),
+        excess_before=steps[0].before.excess if steps else last,
+        excess_after=last,
+        explained=selection.explained(selection.score) if selection is not None else 0.0,
+        gap_before=gap.before if gap else np.nan,
+        gap_after=gap.after if gap else np.nan,
+        gap_floor=gap.floor if gap else np.nan,
+        seconds=seconds,
+    )
+
+
+def confusion(outcomes: list[Outcome]) -> Table:
+    """What was hidden against what was said, single effects that can be seen."""
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    for o in outcomes:
+        if o.group == "effects":
+            said = "+".join(o.names) if o.names else o.verdict if o.visible else "not visible"
+            counts[o.truth[0]][said] += 1
+    table = Table("hidden", "said", title="confusion, single effects")
+    for truth, said in counts.items():
+        table.add_row(truth, ", ".join(f"{name} {n}" for name, n in said.most_common()))
+    return table
+
+
+def figures(outcomes: list[Outcome]) -> Table:
+    """Shares of every group."""
+    table = Table("group", "cases", "visible", "families right", "names right", "unknown", "false family")
+    for group in GROUPS:
+        members = [o for o in outcomes if o.group == group]
+        if not members:
+            continue
+        seen = [o for o in members if o.visible] if group not in ("effect_free",) else members
+        table.add_row(
+            group,
+            str(len(members)),
+            str(sum(o.visible for o in members)),
+            f"{sum(o.family_right for o in seen)} of {len(seen)}",
+            f"{sum(o.name_right for o in seen)} of {len(seen)}",
+            str(sum(o.verdict == "unknown" for o in members)),
+            f"{sum(o.is_false for o in members)} of {len(members)}",
+        )
+    return table
+
+
+def gaps(outcomes: list[Outcome]) -> Table:
+    """How much of the gap closes once an effect has been named rightly."""
+    table = Table("hidden", "cases", "before, %", "after, %", "floor, %", "removed, median %", title="gap, unseen data")
+    named: dict[str, list[Outcome]] = defaultdict(list)
+    for o in outcomes:
+        if o.names and o.family_right:
+            named["+".join(o.truth)].append(o)
+            named["all"].append(o)
+    for truth, members in named.items():
+        before, after, floor = (
+            np.array([getattr(o, f"gap_{k}") for o in members]) for k in ("before", "after", "floor")
+        )
+        removed = 100 * (1 - np.maximum(after - floor, 0) / np.maximum(before - floor, 1e-12))
+        row = [f"{np.median(x):.3f}" for x in (before, after, floor)]
+        table.add_row(truth, str(len(members)), *row, f"{np.median(np.clip(removed, 0, 100)):.0f}")
+    return table
+
+
+def main() -> None:
+    """Run the campaign and print its tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=5, help="seeds of every effect; other groups in proportion")
+    parser.add_argument("--quick", action="store_true", help="one seed at the middle noise")
+    parser.add_argument("--cases", type=int, help="stop after so many cases")
+    parser.add_argument("--groups", nargs="+", choices=GROUPS, default=list(GROUPS))
+    parser.add_argument("--only", default="", help="cases whose label holds this word")
+    parser.add_argument("--json", type=Path, help="outcomes as JSON")
+    options = parser.parse_args()
+    seeds, noises = (1, (NOISES[1],)) if options.quick else (options.seeds, NOISES)
+    wanted = [c for c in cases(tuple(options.groups), seeds, noises) if options.only in c.label][: options.cases]
+    console, outcomes = Console(), list[Outcome]()
+    for k, case in enumerate(wanted, 1):
+        outcome = answer(case)
+        outcomes.append(outcome)
+        said = " and ".join(outcome.names) or outcome.verdict
+        mark = "[red]false[/]" if outcome.is_false else "" if outcome.family_right else "[yellow]missed[/]"
+        console.print(
+            f"{k}/{len(wanted)} {outcome.label} seed {case.seed} {case.plant} noise {100 * case.noise:g} %: {said} "
+            f"V {outcome.excess_before:.2f} → {outcome.excess_after:.2f}, gap {outcome.gap_before:.3f} → "
+            f"{outcome.gap_after:.3f} %, floor {outcome.gap_floor:.3f} %, {outcome.seconds:.1f} s {mark}",
+            highlight=False,
+            soft_wrap=True,
+        )
+        if options.json:
+            options.json.write_text(json.dumps([asdict(o) for o in outcomes], indent=1))
+    for table in (confusion(outcomes), figures(outcomes), gaps(outcomes)):
+        console.print(table)
+    spent = np.array([o.seconds for o in outcomes])
+    console.print(f"processor time per diagnosis: median {np.median(spent):.1f} s, longest {spent.max():.1f} s")
+
+
+if __name__ == "__main__":
+    main()
