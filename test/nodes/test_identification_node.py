@@ -88,10 +88,12 @@ def test_from_an_unknown_stage_to_a_live_model(lab):
     plan = identification.ask("plan").message
     assert f"short: {len(protocol)} phases, {protocol.summary.duration:.1f} s, 0 to 10 V, largest slew" in plan
 
-    recorder = BagRecorder(lab.node, lab.folder / "everything")
+    recorder, commands = BagRecorder(lab.node, lab.folder / "everything"), lab.statuses()
     path = identification.begin()
     assert identification.ask("identify").message.startswith("busy")
     ended = identification.await_state("fitting", "failed", timeout=240.0)
+    end = int(values_of(commands[-1])["first_index"]) + protocol.phases[-1].voltage.size
+    lab.wait(lambda: recorder.holds(end), "the last samples in the other recording")
     lab.do(recorder.close)
     assert "% of range" in identification.await_state("done", "failed", timeout=240.0).message, ended.message
 
