@@ -15,7 +15,7 @@
 ``cut`` ``damaged``   the file ends early, or parts of it cannot be decoded
 ``truncated``         a phase whose beginning is not recorded
 ``history``           a phase before which others were played that are not recorded
-``moved``             the drive moved in a hold or idle that is left out
+``moved``             the drive moved in the idle before the first phase
 ``proposed``          names of phases that come from what the drive looks like
 ``columns`` ``held``  how channels were found in a file of other software, and paired
 ``time_base``         times that are uneven, overlap, or are those of reception

@@ -85,16 +85,12 @@ def finite_records(
     shortest = min(SHORTEST_SHARE * good.size, max(b - a for a, b in pieces))
     pieces = [(a, b) for a, b in pieces if b - a >= shortest]
     dropped = good.size - sum(b - a for a, b in pieces)
-    if dropped:
-        notices.append(
-            Notice(
-                "non_finite" if not good.all() else "gap",
-                f"{int(np.count_nonzero(~good))} of {good.size} samples are not finite: "
-                f"{dropped} dropped with what is too short between holes",
-                phase,
-                severe=dropped > good.size // 2,
-            )
-        )
+    if bad := int(np.count_nonzero(~good)):
+        text = f"{bad} of {good.size} samples are not finite: dropped"
+        notices.append(Notice("non_finite", text, phase, severe=bad > good.size // 2))
+    if dropped > bad:
+        text = f"{dropped - bad} samples between holes too close to each other are dropped"
+        notices.append(Notice("split", text, phase, severe=dropped > good.size // 2))
     if len(pieces) > 1:
         notices.append(Notice("split", f"the phase is split at its holes into {len(pieces)} records", phase))
     begin = float(labels.pop("start_time", 0.0))

@@ -35,10 +35,10 @@ class Rosbag2:
 
     Phases recorded in one go continue each other: from the second one on `Record.continues` holds, also where the
     `hold` between them is left out. There the drive stands still at its last voltage for as long as the `start_time` of
-    the next phase shows, so whoever carries a slow state (creep) holds that voltage for that time; a notice tells where
-    the drive moved meanwhile. The first phase starts settled at the voltage of the `idle` before it. A phase behind
-    lost samples continues and is `truncated`: its state can be carried, but not exactly. So is one whose beginning is
-    not in the bag.
+    the next phase shows, so whoever carries a slow state (creep) holds that voltage for that time. A hold in which the
+    drive moves is kept: the state cannot be carried without it. The first phase starts settled at the voltage of the
+    `idle` before it. A phase behind lost samples continues and is `truncated`: its state can be carried, but not
+    exactly. So is one whose beginning is not in the bag.
     """
 
     def recognises(self, path: Path) -> bool:
@@ -157,23 +157,24 @@ def _records(stretches: list[Stretch], names: PhaseNames, layout: Layout) -> tup
     unlabelled = layout.phases is not None or (not names and all(s.phase == 0 for s in stretches))
     records: list[Record] = []
     notices: list[Notice] = []
-    moved: list[tuple[float, Notice]] = []
+    moving = _MOVED * max(_travel(stretch) for stretch in stretches)
     before: Stretch | None = None
     kept = excited = False
     for stretch in stretches:
         if stretch.first:
             before, kept, excited = None, False, False
         name = "record" if unlabelled else _name(stretch, names, notices)
+        moves = _travel(stretch) > moving
+        left_out = name in (IDLE, HOLD) and name not in layout.include and not (name == HOLD and moves and kept)
         if missing := stretch.lost + sum(stretch.breaks.values()):
             lost = f"{missing} samples ({missing * stretch.sample_period:.3g} s) were lost"
             places = len(stretch.breaks) + (stretch.lost > 0)
-            severe = missing > _SEVERE_SHARE * (stretch.size + missing)
+            severe = not left_out and missing > _SEVERE_SHARE * (stretch.size + missing)
             notices.append(Notice("gap", f"{lost} in {places} places", name, severe))
-        if name in (IDLE, HOLD) and name not in layout.include:
-            move = float(np.ptp(stretch.channels["voltage"]))
-            text = f"the drive moved by {move:.3g} V in {name}, which is left out; include it to carry its state"
-            moved.append((move, Notice("moved", text, name)))
-        else:
+        if left_out and moves:
+            text = f"the drive moved by {_travel(stretch):.3g} V before the first phase: taken as settled after it"
+            notices.append(Notice("moved", text, name))
+        if not left_out:
             begins = stretch.phase == 0 if stretch.first else stretch.lost == 0
             if excited and not kept:
                 notices.append(Notice("history", "begins after phases that are not recorded: taken as settled", name))
@@ -196,14 +197,18 @@ def _records(stretches: list[Stretch], names: PhaseNames, layout: Layout) -> tup
         before = stretch
     if not records:
         raise RecordingError(f"holds only {IDLE} and {HOLD}, expected phases; include={IDLE},{HOLD} keeps those")
-    span = max(float(np.ptp(r.voltage)) for r in records)
-    notices += [notice for move, notice in moved if move > _MOVED * span]
     origin = records[0].start_time
     records = [replace(r, start_time=r.start_time - origin) for r in records]
     if unlabelled:
         records, told = labelled(records, layout.phases)
         notices += told
     return records, notices
+
+
+def _travel(stretch: Stretch) -> float:
+    """Range of the drive [V]."""
+    voltage = stretch.channels["voltage"]
+    return float(np.ptp(voltage)) if np.isfinite(voltage).all() else 0.0
 
 
 def _name(stretch: Stretch, names: PhaseNames, notices: list[Notice]) -> str:

@@ -222,9 +222,11 @@ def test_phases_without_recorded_names_get_proposed_ones(tmp_path):
     assert "proposed" in kinds(experiment)
 
 
-def test_a_move_in_a_hold_that_is_left_out_is_told(tmp_path):
+def test_a_hold_in_which_the_drive_moves_is_part_of_the_history(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         driver = Driver(bag)
+        driver.phase(0, "idle")
+        driver.play(1, voltage=0.0)
         driver.phase(1, "noise")
         driver.play()
         driver.phase(2, "hold")
@@ -232,7 +234,27 @@ def test_a_move_in_a_hold_that_is_left_out_is_told(tmp_path):
         driver.play(2, voltage=0.0)
         driver.phase(3, "noise")
         driver.play()
-    assert "moved" in kinds(read(tmp_path / "bag"))
+        driver.phase(4, "hold")
+        driver.play(2, voltage=0.0)
+    experiment = read(tmp_path / "bag")
+    assert [(r.phase, r.size, r.continues) for r in experiment] == [
+        ("noise", 3 * SIZE, False),
+        ("hold", 4 * SIZE, True),
+        ("noise", 3 * SIZE, True),
+    ]
+
+
+def test_a_bag_that_starts_in_a_hold_tells_what_it_does_not_know(tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        driver = Driver(bag, index=777)
+        driver.phase(8, "hold")
+        driver.play(2, voltage=2.0)
+        driver.play(2, voltage=0.25)
+        driver.phase(9, "noise")
+        driver.play()
+    (record,) = experiment = read(tmp_path / "bag")
+    assert (record.continues, record.truncated, record.initial_voltage) == (False, False, 0.25)
+    assert {"history", "moved"} <= kinds(experiment)
 
 
 def test_uneven_times_and_undecodable_blocks_are_told(tmp_path):
