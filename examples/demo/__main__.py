@@ -65,6 +65,7 @@ class Demo:
             "driver_node",
             real_time_factor=speed,
             block_duration=0.01 * speed,  # 100 messages a second, as in real time
+            command_max_age=30.0,  # 80 MB of staircase take their time on a busy machine
             simulated__plant_file=plant,
             simulated__seed=seed,
         )
@@ -155,8 +156,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1, help="draws the hidden effect (default: 1)")
     parser.add_argument("--effect", help="hide this effect; the seed then draws its size only")
-    parser.add_argument("--protocol", default="rich", help="paper, short or rich (default: rich, 175 s of stage time)")
-    parser.add_argument("--speed", type=float, default=5.0, help="seconds of the simulated stage per second")
+    parser.add_argument(
+        "--protocol", default="short", help="paper, short (18 s of stage time, default) or rich (160 s)"
+    )
+    parser.add_argument("--speed", type=float, default=2.0, help="stage time over real time (default: 2)")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "demo", help="folder (default: demo)")
     arguments = parser.parse_args()
 

@@ -31,12 +31,15 @@ class Trace:
 
     Attributes
     ----------
+    time : (n,) ndarray
+        Time since the first sample of the waveform, of every sample that arrived [s].
     residual : (n,) ndarray
-        Measured minus predicted displacement of every sample [m].
+        Measured minus predicted displacement [m].
     live_rms : list of float
         What `residual_rms` showed meanwhile [m].
     """
 
+    time: Array
     residual: Array
     live_rms: list[float]
 
@@ -166,8 +169,10 @@ class Bench:
         last = (first + voltage.size - 1) % 2**32
         self.wait(lambda: self._seen(last), "the prediction of the last sample", 30.0)
         index, residual = (np.concatenate(column) for column in zip(*self._blocks, strict=True))
+        number = index - np.uint32(first)
+        inside = number < voltage.size
         live, self._blocks = self._live_rms, None
-        return Trace(residual[(index - np.uint32(first)) < voltage.size], live)
+        return Trace(self._sample_period * number[inside], residual[inside], live)
 
     def _seen(self, index: int) -> bool:
         return bool(self._blocks) and (int(self._blocks[-1][0][-1]) - index) % 2**32 < 2**31
