@@ -1,8 +1,8 @@
 """The floor: below which residual no effect can be seen, for every record at its own sample period.
 
-Three parts: white noise from the top of the spectrum, where a stage no longer moves; the scatter between periods of a
-periodic record, which also holds jitter and 1/f noise; and an adequacy floor of 0.03 % of range, below which a model is
-as good as any lab needs.
+Four parts: white noise from the top of the spectrum, where a stage no longer moves; the scatter between periods of a
+periodic record, which also holds jitter and 1/f noise; the steps of the converter, q/√12; and an adequacy floor of 0.03 %
+of range, below which a model is as good as any lab needs.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ ADEQUACY = 3e-4
 """Share of the range of the experiment that counts as perfect."""
 MAINS = (50.0, 60.0)
 """Mains frequencies [Hz]."""
+ALIKE, UNLIKE = 1e-6, 0.1
+"""Share of the power of the drive by which it may differ from itself one period later, and differs in between."""
 TOP_BAND = 0.7
 """Share of the Nyquist frequency above which a record holds noise alone."""
 
@@ -55,15 +57,28 @@ def period_scatter(record: Record) -> float | None:
         return None
     y = record.displacement[period:]
     steps = y[period:] - y[:-period]
+    # a period that is no whole number of samples leaves a little of the drive
+    rest = record.voltage[2 * period :] - record.voltage[period:-period]
     t = record.sample_period * np.arange(steps.size)
     lines = [f for base in MAINS for f in (base, 2 * base, 3 * base) if f * record.sample_period < 0.45]
-    basis = np.array([np.ones(t.size), *(w(2 * np.pi * f * t) for f in lines for w in (np.cos, np.sin))])
+    basis = np.array(
+        [np.ones(t.size), rest, np.gradient(rest), *(w(2 * np.pi * f * t) for f in lines for w in (np.cos, np.sin))]
+    )
     steps = steps - np.linalg.lstsq(basis.T, steps, rcond=1e-6)[0] @ basis
     return float(np.sqrt(np.mean(steps**2) / 2.0))
 
 
+def quantum(record: Record) -> float:
+    """Step of the converter [m]: the smallest difference of readings that repeat; 0 where they do not."""
+    levels = np.unique(record.displacement)
+    return float(np.diff(levels).min()) if 1 < levels.size <= record.size // 2 else 0.0
+
+
 def drive_period(voltage: Array) -> int | None:
-    """Samples of the shortest exact period of a drive that holds at least two; None where it has none."""
+    """Samples of the shortest exact period of a drive that holds at least two; None where it has none.
+
+    Neighbouring samples of a slow drive are alike as well: a period comes after the drive has become unlike itself.
+    """
     moving = voltage - voltage.mean()
     power = float(moving @ moving)
     if power == 0.0:
@@ -75,8 +90,14 @@ def drive_period(voltage: Array) -> int | None:
     lags = np.arange(product.size)
     overlap = energy[voltage.size - lags] + (energy[-1] - energy[lags])
     mismatch = (overlap - 2.0 * product) / np.maximum(overlap, 1e-300)
-    (exact,) = np.nonzero(mismatch[2:] < 1e-6)
-    return int(exact[0]) + 2 if exact.size else None
+    unlike = int(np.argmax(mismatch > UNLIKE))
+    (alike,) = np.nonzero(mismatch[unlike:] < ALIKE)
+    if not (unlike and alike.size):
+        return None
+    first = unlike + int(alike[0])
+    beyond = np.flatnonzero(mismatch[first:] >= ALIKE)
+    run = mismatch[first : first + int(beyond[0])] if beyond.size else mismatch[first:]
+    return first + int(np.argmin(run))
 
 
 def noise_floors(records: Sequence[Record]) -> Array:
@@ -84,7 +105,7 @@ def noise_floors(records: Sequence[Record]) -> Array:
 
     Records without periods take the excess of scatter over white noise that the periodic ones show.
     """
-    white = np.array([white_noise(r) for r in records])
+    white = np.array([max(white_noise(r), quantum(r) / np.sqrt(12.0)) for r in records])
     scatter = [period_scatter(r) for r in records]
     excess = [s / w for s, w in zip(scatter, white, strict=True) if s is not None and w > 0]
     typical = max(1.0, float(np.median(excess))) if excess else 1.0

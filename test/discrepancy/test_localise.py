@@ -1,0 +1,101 @@
+"""Where: each kind of residual concentrates on the axis that reveals it."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.discrepancy.localise import localise
+from piezo_hysteresis.record import Record
+
+RANDOM = np.random.default_rng(9)
+PERIOD = 1e-3
+AXES = {
+    "phase",
+    "frequency",
+    "amplitude",
+    "direction",
+    "turning_point_distance",
+    "time_since_level_change",
+    "absolute_time",
+}
+
+
+def staircase(start_time=0.0):
+    u = np.repeat([0.0, 2.0, 4.0, 6.0, 4.0, 2.0], 5000)
+    return Record(u, np.zeros(u.size), PERIOD, "staircase", start_time)
+
+
+def triangle(start_time=0.0):
+    t = PERIOD * np.arange(8000)
+    return Record(6 * np.abs(2 * (t / 2 % 1) - 1), np.zeros(t.size), PERIOD, "triangle", start_time)
+
+
+RECORDS = (triangle(0.0), staircase(10.0), triangle(45.0), staircase(55.0))
+
+
+def places(residual):
+    """Places by axis, and the most telling axis."""
+    left = [np.asarray(residual(r), float) for r in RECORDS]
+    found = localise(RECORDS, left, [1e-8] * len(RECORDS))
+    return {p.axis: p for p in found}, found[0].axis
+
+
+def since_level(record):
+    changed = np.flatnonzero(np.diff(record.voltage, prepend=record.voltage[0]))
+    last = np.concatenate(([0], changed))[np.searchsorted(changed, np.arange(record.size), side="right")]
+    return PERIOD * (np.arange(record.size) - last)
+
+
+def test_shares_add_up_and_every_axis_answers():
+    by_axis, _ = places(lambda r: RANDOM.normal(size=r.size))
+    assert set(by_axis) == AXES
+    for place in by_axis.values():
+        assert sum(share for _, share in place.bins) == pytest.approx(1.0)
+        assert 0.0 <= place.share <= 1.0
+
+
+def test_creep_lies_late_after_a_change_of_level():
+    by_axis, _ = places(lambda r: np.log10(1 + since_level(r) / 0.1) * 1e-8)
+    place = by_axis["time_since_level_change"]
+    late = sum(s for label, s in place.bins if float(label.split()[0]) >= 1.0)
+    assert late > 0.6
+    by_phase = dict(by_axis["phase"].bins)
+    assert by_phase["staircase"] > 0.95
+
+
+def test_an_error_of_one_direction_shows_there():
+    by_axis, first = places(lambda r: 1e-8 * (np.diff(r.voltage, prepend=r.voltage[0]) > 1e-4))
+    assert dict(by_axis["direction"].bins)["rising drive"] == pytest.approx(1.0)
+    assert by_axis["direction"].detail.startswith("rising drive")
+
+
+def test_an_error_at_the_top_of_the_range_shows_there():
+    by_axis, _ = places(lambda r: 1e-8 * (r.voltage > 5.5))
+    assert dict(by_axis["amplitude"].bins)["90 to 100 % of the drive range"] > 0.9
+
+
+def test_a_drift_grows_with_absolute_time():
+    by_axis, _ = places(lambda r: 1e-10 * r.time)
+    shares = [s for _, s in by_axis["absolute_time"].bins]
+    assert sum(shares[5:]) > 0.85
+
+
+def test_a_line_shows_in_its_band_before_anything_else():
+    by_axis, first = places(lambda r: 1e-8 * np.sin(2 * np.pi * 50 * r.time))
+    assert first == "frequency"
+    assert by_axis["frequency"].detail.startswith("25 to 75 Hz")
+    assert by_axis["frequency"].share > 0.99
+
+
+def test_an_error_just_after_turning_points_shows_there():
+    def residual(record):
+        u = record.voltage
+        distance = np.minimum(u, 6 - u) if record.phase == "triangle" else np.full(u.size, 9.0)
+        return 1e-8 * (distance < 0.5)
+
+    by_axis, _ = places(residual)
+    nearest = dict(by_axis["turning_point_distance"].bins)["0 to 10 % of the drive range after a turning point"]
+    assert nearest > 0.4
+
+
+def test_no_residual_is_nowhere():
+    assert localise(RECORDS, [np.zeros(r.size) for r in RECORDS], [1e-8] * 4) == ()

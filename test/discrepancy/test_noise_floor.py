@@ -1,0 +1,83 @@
+"""The floor: noise of known size is found at every sample period, and nothing else is taken for noise."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.discrepancy.noise_floor import (
+    ADEQUACY,
+    drive_period,
+    floors,
+    noise_floors,
+    period_scatter,
+    quantum,
+    stroke,
+    white_noise,
+)
+from piezo_hysteresis.record import Record
+
+RANDOM = np.random.default_rng(3)
+SIGMA = 1e-8
+
+
+def sine(frequency, period, duration, sigma=SIGMA, added=0.0, phase="sine"):
+    """A stage that follows its drive with a lag, plus white noise."""
+    t = period * np.arange(round(duration / period))
+    u = 3.5 - 2.5 * np.cos(2 * np.pi * frequency * t)
+    y = 4e-6 * (3.5 - 2.5 * np.cos(2 * np.pi * frequency * t - 0.2))
+    extra = added(t) if callable(added) else added
+    return Record(u, y + extra + sigma * RANDOM.normal(size=t.size), period, phase=phase)
+
+
+@pytest.mark.parametrize(("frequency", "period"), [(100.0, 2e-5), (10.0, 1e-4), (1.0, 1e-3), (0.05, 1e-2)])
+def test_white_noise_is_found_under_motion_a_thousand_times_larger(frequency, period):
+    record = sine(frequency, period, 20_000 * period)
+    assert white_noise(record) == pytest.approx(SIGMA, rel=0.05)
+
+
+@pytest.mark.parametrize("frequency", [100.0, 250.0])
+def test_scatter_between_periods_is_the_noise(frequency):
+    assert period_scatter(sine(frequency, 2e-5, 0.4)) == pytest.approx(SIGMA, rel=0.03)
+
+
+def test_scatter_holds_noise_that_is_slower_than_the_top_of_the_spectrum():
+    slow = np.repeat(RANDOM.normal(size=400), 50) * 5 * SIGMA
+    record = sine(100.0, 2e-5, 0.4, added=lambda t: slow[: t.size])
+    assert white_noise(record) < 2 * SIGMA
+    assert period_scatter(record) == pytest.approx(np.sqrt(26) * SIGMA, rel=0.15)
+
+
+@pytest.mark.parametrize("mains", [50.0, 60.0])
+def test_mains_hum_is_an_effect_and_no_floor(mains):
+    record = sine(70.0, 2e-5, 0.5, added=lambda t: 10 * SIGMA * np.cos(2 * np.pi * mains * t + 1.0))
+    assert drive_period(record.voltage) is not None
+    assert period_scatter(record) == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_a_drive_without_period_has_none():
+    assert drive_period(RANDOM.normal(size=5000)) is None
+    assert drive_period(np.full(500, 2.0)) is None
+    assert drive_period(np.cos(2 * np.pi * np.arange(35_000) / 20_000)) is None
+    assert drive_period(np.cos(2 * np.pi * np.arange(45_000) / 20_000)) == 20_000
+    assert drive_period(np.tile(RANDOM.normal(size=250), 6)) == 250
+
+
+def test_averaged_records_are_quieter_and_judged_at_their_own_period():
+    fast = sine(5.0, 2e-5, 1.0)
+    slow = fast.decimate(25)
+    noise = noise_floors((fast, slow))
+    assert noise[1] == pytest.approx(noise[0] / 5, rel=0.1)
+
+
+def test_quantisation_is_noise_of_one_step_over_root_twelve():
+    record = sine(100.0, 2e-5, 0.4, sigma=0.0)
+    step = 2e-7
+    rounded = Record(record.voltage, np.rint(record.displacement / step) * step, 2e-5)
+    assert quantum(rounded) == pytest.approx(step)
+    assert noise_floors((rounded,))[0] == pytest.approx(step / np.sqrt(12), rel=0.3)
+    assert quantum(sine(100.0, 2e-5, 0.4)) == 0.0
+
+
+def test_no_floor_lies_below_the_adequacy_floor():
+    records = (sine(100.0, 2e-5, 0.2, sigma=1e-12),)
+    assert floors(records)[0] == ADEQUACY * stroke(records)
+    assert stroke(records) == pytest.approx(2e-5, rel=1e-3)

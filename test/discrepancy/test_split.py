@@ -1,0 +1,37 @@
+"""Records that report the gap: some of every kind that has enough, and never all of one."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from piezo_hysteresis.discrepancy.split import reporting
+from piezo_hysteresis.record import Record
+
+KINDS = ("noise", "sine_1hz", "sine_50hz", "triangle", "staircase", "validation")
+
+
+def records(phases):
+    return [Record(np.arange(3.0), np.arange(3.0), 1e-3, phase=p) for p in phases]
+
+
+@given(st.lists(st.sampled_from(KINDS), min_size=1, max_size=30))
+def test_every_kind_stays_in_the_fit_and_validation_never_is(phases):
+    kept = records(phases)
+    spared = reporting(kept, range(len(kept)))
+    fitted = {p.split("_")[0] for i, p in enumerate(phases) if i not in spared}
+    kinds = {p.split("_")[0] for p in phases}
+    if kinds == {"validation"}:
+        assert spared == ()
+    else:
+        assert fitted == kinds - {"validation"}
+        assert {i for i, p in enumerate(phases) if p == "validation"} <= set(spared)
+
+
+def test_one_in_three_of_a_kind_and_not_its_extremes():
+    phases = [f"sine_{f}hz" for f in (1, 50, 100, 200, 300, 400)] + ["noise", "noise"]
+    assert reporting(records(phases), range(8)) == (1, 4)
+
+
+def test_what_may_not_be_taken_is_not():
+    phases = ["noise"] * 6
+    assert set(reporting(records(phases), (0, 2, 4))) <= {0, 2, 4}
