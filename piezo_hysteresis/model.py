@@ -18,6 +18,9 @@ from .record import Record
 
 Array = NDArray[np.float64]
 
+HOLD_STEPS = 8
+"""Steps in which the time between two records that continue is gone through."""
+
 
 def _place(effect: Effect) -> tuple[int, int]:
     return int(effect.place), CHAIN.index(type(effect)) if type(effect) in CHAIN else len(CHAIN)
@@ -195,19 +198,21 @@ class Model:
     def simulate(self, records: Record | Iterable[Record]) -> list[Array]:
         """Free-run displacement [m] of every record, each at its own sample period.
 
-        A record starts from a stage at rest at its `settled_voltage`, unless it continues the one before it.
+        A record starts from a stage at rest at its `settled_voltage`, unless it continues the one before it; between
+        two that continue, the last voltage was held.
         """
         outputs: list[Array] = []
         state: ChainState | None = None
         chain: Chain | None = None
-        for record in [records] if isinstance(records, Record) else records:
+        for index, record in self._in_one_go([records] if isinstance(records, Record) else records):
             before, chain = chain, self.at(record.sample_period)
             if state is None or not record.continues:
                 state = chain.rest(record.settled_voltage, record.start_time)
             elif before is not chain:
                 state = chain.resume(state)
             y, state = chain.run(np.array(record.voltage), state, channels_of(record))
-            outputs.append(y)
+            if index is not None:
+                outputs.append(y)
         return outputs
 
     def linearise(
@@ -229,7 +234,7 @@ class Model:
         state: ChainState | None = None
         tangent: ChainTangent | None = None
         chain: Chain | None = None
-        for index, record in enumerate(records):
+        for index, record in self._in_one_go(records):
             before, chain = chain, self.at(record.sample_period)
             if state is None or tangent is None or not record.continues:
                 state = chain.rest(record.settled_voltage, record.start_time)
@@ -243,7 +248,22 @@ class Model:
                 now = {name: c[part].copy() for name, c in channels.items()}
                 u = np.array(record.voltage[part])
                 y, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
-                yield index, part, y, slopes
+                if index is not None:
+                    yield index, part, y, slopes
+
+    def _in_one_go(self, records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:
+        """The records with their index, and without one the holds between those that continue: creep goes on there."""
+        before: Record | None = None
+        for index, record in enumerate(records):
+            if before is not None and record.continues:
+                end = before.start_time + before.duration
+                steps = min(HOLD_STEPS, int((record.start_time - end) / self.sample_period))
+                if steps > 0:
+                    held = np.full(steps, before.voltage[-1])
+                    period = (record.start_time - end) / steps
+                    yield None, Record(held, held, period, "hold", start_time=end, continues=True)
+            yield index, record
+            before = record
 
     def sensitivities(self, record: Record, wanted: Collection[str]) -> tuple[Array, dict[str, Array]]:
         """Free-run displacement (n,) of a record from rest, and ∂y/∂θ (n,) of every number `wanted`."""

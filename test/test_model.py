@@ -90,3 +90,18 @@ def test_unknown_and_impossible_numbers_are_refused() -> None:
         Creep(gamma=3.0)
     with pytest.raises(ParameterError, match="unknown parameter 'q'"):
         MODEL.with_values({"bouc_wen.q": 1.0})
+
+
+def test_creep_goes_on_between_records_that_continue() -> None:
+    model = MODEL.with_effect(Creep(gamma=0.02, tau_min=1e-3, tau_max=1e3))
+    drive = np.concatenate((np.linspace(0.0, 5.0, 200), np.full(4800, 5.0), np.linspace(5.0, 2.0, 300)))
+    whole = Record(drive, drive, PERIOD)
+    parts = [whole[:200], whole[5000:]]
+    expected = model.simulate(whole)[0][5000:]
+    behind = model.simulate(parts)[1]
+    np.testing.assert_allclose(behind, expected, atol=1e-5 * np.ptp(expected))
+    (_, _, y, slopes), *_ = list(model.linearise(parts, ["creep.gamma"]))[1:]
+    np.testing.assert_array_equal(y, behind)
+    np.testing.assert_allclose(
+        slopes["creep.gamma"], model.sensitivities(whole, ["creep.gamma"])[1]["creep.gamma"][5000:], rtol=1e-3
+    )
