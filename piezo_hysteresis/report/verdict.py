@@ -103,7 +103,10 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
     found = [sentence(answer["reason"])] if answer.get("reason") else []
     for effect in answer.get("effects", ()):
         name = effect["name"].replace("_", " ")
-        found.append(f"{name.capitalize()} explains {100 * effect['explained_fraction']:.0f} % of what was missing.")
+        if not answer.get("reason"):
+            found.append(
+                f"{name.capitalize()} explains {100 * effect['explained_fraction']:.0f} % of what was missing."
+            )
         if not effect["member_certain"]:
             twins = ", ".join(t.replace("_", " ") for t in effect["confusable_with"])
             others = f": {twins} would do as well" if twins else ""
@@ -120,7 +123,8 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
         )
     following = answer.get("next_experiment")
     if following:
-        names = " from ".join(n.replace("_", " ") for n in following.get("separates", ()))
+        apart = dict.fromkeys(n.replace("_", " ") for n in following.get("separates", ()))
+        names = " from ".join(apart) if len(apart) > 1 else ""
         found.append(
             f"To learn more, record the phase “{following['phase']}”" + (f": it separates {names}." if names else ".")
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -127,3 +128,17 @@ def test_json_has_no_number_that_machines_cannot_read(piezo, identified, folder,
     text = (tmp_path / "v.json").read_text()
     assert "NaN" not in text
     assert "Infinity" not in text
+
+
+def test_diagnose_says_what_too_little_data_cannot_decide(piezo, folder, tmp_path):
+    part = tmp_path / "part"
+    part.mkdir()
+    for name in ("01_rest", "02_step", "03_noise", "04_triangle"):
+        shutil.copy(folder / f"{name}.npz", part)
+    done = piezo("diagnose", part, "--json", tmp_path / "d.json", "-o", tmp_path / "better.yaml")
+    assert done.status == 0, "unknown is an answer"
+    answer = json.loads((tmp_path / "d.json").read_text())
+    assert (answer["schema"], answer["verdict"], answer["effects"]) == (1, "unknown", [])
+    assert "cannot be named" in done.out
+    assert " ".join(answer["reason"].split())[1:20] in " ".join(done.out.split())
+    assert (answer["model"] == "") == (not (tmp_path / "better.yaml").exists())
