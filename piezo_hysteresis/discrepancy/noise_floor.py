@@ -1,8 +1,8 @@
 """The floor: below which residual no effect can be seen, for every record at its own sample period.
 
 Four parts: white noise from the top of the spectrum, where a stage no longer moves; the scatter between periods of a
-periodic record, which also holds jitter and 1/f noise; the steps of the converter, q/√12; and an adequacy floor of 0.03 %
-of range, below which a model is as good as any lab needs.
+periodic record, which also holds jitter and 1/f noise; the steps of the converter, q/√12; and an adequacy floor of
+0.03 % of range, below which a model is as good as any lab needs.
 """
 
 from __future__ import annotations

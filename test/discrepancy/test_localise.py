@@ -63,7 +63,7 @@ def test_creep_lies_late_after_a_change_of_level():
 
 
 def test_an_error_of_one_direction_shows_there():
-    by_axis, first = places(lambda r: 1e-8 * (np.diff(r.voltage, prepend=r.voltage[0]) > 1e-4))
+    by_axis, _ = places(lambda r: 1e-8 * (np.diff(r.voltage, prepend=r.voltage[0]) > 1e-4))
     assert dict(by_axis["direction"].bins)["rising drive"] == pytest.approx(1.0)
     assert by_axis["direction"].detail.startswith("rising drive")
 
