@@ -165,11 +165,12 @@ def test_every_early_end_leaves_the_stage_safe_and_the_recording_readable(lab):
         return samples.newest.voltage[-1] > 4.0
 
     def recorded(path):
-        """The phase that was cut short, which is all there is."""
-        (record,) = read(path)
-        assert record.phase == "conditioning"
-        assert record.voltage.max() > 1.0
-        return record
+        """The phase that was cut short, and no other; in pieces where a busy computer lost blocks."""
+        experiment = read(path)
+        assert {record.phase for record in experiment} <= {"conditioning", "hold"}
+        records = experiment.named("conditioning")
+        assert max(record.voltage.max() for record in records) > 1.0
+        return records
 
     def at_rest():
         lab.wait(lambda: all((b.voltage < 1e-3).all() for b in samples.blocks[-50:]), "half a second of rest")
@@ -207,7 +208,12 @@ def test_every_early_end_leaves_the_stage_safe_and_the_recording_readable(lab):
     identification.process.signal(signal.SIGKILL)
     lab.wait(lambda: samples.newest.phase[-1] > number, "the end of the phase, which the driver plays whole")
     at_rest()
-    record = recorded(path)
+    records = recorded(path)
+    starts = [round((record.start_time - records[0].start_time) / PERIOD) for record in records]
     # a second is what the recorder keeps in memory, a quarter what may be on its way while the computer is busy
-    assert record.size >= last - began - 1.25 / PERIOD
-    np.testing.assert_array_equal(record.voltage, samples.voltage[samples.phase == number][: record.size])
+    assert starts[-1] + records[-1].size >= last - began - 1.25 / PERIOD
+    inside = samples.phase == number
+    place, voltage = samples.place()[inside] - began, samples.voltage[inside]
+    for start, record in zip(starts, records, strict=True):
+        common = (place >= start) & (place < start + record.size)
+        np.testing.assert_array_equal(record.voltage[place[common] - start], voltage[common])
