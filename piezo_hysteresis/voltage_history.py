@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+FULL_SAMPLES = 3_000_000
+"""Samples kept in full at most, a minute at 50 kHz: 36 MB."""
+
 REST_TOLERANCE = 5e-3
 """Voltages that stay within this distance [V] count as held: the noise of a measured drive."""
 
@@ -22,7 +25,7 @@ class VoltageHistory:
     sample_period : float
         Time between samples [s].
     duration : float
-        Time kept in full [s]; up to half as much again before the oldest part is averaged.
+        Time kept in full [s], `FULL_SAMPLES` at most; up to half as much again before the oldest part is averaged.
     slow_period : float
         Averaging time of older samples [s].
     slow_duration : float
@@ -50,7 +53,8 @@ class VoltageHistory:
         self.began_in_motion = False
         """True where the first block did not."""
         self._has_moved = False
-        self._limit = self.factor * max(1, round(duration / sample_period / self.factor))
+        full = min(duration / sample_period, FULL_SAMPLES)
+        self._limit = self.factor * max(1, round(full / self.factor))
         self._slow_limit = max(1, round(slow_duration / sample_period / self.factor))
         self._full = np.empty(self.factor)
         self._kept = 0

@@ -62,7 +62,6 @@ class BagRecorder:
     """
 
     def __init__(self, node: Node, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
         self._node, self._bag = node, BagWriter(path)
         self.counts = dict.fromkeys(TOPICS, 0)
         self.failure: RecordingError | None = None

@@ -110,8 +110,11 @@ class ModelDiagnostics:
             yield DiagnosticStatus.WARN, f"{lost} samples lost, bridged by holding the voltage"
         if repeated:
             yield DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late, dropped"
-        if predictor.model is None:
+        if predictor.model is None and self._model is None:
             yield DiagnosticStatus.WARN, "no model: give model_file, or identify the stage"
+        elif predictor.model is None:
+            yield DiagnosticStatus.ERROR, "the model cannot follow: slower than the samples, or it ran away"
+        if predictor.model is None:
             return
         if predictor.warming_up:
             yield DiagnosticStatus.WARN, "warming up: joined in motion, what was before is unknown"
