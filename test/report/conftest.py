@@ -95,6 +95,12 @@ def drawn(comparison):
 
 
 @pytest.fixture(scope="session")
+def figures(drawn):
+    """The figures of the page by name."""
+    return {drawing.name: drawing for drawing in drawn.drawings}
+
+
+@pytest.fixture(scope="session")
 def saved(drawn, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "page.html"
     drawn.save(path)

@@ -18,14 +18,12 @@ from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.report.bode import bode
 from piezo_hysteresis.report.comparison import compare
 from piezo_hysteresis.report.creep import creep
-from piezo_hysteresis.report.gap import gap
-from piezo_hysteresis.report.loops import cycles, loops_by_amplitude, loops_by_frequency, opening
+from piezo_hysteresis.report.loops import cycles, opening
 from piezo_hysteresis.report.page import SECTIONS
 from piezo_hysteresis.report.residual_maps import residual_maps
 from piezo_hysteresis.report.spectrum import residual_spectrum
-from piezo_hysteresis.report.step import step
 from piezo_hysteresis.report.thinning import thinned
-from piezo_hysteresis.report.time_series import time_series, window
+from piezo_hysteresis.report.time_series import window
 from piezo_hysteresis.report.whiteness import whiteness
 
 FIGURES = [figure for figures in SECTIONS.values() for figure in figures]
@@ -61,8 +59,8 @@ def test_one_poor_record_is_drawn_or_left_out(figure):
     figure(compare(Experiment((record,)), {"model": linear(1e-2)}))
 
 
-def test_measured_and_predicted_differ_by_more_than_their_colour(comparison):
-    (axis, *_) = loops_by_amplitude(comparison).figure.get_axes()
+def test_measured_and_predicted_differ_by_more_than_their_colour(figures):
+    (axis, *_) = figures["loops_by_amplitude"].figure.get_axes()
     measured, predicted = axis.get_lines()[:2]
     assert measured.get_color() != predicted.get_color()
     assert measured.get_linestyle() != predicted.get_linestyle()
@@ -82,12 +80,12 @@ def test_cycles_of_a_triangle_are_its_peaks(peaks):
     assert [c.swing for c in found] == pytest.approx(peaks)
 
 
-def test_loops_are_sorted_by_swing_and_every_frequency_has_one(comparison):
-    by_amplitude = loops_by_amplitude(comparison)
+def test_loops_are_sorted_by_swing_and_every_frequency_has_one(figures):
+    by_amplitude = figures["loops_by_amplitude"]
     swings = [np.ptp(by_amplitude.data[f"voltage_V_{i}"]) for i in range(1, 5)]
     assert swings == pytest.approx(sorted(swings, reverse=True))
     assert swings[0] == pytest.approx(10.0, rel=0.01)
-    assert "200 Hz" in loops_by_frequency(comparison).alternative
+    assert "200 Hz" in figures["loops_by_frequency"].alternative
 
 
 def test_logarithmic_creep_is_a_straight_line_of_its_slope():
@@ -116,8 +114,8 @@ def test_bode_covers_the_truth_within_two_sigma(signal):
     assert np.mean(np.abs(turn) < 2 * data["relative_deviation_1"]) > 0.85
 
 
-def test_the_step_shows_the_delay_of_the_stage(comparison):
-    drawing = step(comparison)
+def test_the_step_shows_the_delay_of_the_stage(figures):
+    drawing = figures["step"]
     assert "delay 3 samples of 20 µs" in drawing.alternative
     before = drawing.data["time_s"] < 3 * 2e-5 - 1e-9
     assert np.all(np.abs(drawing.data["predicted_m_per_V"][before]) < 1e-9)
@@ -147,8 +145,8 @@ def test_the_map_finds_a_static_nonlinearity_over_the_drive(signal):
         assert mean - mean.mean() == pytest.approx(1e-8 * ((centre - 5) ** 2 - np.mean((centre - 5) ** 2)), abs=5e-9)
 
 
-def test_the_gap_closes_when_the_missing_effect_is_added(comparison):
-    data = gap(comparison).data
+def test_the_gap_closes_when_the_missing_effect_is_added(comparison, figures):
+    data = figures["gap"].data
     assert np.all(data["error_percent_of_range"] < data["error_before_percent_of_range"])
     assert list(data["phase"]) == [r.phase for r in comparison.experiment]
 
@@ -172,8 +170,8 @@ def test_a_window_of_a_fast_phase_holds_the_largest_residual():
     assert window(slow, residual[:200]) == slice(0, 200)
 
 
-def test_against_time_shows_every_phase_of_a_short_experiment(comparison):
-    words = time_series(comparison).alternative
+def test_against_time_shows_every_phase_of_a_short_experiment(comparison, figures):
+    words = figures["time_series"].alternative
     assert all(r.phase in words for r in comparison.experiment)
 
 
