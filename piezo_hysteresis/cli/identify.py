@@ -28,6 +28,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--choose-orders", action="store_true", help="lowest orders that are as good as any")
     parser.add_argument("--published", action="store_true", help="Bouc-Wen in the discrete form of the paper, Eq. (7)")
+    parser.add_argument("--no-memory", action="store_true", help="keep the Bouc-Wen state, whatever plays would reach")
     parser.add_argument(
         "--held-out", metavar="PHASE", action="append", help=f"not fitted but judged (default: {', '.join(HELD_OUT)})"
     )
@@ -49,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
             experiment,
             orders=orders,
             hysteresis=PublishedBoucWen if args.published else BoucWen,
+            memory=not args.no_memory,
             held_out=HELD_OUT if args.held_out is None else tuple(args.held_out),
             progress=tell,
         )

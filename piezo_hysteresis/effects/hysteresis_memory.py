@@ -23,7 +23,8 @@ class HysteresisMemory(Effect):
     Parameters
     ----------
     c : sequence of float
-        Weights of the plays, from the narrowest to the widest, any number of at least 2 [1].
+        Weights of the plays, from the narrowest to the widest, any number of at least 2 [1]; none is negative, a
+        passive actuator returns no more work than it was given.
     reach : float
         Half width of the widest play [normalised, 1]; half the range of the drive uses them all.
 
@@ -39,7 +40,7 @@ class HysteresisMemory(Effect):
     signature = "errors in nested and decaying minor loops: return to the point where a loop was left"
     source = "Prandtl-Ishlinskii operator; Gu et al. 2016"
     parameters = (
-        Parameter("c", "c_j", "1", (0.0,) * 8, -10.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
+        Parameter("c", "c_j", "1", (0.0,) * 8, 0.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
         Parameter("reach", "r_max", "1", 0.5, 1e-3, 10.0, "half width of the widest play", "Gu 2016", fixed=True),
     )
 

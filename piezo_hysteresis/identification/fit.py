@@ -12,6 +12,7 @@ from ..errors import DivergenceError, IdentificationError, ParameterError
 from ..model import Model
 from ..record import Record
 from .normal_equations import Gram, Nuisance, grams, residuals
+from .step import bounded_step
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -167,9 +168,9 @@ def fit(
         slope = directions.T @ total[:-1, -1]
         diagonal = np.diag(hessian).copy()
         diagonal[diagonal <= 0] = 1.0
-        held = _held(theta, lower, upper, directions, slope)
+        low, high = _box(lower, theta, directions, -np.inf), _box(upper, theta, directions, np.inf)
         while True:
-            step = directions @ _solve(hessian, slope, damping * diagonal, held)
+            step = directions @ bounded_step(hessian + np.diag(damping * diagonal), slope, low, high)
             trial = _bounded(free, np.clip(theta + step, lower, upper))
             better, cost = _try(model, records, free, trial, nuisance, sizes)
             if better is not None and cost < total[-1, -1]:
@@ -202,25 +203,14 @@ def fit(
     )
 
 
-def _held(theta: Array, lower: Array, upper: Array, directions: Array, slope: Array) -> NDArray[np.bool_]:
-    """Directions of a single number that would leave its bound."""
-    held = np.zeros(directions.shape[1], dtype=bool)
+def _box(limits: Array, theta: Array, directions: Array, open_end: float) -> Array:
+    """How far every direction may go; without end where it moves several numbers."""
+    room = np.full(directions.shape[1], open_end)
     for j, column in enumerate(directions.T):
         (moved,) = np.nonzero(column)
         if moved.size == 1:
-            i = moved[0]
-            held[j] = (theta[i] <= lower[i] and slope[j] < 0) or (theta[i] >= upper[i] and slope[j] > 0)
-    return held
-
-
-def _solve(hessian: Array, slope: Array, damping: Array, held: NDArray[np.bool_]) -> Array:
-    step = np.zeros(slope.size)
-    free = ~held
-    # unit diagonal: columns differ by many orders of magnitude
-    matrix = hessian[np.ix_(free, free)] + np.diag(damping[free])
-    scale = 1.0 / np.sqrt(np.diag(matrix))
-    step[free] = scale * np.linalg.lstsq(matrix * np.outer(scale, scale), slope[free] * scale, rcond=1e-15)[0]
-    return step
+            room[j] = limits[moved[0]] - theta[moved[0]]
+    return room
 
 
 def _bounded(names: Sequence[str], theta: Array) -> Array:

@@ -23,7 +23,9 @@ from .fit import Fit, Progress
 from .hysteresis import fit_hysteresis
 from .identification import Identification, PhaseError
 from .joint import fit_dynamics, fit_lag
+from .leading_step import Blocks, steps_apart
 from .linear_start import hysteresis_signals
+from .memory import choose_memory
 from .normal_equations import Nuisance, residuals
 from .roles import HELD_OUT, Roles, roles_of
 from .three_steps import ThreeSteps, three_steps
@@ -42,6 +44,7 @@ def identify(
     gain: float = 1.0,
     orders: tuple[int, int] | None = (8, 8),
     hysteresis: type[Effect] = BoucWen,
+    memory: bool = False,
     held_out: Collection[str] = HELD_OUT,
     progress: Progress | None = None,
 ) -> Identification:
@@ -61,6 +64,8 @@ def identify(
         na and nb of the ARX; None chooses the lowest order that is as good as any.
     hysteresis : type of Effect
         `BoucWen`, or `PublishedBoucWen` for data that Eq. (7) made.
+    memory : bool
+        Take plays instead of the Bouc-Wen state where they predict better what was left out.
     held_out : collection of str
         Names of phases that are not fitted but judge the result.
     progress : callable, optional
@@ -104,6 +109,7 @@ def identify(
     dynamics: Dynamics | None = None
     table: tuple[OrderError, ...] = ()
     comparisons: tuple[Comparison, ...] = ()
+    blocks: Blocks = (records, floors, roles.fitted)
     if roles.broadband:
         tell("step 2: dynamics", 0.2)
         signals = hysteresis_signals(start, records, roles.broadband)
@@ -134,14 +140,23 @@ def identify(
         notices.append(
             Notice("lag_only", "no broadband record: the dynamics are reported as a lag, dead time and at most a pole")
         )
-        joint = fit_lag(start, records, floors, roles.fitted)
+        blocks = steps_apart(records, floors, roles.fitted)
+        joint = fit_lag(start, *blocks)
+    if memory:
+        tell("memory", 0.9)
+        joint, told = choose_memory(joint, *blocks, roles.loops if roles.broadband else blocks[2])
+        notices += told
     tell("free run", 0.95)
     phases = _free_run(joint.model, experiment, roles, reach)
-    zero = float(np.mean([n[0] for n in joint.nuisances]))
+    zero = float(np.mean([e.mean() for e in residuals(joint.model, records)]))
     joint = replace(joint, model=joint.model.with_effect(Offset(y0=zero)))
     if not joint.converged:
         notices.append(Notice("not_converged", f"the joint fit stopped after {joint.iterations} linearisations"))
-    notices += [Notice("at_bound", f"{name} stopped at a bound of its table") for name in joint.at_bounds]
+    notices += [
+        Notice("at_bound", f"{name} stopped at a bound of its table")
+        for name in joint.at_bounds
+        if joint.model.row(name).off != joint.values[name]  # a play without weight is none
+    ]
     if not any(not p.is_fitted for p in phases):
         notices.append(Notice("nothing_held_out", "all records were fitted: the errors are not those of a prediction"))
     found = Identification(joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices))

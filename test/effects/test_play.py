@@ -40,7 +40,7 @@ def test_backlash_is_blind_below_its_half_width() -> None:
 @settings(max_examples=40, deadline=None)
 @given(levels)
 def test_memory_is_the_weighted_sum_of_plays(x: list[float]) -> None:
-    effect = HysteresisMemory(c=[0.3, -0.1, 0.2], reach=0.4)
+    effect = HysteresisMemory(c=[0.3, 0.1, 0.2], reach=0.4)
     drive = np.array(x)
     parts = [c * run(Backlash(b=r), drive) for c, r in zip(effect.array("c"), effect.radii, strict=True)]
     np.testing.assert_allclose(run(effect, drive), sum(parts), atol=1e-15)

@@ -1,0 +1,43 @@
+"""`bounded_step`: the minimum of a small quadratic inside a box, for the steps of a fit."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+Array = NDArray[np.float64]
+
+SMALLEST = 1e-14
+"""Relative eigenvalue below which a direction is left where it is, once a bound is met."""
+
+
+def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Array:
+    """Minimise ½ xᵀHx − sᵀx for lower ≤ x ≤ upper.
+
+    Parameters
+    ----------
+    hessian : (q, q) ndarray
+        H, positive definite.
+    slope : (q,) ndarray
+        s.
+    lower, upper : (q,) ndarray
+        Bounds, lower < upper; infinite where there is none.
+
+    Returns
+    -------
+    (q,) ndarray
+        x; exact also where many bounds are met, as for weights that may not be negative.
+    """
+    # unit diagonal: columns differ by many orders of magnitude
+    scale = 1.0 / np.sqrt(np.diag(hessian))
+    matrix = hessian * np.outer(scale, scale)
+    free = scale * np.linalg.lstsq(matrix, slope * scale, rcond=1e-15)[0]
+    if np.all((free >= lower) & (free <= upper)):
+        return np.asarray(free)
+    values, vectors = np.linalg.eigh(matrix)
+    known = values > SMALLEST * values[-1]
+    root, vectors = np.sqrt(values[known]), vectors[:, known]
+    box = (lower / scale, upper / scale)
+    found = lsq_linear(root[:, None] * vectors.T, (vectors.T @ (slope * scale)) / root, box, method="bvls")
+    return np.asarray(scale * found.x)
