@@ -54,7 +54,7 @@ class Case:
     plant: str = "independent"
     layout: Layout = field(default_factory=Layout)
     without: tuple[str, ...] = ()
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     @property
     def label(self) -> str:

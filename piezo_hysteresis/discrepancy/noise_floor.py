@@ -50,22 +50,39 @@ def white_noise(record: Record) -> float:
 def period_scatter(record: Record) -> float | None:
     """RMS of what does not repeat from one drive period to the next [m]; None for fewer than three periods.
 
-    The first period settles and is left out; mains hum, which is an effect and no floor, is taken out.
+    The first period settles and is left out; mains hum, which is an effect and no floor, is taken out, and so is what
+    stands out of its band of the spectrum: a resonance still ringing, a drift.
     """
     period = drive_period(record.voltage)
     if period is None or record.size < 3 * period:
         return None
     y = record.displacement[period:]
     steps = y[period:] - y[:-period]
-    # a period that is no whole number of samples leaves a little of the drive
+    # a period that is no whole number of samples leaves a little of the drive; the other axis need not repeat
     rest = record.voltage[2 * period :] - record.voltage[period:-period]
+    other = record.other_displacement
+    seen = [] if other is None else [other[2 * period :] - other[period:-period]]
     t = record.sample_period * np.arange(steps.size)
     lines = [f for base in MAINS for f in (base, 2 * base, 3 * base) if f * record.sample_period < 0.45]
-    basis = np.array(
-        [np.ones(t.size), rest, np.gradient(rest), *(w(2 * np.pi * f * t) for f in lines for w in (np.cos, np.sin))]
-    )
+    hum = [wave(2 * np.pi * f * t) for f in lines for wave in (np.cos, np.sin)]
+    basis = np.array([np.ones(t.size), rest, np.gradient(rest), *seen, *hum])
     steps = steps - np.linalg.lstsq(basis.T, steps, rcond=1e-6)[0] @ basis
-    return float(np.sqrt(np.mean(steps**2) / 2.0))
+    window = hann(steps.size)
+    frequency, density = periodogram(steps, window=window, detrend=False)
+    # the difference of two periods is a comb: white noise has this mean spectrum, twice its variance in all
+    alike = window[period:] @ window[:-period] / (window @ window) if steps.size > period else 0.0
+    comb = 1.0 - alike * np.cos(2.0 * np.pi * frequency * period)
+    noise = np.where(comb > 0.2, density / np.maximum(comb, 0.2), np.nan)
+    return float(np.sqrt(_broad(noise) / steps.size / 2.0))
+
+
+def _broad(density: Array) -> float:
+    """Sum of a spectrum by the medians of its octaves, without dc: peaks of few bins do not count."""
+    edges = [1]
+    while edges[-1] < density.size:
+        edges.append(min(max(2 * edges[-1], edges[-1] + 8), density.size))
+    bands = [density[a:b] for a, b in zip(edges, edges[1:], strict=False)]
+    return float(sum(b.size * np.nanmedian(b) for b in bands if np.isfinite(b).any()) / np.log(2.0))
 
 
 def quantum(record: Record) -> float:

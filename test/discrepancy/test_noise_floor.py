@@ -53,6 +53,16 @@ def test_mains_hum_is_an_effect_and_no_floor(mains):
     assert period_scatter(record) == pytest.approx(SIGMA, rel=0.05)
 
 
+def test_a_resonance_that_still_rings_is_no_noise():
+    record = sine(100.0, 2e-5, 0.4, added=lambda t: 300 * SIGMA * np.exp(-10 * t) * np.cos(2 * np.pi * 730 * t))
+    assert period_scatter(record) == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_a_drift_is_no_noise():
+    record = sine(100.0, 2e-5, 0.4, added=lambda t: 500 * SIGMA * (1 - np.exp(-t)))
+    assert period_scatter(record) == pytest.approx(SIGMA, rel=0.05)
+
+
 def test_a_drive_without_period_has_none():
     assert drive_period(RANDOM.normal(size=5000)) is None
     assert drive_period(np.full(500, 2.0)) is None

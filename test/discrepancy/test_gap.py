@@ -1,0 +1,58 @@
+"""The gap: closed forms, on the records asked for and no others."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.discrepancy.gap import measure_gap
+from piezo_hysteresis.effects import Arx, BoucWen, Offset
+from piezo_hysteresis.identification.normal_equations import Nuisance
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Record
+
+MODEL = Model((BoucWen(), Arx(b=[0.25]), Offset()), sample_period=1e-3, displacement_scale=2e-5)
+ERRORS = (1e-8, 3e-8, 5e-8)
+STROKE = 1e-5
+PLAIN = (Nuisance(), Nuisance())
+
+
+@pytest.fixture(scope="module")
+def records():
+    """What MODEL would have answered, off by a known square wave."""
+    found = []
+    for size in ERRORS:
+        u = 5 - 5 * np.cos(2 * np.pi * 1e-3 * np.arange(2000))
+        wave = size * np.where(np.arange(2000) % 2, 1.0, -1.0)
+        bare = Record(u, np.zeros(2000), 1e-3, phase="sine_1hz")
+        found.append(Record(u, MODEL.simulate(bare)[0] + wave, 1e-3, phase="sine_1hz"))
+    return found
+
+
+def measure(records, models, chosen, nuisances=PLAIN):
+    return measure_gap(models, records, chosen, [2e-8] * 3, STROKE, nuisances, True)
+
+
+def test_is_rms_over_range_with_records_alike(records):
+    gap = measure(records, (MODEL, MODEL), (0, 2))
+    assert [p.after for p in gap.per_phase] == pytest.approx([0.1, 0.5])
+    assert gap.after == pytest.approx(np.sqrt((0.1**2 + 0.5**2) / 2))
+    assert gap.before == gap.after
+    assert gap.floor == pytest.approx(0.2)
+    assert gap.interval_95[0] <= gap.after <= gap.interval_95[1]
+
+
+def test_before_and_after_are_of_the_two_models(records):
+    shifted = MODEL.with_effect(Offset(y0=2e-8))
+    gap = measure(records, (shifted, MODEL), (0,))
+    assert gap.before == pytest.approx(np.sqrt(0.1**2 + 0.2**2))
+    assert gap.after == pytest.approx(0.1)
+
+
+def test_what_is_free_per_record_is_no_gap(records):
+    shifted = MODEL.with_effect(Offset(y0=2e-8))
+    gap = measure(records, (shifted, MODEL), (0,), (Nuisance(offset=True), Nuisance()))
+    assert gap.before == pytest.approx(gap.after)
+
+
+def test_one_record_still_has_an_interval(records):
+    gap = measure(records, (MODEL, MODEL), (1,))
+    assert np.isfinite(gap.interval_95).all()

@@ -1,0 +1,121 @@
+"""Naming on stages whose physics is other code than the catalogue: named, nothing missing, unknown."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from benchmarks.naming_cases import UNKNOWN, Case
+from benchmarks.naming_experiments import Layout
+from piezo_hysteresis.discrepancy import Verdict, diagnose
+from piezo_hysteresis.effects import BY_NAME
+from piezo_hysteresis.errors import IdentificationError
+from piezo_hysteresis.record import Experiment, Notice, Record
+
+BRIEF = Layout(hold=3.0)
+
+
+@cache
+def answered(case):
+    return diagnose(case.experiment(), effects=case.library)
+
+
+def hidden(*names, group="effects", **options):
+    return Case(group, names, 1, 5e-4, layout=BRIEF, **options)
+
+
+@pytest.mark.parametrize("plant", ["independent", "packaged"])
+def test_nothing_is_missing_where_nothing_is_hidden(plant):
+    found = answered(replace(hidden(plant=plant), group="effect_free"))
+    assert found.verdict is Verdict.NOTHING_MISSING
+    assert found.names == () and found.effects() == []
+    assert found.gap.after <= 1.2 * found.gap.floor
+
+
+@pytest.mark.parametrize("name", ["creep", "thermal_drift", "mains_hum"])
+def test_a_hidden_effect_is_named_and_its_gap_closes_on_unseen_records(name):
+    found = answered(hidden(name))
+    assert found.names == (name,)
+    assert found.gap.unseen
+    assert found.gap.before > 1.5 * found.gap.floor
+    assert found.gap.after <= 1.3 * found.gap.floor
+
+
+def test_what_is_in_no_catalogue_is_unknown():
+    found = answered(hidden(group="uncatalogued", extra={"unknown": UNKNOWN["line"], "unknown_name": ("line",)}))
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.effects() == []
+    assert "does not explain" in found.reason
+
+
+def test_without_the_true_family_nothing_else_takes_the_blame():
+    library = ("thermal_drift", "gain_drift", "extra_delay", "axis_coupling")
+    found = diagnose(hidden("creep").experiment(), effects=[BY_NAME[n] for n in library])
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.names == ()
+
+
+def test_the_answer_has_its_stable_form():
+    answer = json.loads(json.dumps(answered(hidden("creep")).answer("better.yaml"), allow_nan=False))
+    assert answer["schema"] == 1
+    assert answer["verdict"] == "named"
+    (effect,) = answer["effects"]
+    assert effect["name"] == "creep" and effect["family"] == "creep"
+    assert isinstance(effect["member_certain"], bool)
+    assert 0.6 <= effect["explained_fraction"] <= 1.0
+    assert effect["held_out_gain"] > 0.15
+    assert isinstance(effect["confusable_with"], list)
+    for row in effect["parameters"].values():
+        low, high = row["interval_95"]
+        assert low <= row["value"] <= high
+        assert isinstance(row["unit"], str)
+    axes = {
+        "phase",
+        "frequency",
+        "amplitude",
+        "direction",
+        "turning_point_distance",
+        "time_since_level_change",
+        "absolute_time",
+    }
+    assert {place["axis"] for place in answer["where"]} == axes
+    assert all(0.0 <= place["share"] <= 1.0 and isinstance(place["detail"], str) for place in answer["where"])
+    gap = answer["gap_percent_of_range"]
+    assert gap["before"] > gap["after"] > 0 and gap["floor"] > 0
+    assert all(set(phase) == {"before", "after", "floor"} for phase in gap["per_phase"].values())
+    assert all(set(row) == {"name", "reason"} for row in answer["rejected"])
+    assert len(answer["rejected"]) > 5
+    following = answer["next_experiment"]
+    assert following is None or (isinstance(following["phase"], str) and len(following["separates"]) == 2)
+    assert answer["data_quality"] == []
+    assert answer["model"] == "better.yaml"
+
+
+def triangle(records):
+    t = 1e-3 * np.arange(2000)
+    u = 4 * np.abs((t % 1) * 2 - 1)
+    return tuple(Record(u, 1e-6 * u, 1e-3, phase="triangle") for _ in range(records))
+
+
+def test_one_phase_is_no_ground_for_a_verdict():
+    found = diagnose(Experiment(triangle(1)))
+    assert found.verdict is Verdict.UNKNOWN
+    assert "record more phases" in found.reason
+    answer = found.answer()
+    assert answer["effects"] == [] and answer["verdict"] == "unknown"
+
+
+def test_severe_damage_forbids_a_verdict():
+    notice = Notice("clipped", "displacement is clipped in 30 % of the samples", "triangle", severe=True)
+    found = diagnose(Experiment(triangle(6), notices=(notice,)))
+    assert found.verdict is Verdict.UNKNOWN
+    assert notice.message in found.reason
+    assert found.answer()["data_quality"][0]["severe"] is True
+
+
+def test_a_stage_that_was_not_driven_is_refused():
+    still = Record(np.full(100, 3.0), np.arange(100.0), 1e-3, phase="rest")
+    with pytest.raises(IdentificationError, match="does not move"):
+        diagnose(Experiment((still,) * 5))

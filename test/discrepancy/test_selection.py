@@ -1,0 +1,29 @@
+"""Rules of the selection: what share of a gap is explained, and when the search stops."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from piezo_hysteresis.discrepancy.held_out import Score
+from piezo_hysteresis.discrepancy.selection import ADEQUATE, Selection, explained, select
+
+
+@given(null=st.floats(0.1, 1.5), gap=st.floats(1.0, 1e4), share=st.floats(0.0, 1.0))
+def test_explained_is_the_share_of_the_rms_error_that_went_away(null, gap, share):
+    # the error beyond noise falls to (1 − share) of what it was: its power to (1 − share)²
+    after = null + gap * (1 - share) ** 2
+    assert explained(null + gap, after, null) == pytest.approx(share, abs=1e-6)
+
+
+def test_explained_stays_between_nothing_and_all():
+    assert explained(10.0, 20.0, 1.0) == 0.0
+    assert explained(10.0, 0.5, 1.0) == 1.0
+    assert explained(0.9, 0.9, 1.0) == 1.0
+
+
+def test_nothing_is_tried_on_a_model_that_is_adequate():
+    score = Score(np.sqrt(np.full(5, ADEQUATE)), np.empty(0))
+    found = select(None, None, score, 1.0)
+    assert isinstance(found, Selection)
+    assert found.steps == found.accepted == ()
