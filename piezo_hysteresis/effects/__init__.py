@@ -16,6 +16,7 @@ from .backlash import Backlash
 from .bouc_wen import BoucWen
 from .creep import Creep
 from .creep_exponential import CreepExponential
+from .creep_fractional import CreepFractional
 from .effect import Effect, Place, Setting, Term
 from .even_input_polynomial import EvenInputPolynomial
 from .extra_delay import ExtraDelay
@@ -49,6 +50,7 @@ CHAIN: tuple[type[Effect], ...] = (
     EvenInputPolynomial,
     Creep,
     CreepExponential,
+    CreepFractional,
     ExtraDelay,
     Arx,
     Softening,
@@ -87,6 +89,7 @@ __all__ = [
     "BoucWen",
     "Creep",
     "CreepExponential",
+    "CreepFractional",
     "Effect",
     "EvenInputPolynomial",
     "ExtraDelay",

@@ -1,4 +1,4 @@
-"""Logarithmic creep of the piezo ceramic, and its fractional generalisation."""
+"""Logarithmic creep of the piezo ceramic."""
 
 from __future__ import annotations
 
@@ -27,8 +27,6 @@ class Creep(Effect):
     ----------
     gamma : float
         Creep per decade of time, relative to the response 0.1 s after a step [1/decade].
-    exponent : float
-        λ of the fractional law, weights ∝ (τ/0.1 s)^λ; 0 is the logarithmic law.
     tau_min, tau_max : float
         Range of the relaxation times [s]: from the fastest sample period to 10 times the longest record.
 
@@ -50,27 +48,13 @@ class Creep(Effect):
     name = "creep"
     family = "creep"
     place = Place.MATERIAL
-    equation = (
-        "y = w + γ Σ_j g_j (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w,  g_j = ½ (τ_j/0.1)^λ;  "
-        "after a step: 1 + γ log10(t/0.1 s)"
-    )
+    equation = "y = w + γ Σ_j ½ (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w;  after a step: 1 + γ log10(t/0.1 s)"
     signature = (
         "grows with log t after each change of level; on sines a gain falling linearly in log f at constant phase"
     )
     source = "Croft, Shed, Devasia 2001; relaxation bank of the logarithmic law"
     parameters = (
         Parameter("gamma", "γ", "1/decade", 0.0, -0.2, 0.2, "creep per decade of time", "Croft 2001", 0.0, 0.01),
-        Parameter(
-            "exponent",
-            "λ",
-            "1",
-            0.0,
-            -0.5,
-            0.5,
-            "exponent of the fractional law; 0 is logarithmic",
-            "fractional creep",
-            scale=0.1,
-        ),
         Parameter(
             "tau_min",
             "τ_min",
@@ -114,12 +98,13 @@ class Creep(Effect):
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         tau = self.tau
-        ratio = tau / REFERENCE_TIME
-        weights = ratio ** self["exponent"] / PER_DECADE
-        weight_slopes = weights * np.log(ratio)
-        done = -np.expm1(-1.0 / ratio)
-        by_gamma = np.append(-weights @ done, weights)
-        by_exponent = self["gamma"] * np.append(-weight_slopes @ done, weight_slopes)
-        names = ("creep.gamma", "creep.exponent")
-        mix = self["gamma"] * by_gamma
-        return RelaxationBlock(names, tau, setting.sample_period, mix, np.vstack((by_gamma, by_exponent)))
+        weights = np.full(tau.size, 1.0 / PER_DECADE)
+        by_gamma = settled_mix(tau, weights)
+        return RelaxationBlock(
+            ("creep.gamma",), tau, setting.sample_period, self["gamma"] * by_gamma, by_gamma[None, :]
+        )
+
+
+def settled_mix(tau: Array, weights: Array) -> Array:
+    """Direct path and weights of relaxations whose sum is zero 0.1 s after a step, shape (1 + s,)."""
+    return np.append(weights @ np.expm1(-REFERENCE_TIME / tau), weights)

@@ -12,6 +12,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 FAMILIES = {
     "creep": "creep",
     "creep_exponential": "creep",
+    "creep_fractional": "creep",
     "thermal_drift": "drift",
     "thermal_expansion": "drift",
     "gain_drift": "drift",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from piezo_hysteresis.effects import Creep, CreepExponential, Effect, Setting
+from piezo_hysteresis.effects import Creep, CreepExponential, CreepFractional, Effect, Setting
 from piezo_hysteresis.errors import ParameterError
 
 
@@ -45,7 +45,7 @@ def test_on_sines_the_gain_falls_with_log_frequency_at_constant_phase() -> None:
 
 @pytest.mark.parametrize("exponent", [-0.3, 0.3])
 def test_the_fractional_law_is_a_power_of_time(exponent: float) -> None:
-    y = run(Creep(gamma=0.02, exponent=exponent, tau_min=1e-6, tau_max=1e7), np.ones(100001), 1e-3)
+    y = run(CreepFractional(gamma=0.02, exponent=exponent, tau_min=1e-6, tau_max=1e7), np.ones(100001), 1e-3)
     rises = [y[10 * k] - y[k] for k in (100, 1000, 10000)]
     np.testing.assert_allclose(np.log10(np.array(rises[1:]) / rises[:-1]), exponent, atol=0.01)
 
