@@ -73,9 +73,10 @@ def diagnose(
     records = experiment.records
     severe = [n for n in experiment.notices if n.severe]
     usable = [i for i, r in enumerate(records) if r.phase not in IDLE and not r.truncated]
-    moving = [i for i in usable if np.ptp(np.append(records[i].voltage, records[i].settled_voltage)) > 0.0]
+    moving = [i for i, r in enumerate(records) if np.ptp(np.append(r.voltage, r.settled_voltage)) > 0.0]
     if not moving:
         raise IdentificationError("diagnose: the drive does not move in any record; expected loops, steps or noise")
+    moving = [i for i in moving if i in usable]
     if severe or len(moving) < FEWEST:
         return _undecided(experiment, model, severe, len(moving))
 
@@ -226,11 +227,13 @@ def _verdict(selection: Selection, named: bool) -> tuple[Verdict, str]:
 
 
 def _next(selection: Selection, evidence: Evidence) -> NextExperiment | None:
-    """For the first named effect with a rival, or for a closest that does not suffice and the one behind it."""
-    for step in selection.steps:
-        if step.accepted and step.rivals and step.best.fit is not None and step.rivals[0].fit is not None:
-            pair = (step.best.effect.public_name(), step.rivals[0].effect.public_name())
-            return propose(step.best.fit.model, step.rivals[0].fit.model, pair, evidence)
+    """For the first accepted effect that has a rival."""
+    for step in selection.accepted:
+        mine = step.best
+        others = [r for r in step.rivals if r.effect.public_name() != mine.effect.public_name()]
+        if others and mine.fit is not None and others[0].fit is not None:
+            pair = (mine.effect.public_name(), others[0].effect.public_name())
+            return propose(mine.fit.model, others[0].fit.model, pair, evidence)
     return None
 
 

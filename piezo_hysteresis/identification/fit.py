@@ -75,7 +75,8 @@ class Fit:
     def correlation(self, first: str, second: str) -> float:
         """Correlation coefficient of two fitted numbers."""
         i, j = self.names.index(first), self.names.index(second)
-        return float(self.covariance[i, j] / np.sqrt(self.covariance[i, i] * self.covariance[j, j]))
+        scale = np.sqrt(self.covariance[i, i] * self.covariance[j, j])
+        return float(self.covariance[i, j] / scale) if scale > 0.0 else 0.0
 
 
 def gauge(model: Model, names: Sequence[str]) -> Array:
