@@ -15,6 +15,7 @@ from ..errors import IdentificationError, PiezoError
 
 COMMANDS = {
     "simulate": "play a protocol to a simulated stage and record it",
+    "emulate": "be a controller without hardware, behind a TCP port",
     "identify": "identify a model from an experiment",
     "validate": "judge a model in free run on an experiment",
     "diagnose": "say where a model is wrong and which effect is missing",

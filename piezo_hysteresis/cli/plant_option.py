@@ -1,0 +1,52 @@
+"""Which simulated stage: the options that ``piezo simulate`` and ``piezo emulate`` share."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ..errors import ParameterError, RecordingError
+from ..stage.hidden import hidden_effect
+from ..stage.plant import PlantParameters
+
+
+def add_plant_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--plant``, ``--seed``, ``--noise`` and ``--hidden``."""
+    parser.add_argument("--plant", metavar="FILE", help="YAML with parameters of the stage, part.quantity: value")
+    parser.add_argument("--seed", type=int, default=0, help="of noise and random drives (default: 0)")
+    parser.add_argument("--noise", metavar="SHARE", type=float, help="sensor noise, rms over full stroke, e.g. 0.0005")
+    parser.add_argument("--hidden", metavar="SEED", type=int, help="hide an effect drawn by this seed in the stage")
+
+
+def plant(args: argparse.Namespace) -> tuple[PlantParameters, dict[str, Any]]:
+    """The plant asked for, and what was hidden in it: ``name`` and ``changes``.
+
+    Raises
+    ------
+    ParameterError, RecordingError
+        On a file or an option that is not acceptable.
+    """
+    parameters = _read(args.plant)
+    if args.noise is not None:
+        parameters = parameters.with_values({"sensor.noise": args.noise})
+    if args.hidden is None:
+        return parameters, {"name": None, "changes": {}}
+    hidden = hidden_effect(args.hidden, parameters, highest_voltage=parameters.electronics.voltage_max)
+    return hidden.parameters, {"name": hidden.name, "changes": hidden.changes}
+
+
+def _read(path: str | None) -> PlantParameters:
+    if path is None:
+        return PlantParameters()
+    try:
+        mapping = yaml.safe_load(Path(path).expanduser().read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}, expected a YAML file") from None
+    except (yaml.YAMLError, UnicodeError) as error:
+        raise ParameterError(f"{path}: broken YAML ({' '.join(str(error).split())[:120]})") from None
+    if not isinstance(mapping, dict):
+        raise ParameterError(f"{path}: got a {type(mapping).__name__}, expected part.quantity: value")
+    return PlantParameters.from_mapping(mapping)

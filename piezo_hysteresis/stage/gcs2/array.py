@@ -1,0 +1,74 @@
+"""`GcsArray`: the table of numbers with a header that ``DRR?`` and ``GWD?`` answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..description import Samples
+from .connection import Gcs2Error
+
+_END = "END_HEADER"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GcsArray:
+    """A GCS array.
+
+    Parameters
+    ----------
+    header : dict
+        Keys of the lines ``# KEY = value`` in capitals, with their values as text.
+    values : (rows, columns) ndarray
+        The numbers, finite.
+    """
+
+    header: dict[str, str]
+    values: Samples
+
+    @classmethod
+    def parse(cls, lines: list[str], rows: int, columns: int) -> GcsArray:
+        """Read the lines of an answer.
+
+        Raises
+        ------
+        Gcs2Error
+            Without a header, with another number of rows or columns, or with a row that holds no finite numbers.
+        """
+        header, first = _header(lines)
+        if len(lines) - first != rows:
+            raise Gcs2Error(f"got {len(lines) - first} rows, expected {rows}")
+        code = header.get("SEPARATOR", "32")
+        separator = chr(int(code)) if code.isdecimal() and code not in ("9", "32") else None
+        values = np.empty((rows, columns))
+        for row, line in enumerate(lines[first:]):
+            cells = line.split(separator)
+            try:
+                values[row] = [float(cell) for cell in cells]
+                sound = len(cells) == columns and bool(np.isfinite(values[row]).all())
+            except ValueError:
+                sound = False
+            if not sound:
+                raise Gcs2Error(f"row {row + 1} of {rows} is '{line[:60]}', expected {columns} finite numbers")
+        return cls(header, values)
+
+    @property
+    def sample_time(self) -> float | None:
+        """Time between rows [s]; None where the header does not tell."""
+        try:
+            return float(self.header["SAMPLE_TIME"])
+        except (KeyError, ValueError):
+            return None
+
+
+def _header(lines: list[str]) -> tuple[dict[str, str], int]:
+    header: dict[str, str] = {}
+    for number, line in enumerate(lines, 1):
+        words = line.lstrip("# ").strip()
+        if words == _END:
+            return header, number
+        key, equals, value = words.partition("=")
+        if equals:
+            header[key.strip().upper()] = value.strip()
+    raise Gcs2Error(f"got '{' '.join(lines)[:60]}', expected a header that ends with '# {_END}'")

@@ -1,0 +1,118 @@
+"""`Connection`: lines to and from a GCS 2.0 controller over TCP, with time-outs and without busy waiting."""
+
+from __future__ import annotations
+
+import socket
+
+from ...errors import StageError
+
+_CODE_PAGE = "cp1252"
+_LONGEST_ANSWER = 1 << 26
+
+
+class Gcs2Error(StageError):
+    """The controller refused or answered nonsense, or the link failed: a fault of the device, not of its user."""
+
+
+class NoAnswerError(Gcs2Error):
+    """Not one byte came within the time-out."""
+
+
+class Connection:
+    """A TCP link that is opened when it is needed and closed as soon as it can be out of step.
+
+    After a time-out or half an answer nobody can tell what the next bytes belong to; the link is then closed, and the
+    next `send` opens a new one.
+
+    Parameters
+    ----------
+    host : str
+        Name or address of the controller.
+    port : int
+        TCP port; 50000 on PI controllers.
+    timeout : float
+        Longest silence while opening, sending or waiting for an answer [s].
+    """
+
+    def __init__(self, host: str, port: int, timeout: float) -> None:
+        self.host, self.port, self.timeout = host, port, timeout
+        self._socket: socket.socket | None = None
+
+    @property
+    def place(self) -> str:
+        """Host and port, as messages name them."""
+        return f"{self.host}:{self.port}"
+
+    @property
+    def is_open(self) -> bool:
+        """True while there is a link; one that broke unnoticed counts."""
+        return self._socket is not None
+
+    def send(self, text: str) -> None:
+        """Send bytes as they are; lines carry their own line feed.
+
+        Raises
+        ------
+        Gcs2Error
+            If there is no link and none can be made, or it is lost.
+        """
+        link = self._opened()
+        try:
+            link.sendall(text.encode(_CODE_PAGE))
+        except OSError as error:
+            raise self._lost(f"lost the link while sending ({error})") from None
+
+    def receive(self) -> list[str]:
+        """The next answer, line by line, without line feeds and the spaces before them.
+
+        Every line of an answer but the last ends with space and line feed, the last with a line feed alone.
+
+        Raises
+        ------
+        NoAnswerError
+            If nothing came within the time-out; the link stays open.
+        Gcs2Error
+            If the link is lost or half an answer came; the link is closed.
+        """
+        link = self._opened()
+        answer = bytearray()
+        while not answer.endswith(b"\n") or answer.endswith(b" \n"):
+            try:
+                part = link.recv(1 << 16)
+            except TimeoutError:
+                if not answer:
+                    raise NoAnswerError(f"{self.place}: no answer within {self.timeout:g} s") from None
+                raise self._lost(
+                    f"the answer stopped after {len(answer)} bytes for {self.timeout:g} s, expected its end"
+                ) from None
+            except OSError as error:
+                raise self._lost(f"lost the link while reading ({error})") from None
+            if not part:
+                raise self._lost(f"the link was closed from the other side after {len(answer)} bytes of an answer")
+            answer += part
+            if len(answer) > _LONGEST_ANSWER:
+                raise self._lost(f"got {len(answer)} bytes, expected the end of an answer")
+        lines = answer.decode(_CODE_PAGE, errors="replace").split("\n")[:-1]
+        return [line.rstrip() for line in lines]
+
+    def close(self) -> None:
+        """Close the link; harmless when repeated."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _opened(self) -> socket.socket:
+        if self._socket is None:
+            try:
+                link = socket.create_connection((self.host, self.port), self.timeout)
+            except OSError as error:
+                raise Gcs2Error(
+                    f"{self.place}: cannot connect ({error}), expected a controller; check address, cable, power"
+                ) from None
+            link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._socket = link
+        return self._socket
+
+    def _lost(self, words: str) -> Gcs2Error:
+        self.close()
+        return Gcs2Error(f"{self.place}: {words}")

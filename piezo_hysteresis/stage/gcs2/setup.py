@@ -1,0 +1,109 @@
+"""`Gcs2Setup`: how a stage is wired to a GCS 2.0 controller, and every fact that differs between controllers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ...errors import StageError
+
+
+@dataclass(frozen=True, slots=True)
+class Gcs2Setup:
+    """Wiring, scales and limits of one axis. Those marked [U] are not verified on a device: see docs/hardware.md.
+
+    Parameters
+    ----------
+    host, port
+        Where the controller listens.
+    axis : str
+        Axis identifier, as ``SAI?`` lists it.
+    channel : int
+        Output channel of the piezo, for ``VOL?``, ``VMI?``, ``VMA?`` and record option 7.
+    generator, wave_table : int
+        Wave generator of the axis and the wave table it plays.
+    voltage_table, displacement_table : int
+        Recorder tables that are used.
+    voltage_option, displacement_option : int
+        Record options of piezo voltage and actual position.
+    amplifier_gain : float
+        Piezo voltage over drive voltage [V/V]; 1 where the drive is the piezo voltage itself.
+    command_per_volt, command_at_zero : float
+        Open-loop command of ``SVA`` and of wave points: command = command_at_zero + command_per_volt × piezo voltage
+        [U]; it may be volts or µm.
+    position_unit : float
+        Length of one unit of ``POS?`` [m].
+    safe_voltage : float
+        Drive voltage of the stage at rest [V].
+    max_slew_rate : float
+        Steepest drive [V/s]; also the way to the safe voltage.
+    voltage_tolerance : float
+        Largest steady difference between piezo voltage asked for and measured [V].
+    settling_time : float
+        Time that amplifier and ``VOL?`` need to follow a step [s].
+    points_per_command : int
+        Wave points in one ``WAV`` line; the longest line a controller takes is not documented [U].
+    rows_per_answer : int
+        Recorded samples asked for at once.
+    read_back : bool
+        Read the wave table back and compare it before anything moves.
+    longest_wave : int
+        Points of the wave table; 0 to ask the controller with ``WMS?``, which not all of them know [U].
+    longest_multiple : int
+        Largest multiple of the servo time that can be a sample period [U].
+    servo_time_parameter, recorder_parameter : int
+        Numbers of the controller parameters servo time [s] and recorder points shared by all tables [U] beyond E-727.
+    timeout : float
+        Longest silence of the controller [s].
+
+    Raises
+    ------
+    StageError
+        On a value that cannot be.
+    """
+
+    host: str
+    port: int = 50000
+    axis: str = "1"
+    channel: int = 1
+    generator: int = 1
+    wave_table: int = 1
+    voltage_table: int = 1
+    displacement_table: int = 2
+    voltage_option: int = 7
+    displacement_option: int = 2
+    amplifier_gain: float = 1.0
+    command_per_volt: float = 1.0
+    command_at_zero: float = 0.0
+    position_unit: float = 1e-6
+    safe_voltage: float = 0.0
+    max_slew_rate: float = math.inf
+    voltage_tolerance: float = 1.0
+    settling_time: float = 0.01
+    points_per_command: int = 10
+    rows_per_answer: int = 4096
+    read_back: bool = True
+    longest_wave: int = 0
+    longest_multiple: int = 1000
+    servo_time_parameter: int = 0x0E000200
+    recorder_parameter: int = 0x16000200
+    timeout: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not self.host:
+            raise StageError("gcs2.host: got no host, expected name or address of the controller")
+        for name in (
+            "port", "channel", "generator", "wave_table", "voltage_table", "displacement_table", "points_per_command",
+            "rows_per_answer", "longest_multiple", "timeout", "voltage_tolerance", "position_unit", "max_slew_rate",
+        ):  # fmt: skip
+            if not getattr(self, name) > 0:
+                raise StageError(f"gcs2.{name}: got {getattr(self, name)!r}, expected more than 0")
+        for name in ("amplifier_gain", "command_per_volt"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) != 0):
+                raise StageError(f"gcs2.{name}: got {getattr(self, name)!r}, expected a number other than 0")
+        if self.voltage_table == self.displacement_table:
+            raise StageError(f"gcs2: got table {self.voltage_table} for voltage and displacement, expected two tables")
+
+    def command(self, drive: float) -> float:
+        """Open-loop command for a drive voltage [V]."""
+        return self.command_at_zero + self.command_per_volt * self.amplifier_gain * drive

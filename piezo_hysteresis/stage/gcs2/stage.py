@@ -1,0 +1,231 @@
+"""`Gcs2Stage`: an axis of a PI GCS 2.0 controller in open loop, as a stage with on-board memory."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import cast
+
+import numpy as np
+
+from ...errors import StageError
+from ..stage import Acquired, Description, Samples
+from .agreement import check_agreement
+from .axis import Axis
+from .connection import Gcs2Error
+from .setup import Gcs2Setup
+
+_POLL = 5e-3
+_RAMP_STEP = 0.01
+
+
+class Gcs2Stage:
+    """One axis, driven by voltage from the wave table and recorded by the data recorder at the servo rate.
+
+    Opening asks for identity, servo time and limits and moves nothing. Before every open-loop move the servo is
+    switched off, and that is verified. When the device fails in between, the stage goes to its safe voltage over a new
+    link if it has to; the error says whether that was reached.
+
+    Parameters
+    ----------
+    setup : Gcs2Setup
+
+    Raises
+    ------
+    StageError
+        If the controller cannot be reached or is not what the setup says.
+    """
+
+    def __init__(self, setup: Gcs2Setup) -> None:
+        self._setup, self._axis = setup, Axis(setup)
+        self._closed, self._armed, self._playing, self._played = False, False, False, False
+        self._due = 0.0
+        self._waveform: Samples | None = None
+        self._acquired: Acquired | None = None
+        try:
+            self._description = self._axis.identify()
+            self._voltage = self._axis.voltage()
+        except StageError:
+            self._axis.client.connection.close()
+            raise
+        self._sample_period = self._axis.servo_time
+
+    @property
+    def description(self) -> Description:
+        """Identity and limits as the controller told them."""
+        return self._description
+
+    @property
+    def sample_period(self) -> float:
+        """Sample period in force [s], a multiple of the servo time."""
+        return self._sample_period
+
+    @property
+    def voltage(self) -> float:
+        """Drive voltage in force [V]: measured on opening, after that the one commanded."""
+        return self._voltage
+
+    def configure(self, sample_period: float) -> None:
+        """Sample every so many seconds [s]; a waveform in memory is forgotten."""
+        self._require_ready()
+        period = self._description.check_sample_period(sample_period)
+        self._sample_period = round(period / self._axis.servo_time) * self._axis.servo_time
+        self._waveform = None
+        self._forget()
+
+    def set_voltage(self, voltage: float) -> None:
+        """Apply one voltage [V], hold it, and see it measured."""
+        self._require_ready()
+        drive = self._check(np.array([voltage]))
+        with self._guarded():
+            self._axis.open_loop()
+            self._move(float(drive[0]))
+
+    def read_displacement(self) -> float:
+        """One reading of the sensor [m]."""
+        self._require_ready()
+        with self._guarded():
+            return self._axis.displacement()
+
+    def upload(self, voltage: Samples) -> None:
+        """Store a waveform [V] in the wave table."""
+        self._require_ready()
+        waveform = self._check(voltage).copy()
+        self._waveform = None
+        self._forget()
+        with self._guarded():
+            self._axis.load(waveform)
+        self._waveform = waveform
+
+    def arm(self) -> None:
+        """Set generator and recorder; the servo is off afterwards."""
+        self._require_ready()
+        if self._waveform is None:
+            raise StageError(f"{self._description.name}: holds no waveform, expected upload() first")
+        self._check(self._waveform)
+        with self._guarded():
+            self._axis.open_loop()
+            self._axis.arm(round(self._sample_period / self._axis.servo_time))
+        self._forget()
+        self._armed = True
+
+    def start(self) -> None:
+        """Play and record the waveform."""
+        self._require_ready()
+        if not self._armed or self._waveform is None:
+            raise StageError(f"{self._description.name}: started without being armed, expected arm() first")
+        self._armed = False
+        with self._guarded():
+            self._axis.require_servo_off("before the start")
+            self._axis.start()
+        self._playing = True
+        self._due = time.monotonic() + self._waveform.size * self._sample_period
+        self._voltage = float(self._waveform[-1])
+
+    def wait(self, timeout: float) -> None:
+        """Return when the waveform has been played; StageError after `timeout` [s]."""
+        self._require_open()
+        if not self._playing:
+            if not self._played:
+                raise StageError(f"{self._description.name}: nothing to wait for, expected start() first")
+            return
+        end = time.monotonic() + max(timeout, 0.0)
+        time.sleep(max(min(self._due, end) - time.monotonic(), 0.0))
+        with self._guarded():
+            while self._axis.is_playing():
+                left = end - time.monotonic()
+                if left <= 0:
+                    break
+                time.sleep(min(left, _POLL))
+            else:
+                self._playing, self._played = False, True
+                return
+        raise StageError(f"{self._description.name}: still playing after {timeout:g} s; wait again")
+
+    def read(self) -> Acquired:
+        """The record of the waveform that was played."""
+        self._require_ready()
+        if not self._played:
+            raise StageError(f"{self._description.name}: nothing recorded, expected upload, arm, start, wait first")
+        if self._acquired is None:
+            with self._guarded():
+                self._acquired = self._record()
+        return self._acquired
+
+    def safe(self) -> None:
+        """Stop what plays and go to the safe voltage, over a new link where the old one is lost."""
+        if self._closed:
+            return
+        self._forget()
+        try:
+            self._retreat()
+        except Gcs2Error as error:
+            raise StageError(f"{error}; {self._unknown()}") from None
+
+    def close(self) -> None:
+        """Make safe and close the link; every later call but `close` and `safe` raises StageError."""
+        try:
+            self.safe()
+        finally:
+            self._closed = True
+            self._axis.client.connection.close()
+
+    def _forget(self) -> None:
+        self._armed, self._playing, self._played, self._acquired = False, False, False, None
+
+    def _record(self) -> Acquired:
+        waveform = cast(Samples, self._waveform)
+        voltage, displacement = self._axis.record(waveform.size, self._sample_period)
+        self._axis.require_servo_off("after the run")
+        tolerance = self._setup.voltage_tolerance / abs(self._setup.amplifier_gain)
+        settling = int(np.ceil(self._setup.settling_time / self._sample_period))
+        check_agreement(waveform, voltage, displacement, tolerance, settling)
+        self._axis.require_voltage(self._voltage)
+        return Acquired(voltage, displacement)
+
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Go to the safe voltage when the device fails, and say in the error whether it was reached."""
+        try:
+            yield
+        except Gcs2Error as error:
+            self._forget()
+            try:
+                self._retreat()
+                end = f"the stage was brought to its safe voltage, {self._voltage:g} V"
+            except Gcs2Error:
+                end = self._unknown()
+            raise StageError(f"{error}; {end}") from None
+
+    def _retreat(self) -> None:
+        self._axis.stop()
+        self._axis.open_loop()
+        self._voltage = self._axis.voltage()
+        goal, slew = self._description.safe_voltage, self._description.max_slew_rate
+        step = slew * _RAMP_STEP
+        while abs(goal - self._voltage) > step:
+            self._move(self._voltage + float(np.copysign(step, goal - self._voltage)))
+            time.sleep(_RAMP_STEP)
+        self._move(goal)
+
+    def _move(self, drive: float) -> None:
+        self._axis.set_voltage(drive)
+        self._voltage = drive
+
+    def _unknown(self) -> str:
+        return (
+            f"the voltage of the stage is unknown, last commanded {self._voltage:g} V; switch the amplifier off by hand"
+        )
+
+    def _check(self, voltage: Samples) -> Samples:
+        return self._description.check_voltage(voltage, self._voltage, self._sample_period)
+
+    def _require_ready(self) -> None:
+        self._require_open()
+        if self._playing:
+            raise StageError(f"{self._description.name}: is still playing, expected wait() first")
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise StageError(f"{self._description.name}: is closed, expected an open stage; make a new one")

@@ -1,0 +1,105 @@
+"""Whatever fails: one clear error, the safe voltage where the link allows, and what is not known is said."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.gcs2.emulator.faults import LASTING, ONCE, Fault
+from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
+
+WAVE = 4.0 - 4.0 * np.cos(2 * np.pi * np.arange(1200) / 600)
+WAY = "SVO:1 SVO?:1 SVA:1 VOL?:2 WCL:1 WAV:3 WAV?:1 GWD?:2 WSL:1 WTR:1 RTR:1 DRC:2 WGO:1 #9:1 DRL?:1 DRR?:2 POS?:1"
+"""Every kind of step between the first set-point and the last sample."""
+
+
+def work(stage, play):
+    stage.set_voltage(1.0)
+    record = play(stage, 1.0 + WAVE)
+    stage.read_displacement()
+    return record
+
+
+@pytest.mark.parametrize("step", WAY.split())
+def test_a_link_lost_at_any_step_ends_at_the_safe_voltage(bench, play, step):
+    b = bench(f"link_lost@{step}", rows_per_answer=500)
+    with pytest.raises(StageError, match=r"link.*brought to its safe voltage, 0 V"):
+        work(b.stage, play)
+    assert b.voltage == 0.0
+    work(b.stage, play)  # over the new link
+
+
+@pytest.mark.parametrize("step", ["VOL?:2", "WAV?:1", "DRR?:2"])
+def test_a_link_that_does_not_come_back_leaves_the_voltage_unknown_and_says_so(bench, play, step):
+    b = bench(f"gone@{step}", rows_per_answer=500)
+    with pytest.raises(StageError, match=r"voltage of the stage is unknown.*switch the amplifier off"):
+        work(b.stage, play)
+    with pytest.raises(StageError, match="cannot connect"):
+        b.stage.close()
+    b.stage.close()
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ("partial_answer", r"the answer stopped after \d+ bytes"),
+        ("partial_answer@ERR?:30", "no answer within 1 s|stopped after"),
+        ("slow@POS?=5", r"no answer within 1 s to 'POS\? 1'"),
+        ("slow@WGO=5", "no answer within 1 s to ERR"),
+        ("error@WAV:3=3", r"refused 'WAV 1 & PNT 201 .*error 3 \(the command is too long; lower points_per_command"),
+        ("error@DRR?=77", "no answer.*it holds error 77"),
+        ("error@SVA=555", "error 555"),
+        ("garbled", r"row \d+ of \d+ is '.*nan.*', expected 2 finite numbers"),
+        ("garbled@VOL?:2", "expected a number"),
+        ("garbled@ERR?:16", "expected an error number"),
+        ("short_record", "table 1 holds 960 samples, expected 1200"),
+        ("wrong_servo_time", "recorded every 0.0001 s, expected 5e-05 s; check the servo time"),
+        ("saturated", r"measured a drive of 5\S* V at sample \d+, expected 9 V .*saturated"),
+        ("stale@WGO", "displacement stayed at exactly"),
+        ("duplicated", "the same 500 recorded samples twice"),
+        ("swapped", "channels exchanged"),
+        ("servo_on", "servo of axis 1 is on after it was switched off"),
+        ("servo_on@WGO", "servo of axis 1 is on after the run"),
+    ],
+)
+def test_every_failure_is_told_clearly_and_ends_safe(bench, play, fault, message):
+    b = bench(fault, rows_per_answer=500, timeout=1.0 if "answer" in message else 5.0)
+    with pytest.raises(StageError, match=message) as told:
+        work(b.stage, play)
+    assert "\n" not in str(told.value)
+    if fault.startswith("servo_on"):
+        assert "voltage of the stage is unknown" in str(told.value), (
+            "an open-loop move is refused while the servo is on"
+        )
+    else:
+        assert "brought to its safe voltage, 0 V" in str(told.value)
+        assert b.voltage == 0.0
+
+
+def test_channels_apart_by_one_sample_cannot_be_seen_and_are_a_delay(bench, play, ideal):
+    straight, late = (play(bench(*faults, plant=ideal()).stage, WAVE) for faults in ((), ("skewed",)))
+    np.testing.assert_array_equal(late.displacement[1:], straight.displacement[:-1])
+    np.testing.assert_array_equal(late.voltage, straight.voltage)
+
+
+def test_a_waveform_that_was_not_stored_as_sent_is_not_played(bench, play):
+    b = bench("garbled@GWD?")
+    with pytest.raises(StageError, match=r"GWD\?"):
+        play(b.stage, WAVE)
+    assert not any(line.startswith("WGO 1 1") for line in b.controller.heard)
+
+
+def test_nobody_there(bench):
+    b = bench(opened=False)
+    setup = b.setup()
+    b.server.close()
+    with pytest.raises(StageError, match=r"cannot connect.*check address, cable, power"):
+        Gcs2Stage(setup)
+
+
+def test_every_fault_can_be_named_and_nothing_else():
+    for kind in (*ONCE, *LASTING):
+        assert Fault.parse(kind).kind == kind
+    assert Fault.parse("error@sva:3=79") == Fault("error", "SVA", 3, 79.0)
+    for wrong in ("earthquake", "slow@POS?:x", "slow=fast"):
+        with pytest.raises(StageError, match="expected"):
+            Fault.parse(wrong)

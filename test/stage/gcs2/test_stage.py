@@ -1,0 +1,197 @@
+"""The GCS 2.0 back end keeps the promises of the stage protocol over a real socket."""
+
+import math
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.gcs2.setup import Gcs2Setup
+from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
+from piezo_hysteresis.stage.simulated import SimulatedStage
+from piezo_hysteresis.stage.stage import MemoryStage, Stage
+
+SERVO_TIME = 50e-6
+WAVE = 3.0 - 3.0 * np.cos(2 * np.pi * np.arange(1200) / 400)
+
+
+def test_it_is_a_memory_stage_described_by_the_device(bench):
+    stage = bench().stage
+    promised = {name for part in (Stage, MemoryStage) for name in vars(part) if not name.startswith("_")}
+    assert promised <= set(dir(stage))
+    described = stage.description
+    assert not described.streaming
+    assert described.measured_voltage
+    assert (described.voltage_min, described.voltage_max) == (0.0, 10.0)
+    assert described.sample_period_min == described.sample_period_step == stage.sample_period == SERVO_TIME
+    assert described.longest_block == 262144 // 8
+    assert "E-727.EMULATED" in described.name and "axis 1" in described.name
+
+
+def test_opening_moves_nothing(bench):
+    b = bench(opened=False)
+    observer = b.observer()
+    observer.command("SVA 1 60")
+    b.controller.heard.clear()
+    b.stage = Gcs2Stage(b.setup())
+    assert b.stage.voltage == pytest.approx(3.0, abs=2e-4)
+    asked = {line.split()[0] for line in b.controller.heard if not line.endswith("?")}
+    assert all(word.endswith("?") for word in asked), asked
+    observer.connection.close()
+
+
+def test_a_waveform_gives_what_the_simulated_stage_gives(bench, play, ideal):
+    got = play(bench(plant=ideal()).stage, WAVE)
+    expected = SimulatedStage(ideal(), sample_period=SERVO_TIME).play(WAVE, initial_voltage=0.0)
+    np.testing.assert_allclose(got.displacement, expected.displacement, rtol=1e-7, atol=1e-13)
+    np.testing.assert_allclose(got.voltage, WAVE, atol=1e-7)
+
+
+def test_a_multiple_of_the_servo_time_holds_every_point_and_keeps_one_sample_of_each(bench, play, ideal):
+    stage = bench(plant=ideal()).stage
+    stage.configure(3 * SERVO_TIME)
+    assert stage.sample_period == pytest.approx(150e-6)
+    got = play(stage, WAVE)
+    expected = SimulatedStage(ideal(), sample_period=SERVO_TIME).play(np.repeat(WAVE, 3), initial_voltage=0.0)
+    np.testing.assert_allclose(got.displacement, expected.displacement[::3], rtol=1e-7, atol=1e-13)
+    with pytest.raises(StageError, match="whole multiple"):
+        stage.configure(70e-6)
+
+
+def test_blocks_follow_each_other_from_the_voltage_in_force(bench, play):
+    stage = bench().stage
+    first = play(stage, np.linspace(0.0, 5.0, 300))
+    assert stage.voltage == 5.0
+    second = play(stage, np.full(100, 5.0))
+    assert second.voltage[0] == pytest.approx(first.voltage[-1])
+    assert stage.read() is second, "read again"
+
+
+@pytest.mark.parametrize("size", [1, 9, 10, 11, 4097])
+def test_chunks_of_any_size_carry_every_point(bench, play, size):
+    drive = 2.0 + np.sin(0.1 * np.arange(size))
+    got = play(bench(points_per_command=10, rows_per_answer=1000).stage, drive)
+    np.testing.assert_allclose(got.voltage, drive, atol=2e-4)
+
+
+def test_slow_path_sets_and_reads_with_the_servo_off(bench, ideal):
+    b = bench(plant=ideal())
+    observer = b.observer()
+    observer.command("SVO 1 1")
+    b.stage.set_voltage(4.0)
+    assert observer.whole("SVO? 1") == 0
+    assert b.voltage == pytest.approx(4.0)
+    for _ in range(300):
+        reading = b.stage.read_displacement()
+    assert reading == pytest.approx(SimulatedStage(ideal()).parameters.stroke(0.0, 4.0), rel=1e-5)
+    heard = [line for line in b.controller.heard if line[:3] in ("SVO", "SVA")]
+    assert heard[-3:] == ["SVO 1 0", "SVO? 1", "SVA 1 80"] or heard[-4:-1] == ["SVO 1 0", "SVO? 1", "SVA 1 80"]
+    observer.connection.close()
+
+
+def test_what_breaks_a_limit_is_not_sent(bench):
+    b = bench()
+    b.controller.heard.clear()
+    for drive in ([10.1], [-0.1], [math.nan], []):
+        with pytest.raises(StageError, match="expected"):
+            b.stage.upload(np.array(drive))
+    with pytest.raises(StageError, match="expected"):
+        b.stage.set_voltage(11.0)
+    assert b.controller.heard == []
+
+
+def test_out_of_order_is_refused(bench):
+    stage = bench().stage
+    for early in (stage.arm, stage.start, stage.read, lambda: stage.wait(0.0)):
+        with pytest.raises(StageError, match="expected"):
+            early()
+    stage.upload(WAVE)
+    with pytest.raises(StageError, match="arm"):
+        stage.start()
+    stage.arm()
+    stage.configure(SERVO_TIME)
+    with pytest.raises(StageError, match="arm"):
+        stage.start()
+
+
+def test_safe_stops_a_waveform_where_it_is(bench):
+    b = bench(speed=1.0)
+    b.stage.upload(np.linspace(0.0, 8.0, 30000))
+    b.stage.arm()
+    b.stage.start()
+    with pytest.raises(StageError, match="still playing"):
+        b.stage.wait(0.02)
+    for busy in (b.stage.read, b.stage.start, b.stage.read_displacement, lambda: b.stage.set_voltage(1.0)):
+        with pytest.raises(StageError, match="still playing"):
+            busy()
+    b.stage.safe()
+    assert b.voltage == b.stage.voltage == 0.0
+    with pytest.raises(StageError, match="nothing recorded"):
+        b.stage.read()
+
+
+def test_the_way_to_safety_is_no_steeper_than_allowed(bench):
+    b = bench(max_slew_rate=200.0)
+    client = b.observer()
+    client.command("SVA 1 120")
+    client.connection.close()
+    b.stage.safe()
+    levels = [120.0] + [float(line.split()[2]) for line in b.controller.heard if line.startswith("SVA 1")][1:]
+    assert levels[-1] == 0.0
+    assert np.abs(np.diff(levels)).max() <= 200.0 * 0.01 * 20.0 + 0.01
+
+
+def test_a_closed_stage_is_safe_and_refuses_work(bench):
+    b = bench()
+    b.stage.set_voltage(4.0)
+    b.stage.close()
+    b.stage.close()
+    b.stage.safe()
+    assert b.voltage == 0.0
+    for work in (b.stage.read_displacement, lambda: b.stage.set_voltage(1.0), lambda: b.stage.configure(SERVO_TIME)):
+        with pytest.raises(StageError, match="closed"):
+            work()
+
+
+def test_open_loop_commands_in_other_units(bench, play):
+    b = bench(controller={"command_per_volt": 0.4}, command_per_volt=0.4)
+    np.testing.assert_allclose(play(b.stage, WAVE).voltage, WAVE, atol=2e-4)
+    b.stage.set_voltage(5.0)
+    assert b.controller.heard.count("SVA 1 40") == 1
+
+
+def test_wrong_units_are_seen_at_the_first_move(bench):
+    b = bench(controller={"command_per_volt": 0.5}, settling_time=0.0)
+    with pytest.raises(
+        StageError, match=r"measured a drive of 3.9999\S* V, expected 2 V.*command_per_volt.*safe voltage"
+    ):
+        b.stage.set_voltage(2.0)
+    assert b.voltage == 0.0
+
+
+def test_the_error_an_earlier_user_left_is_nobodys_now(bench):
+    b = bench(opened=False)
+    client = b.observer()
+    client.connection.send("MOV 1 3\n")
+    client.connection.close()
+    b.stage = Gcs2Stage(b.setup())
+    b.stage.set_voltage(1.0)
+
+
+def test_a_controller_that_lacks_what_is_needed_is_named(bench):
+    b = bench(opened=False)
+    for word in ("WGO", "DRR?"):
+        del b.controller._commands[word]
+    with pytest.raises(StageError, match=r"does not know DRR\? WGO"):
+        Gcs2Stage(b.setup())
+    with pytest.raises(StageError, match="has the axes 1, expected 'X'"):
+        Gcs2Stage(bench(opened=False).setup(axis="X"))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"host": ""}, {"port": 0}, {"amplifier_gain": 0.0}, {"points_per_command": 0}, {"voltage_table": 2}],
+)
+def test_a_setup_that_cannot_be_is_refused(wrong):
+    with pytest.raises(StageError, match="expected"):
+        Gcs2Setup(**{"host": "nowhere", **wrong})
