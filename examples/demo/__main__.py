@@ -53,6 +53,7 @@ class Demo:
         self.begin = time.monotonic()
         self.voltage: NDArray = probe(LIMITS)
         self.traces: dict[str, Trace] = {}
+        self.verdict = ""
 
     def say(self, text: str) -> None:
         """Print a line with the time since the start."""
@@ -130,7 +131,8 @@ class Demo:
 
         count = len(bench.models)
         told = self.run_job(bench, "diagnose")
-        self.say(f"[bold]verdict: {told['verdict']}[/bold]")
+        self.verdict = told["verdict"]
+        self.say(f"[bold]verdict: {self.verdict}[/bold]")
         self.look(bench, "extended", bench.new_model(count))
         return experiment
 
@@ -149,6 +151,8 @@ class Demo:
         """What the stage was hiding."""
         with (self.folder / "plant.yaml").open() as plant:
             self.say(f"[bold]the plant file opens: {plant.readline().removeprefix('# ').strip()}[/bold]")
+        if self.verdict.startswith("nothing_missing"):
+            self.say("the identified model had taken it in already: its residual was at the noise before the search")
 
 
 def main() -> int:
