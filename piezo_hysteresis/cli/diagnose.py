@@ -68,7 +68,8 @@ def _comparison(experiment: Experiment, found: Diagnosis) -> Comparison:
     models, nuisances = {}, {}
     if found.baseline is not None:
         models["before"] = found.baseline
-    if found.names and found.model is not None and found.selection is not None:
+    if found.selection is not None and found.selection.accepted and found.model not in (None, found.baseline):
+        assert found.model is not None
         models["after"] = found.model
         free = found.selection.accepted[-1].best.evidence.nuisance
         # hum has an amplitude and a phase of its own in every record

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import Arx, Effect, MainsHum
+from ..effects import Arx, BoucWen, Effect, MainsHum
 from ..effects.extent import Extent
 from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ..identification.content import content_of
@@ -99,6 +99,8 @@ def free_numbers(model: Model, nuisance: Nuisance) -> list[str]:
             names.append(name)
     skipped = {"offset.y0", "offset.settling"} if nuisance.offset else set()
     skipped |= {f"{MainsHum.name}.f"}
+    if BoucWen.name in model and model[BoucWen.name]["A"] == 0.0:  # a loop that is switched off stays so
+        skipped |= {f"{BoucWen.name}.{n}" for n in ("A", "beta", "gamma")}
     return [n for n in names if n not in skipped]
 
 

@@ -19,6 +19,7 @@ from ..model import Model
 from ..record import Experiment, Notice, Record
 from .candidates import Evidence, free_numbers, score_model
 from .diagnosis import Diagnosis, Verdict
+from .few_records import diagnose_few
 from .gap import measure_gap
 from .localise import localise
 from .next_experiment import NextExperiment, propose
@@ -30,7 +31,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 FEWEST = 4
-"""Records below which nothing can be held out and no name is given."""
+"""Records below which none can be held out and no name is given."""
 MOVES = 30.0
 """Power over noise from which the spectrum of the displacement counts as motion."""
 IDLE = ("idle", "hold", *CARRYING)
@@ -77,8 +78,10 @@ def diagnose(
     if not moving:
         raise IdentificationError("diagnose: the drive does not move in any record; expected loops, steps or noise")
     moving = [i for i in moving if i in usable]
-    if severe or len(moving) < FEWEST:
-        return _undecided(experiment, model, severe, len(moving))
+    if severe:
+        return _undecided(experiment, model, severe)
+    if len(moving) < FEWEST:
+        return diagnose_few(experiment, model, moving, extent_of, effects, tell)
 
     tell("baseline", 0.0)
     spared = reporting(records, usable)
@@ -237,12 +240,6 @@ def _next(selection: Selection, evidence: Evidence) -> NextExperiment | None:
     return None
 
 
-def _undecided(experiment: Experiment, model: Model | None, severe: list[Notice], moving: int) -> Diagnosis:
-    if severe:
-        reason = f"No verdict: {severe[0].message}."
-    else:
-        reason = (
-            f"No verdict: got {moving} records in which the drive moves, expected at least {FEWEST} to fit some and "
-            "hold out others; record more phases."
-        )
+def _undecided(experiment: Experiment, model: Model | None, severe: list[Notice]) -> Diagnosis:
+    reason = f"No verdict: {severe[0].message}."
     return Diagnosis(Verdict.UNKNOWN, reason, model, model, None, None, (), None, None, experiment.notices)

@@ -1,0 +1,173 @@
+"""Diagnosis of few records, or of one: the model that predicts best, without a name.
+
+Records that are cut into blocks show what keeps from one block to the next, and a model may be chosen by that. They do
+not show what a missing effect does under another drive, so none is named with confidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects import BoucWen, Effect, HysteresisMemory, Offset
+from ..effects.extent import Extent
+from ..identification.fit import Fit, fit
+from ..identification.identify import identify
+from ..identification.leading_step import step_length
+from ..identification.normal_equations import Nuisance, residuals
+from ..model import Model
+from ..record import Experiment, Record
+from .candidates import Candidate, Evidence, free_numbers, score_model
+from .diagnosis import Diagnosis, Verdict
+from .gap import measure_gap
+from .localise import localise
+from .next_experiment import NextExperiment, propose
+from .noise_floor import floors, noise_floors, stroke
+from .selection import Selection, Step, explained, select
+
+BLOCKS = 16
+"""Blocks into which the records are cut, about."""
+FEWEST = 256
+"""Samples of a block at least."""
+
+Progress = Callable[[str, float], None]
+
+
+def diagnose_few(
+    experiment: Experiment,
+    model: Model | None,
+    used: Collection[int],
+    extent: Callable[[list[Record], Model], Extent],
+    effects: Collection[type[Effect]],
+    tell: Progress,
+) -> Diagnosis:
+    """Extend the model as far as blocks left out ask for it; the verdict is always unknown.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Records, in order.
+    model : Model or None
+        Where to begin; identified from the experiment where None.
+    used : collection of int
+        Indices of the records in which the drive moves.
+    extent : callable
+        What records span, for the starts of the search.
+    effects : collection of Effect classes
+        The library to choose from.
+    tell : callable
+        Called with a word and the fraction done.
+    """
+    records = experiment.records
+    known = Experiment(records, experiment.source)
+    tell("baseline", 0.0)
+    state = model or identify(known, progress=lambda word, part: tell(word, 0.2 * part)).model
+    start = model or identify(known, memory=True, progress=lambda word, part: tell(word, 0.2 + 0.2 * part)).model
+    least, noise = floors(records), noise_floors(records)
+    blocks, origin = blocks_of(records, used)
+    weights = np.array([np.inf if k is None else least[k] for k in origin])
+    runs = sum(not r.continues for r in records)
+    evidence = Evidence(tuple(blocks), weights, Nuisance(offset=runs > 1), extent([records[i] for i in used], start))
+    null = float(np.mean([(noise[i] / least[i]) ** 2 for i in used]))
+    baseline = _joint(_zeroed(state), evidence)
+    before = score_model(baseline.model, evidence)
+    steps: list[Step] = []
+    now, score = baseline, before
+    if HysteresisMemory.name in start and HysteresisMemory.name not in state:
+        now = _joint(_zeroed(start), evidence)
+        score = score_model(now.model, evidence)
+        memory = Candidate(now.model[HysteresisMemory.name], evidence, score, now)
+        steps.append(Step(before, memory, True, (), ()))
+    tell("where", 0.45)
+    left = residuals(baseline.model, records, Nuisance(offset=True))
+    where = localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])
+    fitting = [e for e in effects if not (_loop_is_off(now.model) and e.host == BoucWen.name)]
+    found = select(now.model, evidence, score, null, fitting, lambda word, part: tell(word, 0.5 + 0.4 * part))
+    selection = Selection(baseline.model, found.model, found.score, (*steps, *found.steps), null)
+    final_evidence = found.accepted[-1].best.evidence if found.accepted else evidence
+    # what was judged on blocks left out is delivered: fitting on would bend it towards the few kinds of record
+    scored = selection.accepted[-1].best.fit if selection.accepted else None
+    final = scored or baseline
+    gap = measure_gap(
+        (baseline.model, final.model),
+        records,
+        sorted(used),
+        least.tolist(),
+        stroke(records),
+        (Nuisance(offset=True), replace(final_evidence.nuisance, offset=True)),
+        False,
+    )
+    names = [s.best.effect.public_name() for s in selection.accepted]
+    closed = explained(before.excess, selection.score.excess, null)
+    told = (
+        f"closest is {' with '.join(names)}, which explains {100 * closed:.0f} % and is in the model"
+        if names
+        else "nothing in the catalogue helps on blocks left out"
+    )
+    count = "one record" if len(used) == 1 else f"{len(used)} records"
+    reason = f"No name: {count} cannot tell effects apart; {told}"
+    return Diagnosis(
+        verdict=Verdict.UNKNOWN,
+        reason=f"{reason}.",
+        model=final.model,
+        baseline=baseline.model,
+        selection=selection,
+        fit=final,
+        where=where,
+        gap=gap,
+        next_experiment=_next(selection, evidence),
+        notices=experiment.notices,
+    )
+
+
+def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Record], list[int | None]]:
+    """Blocks of the records `used`, a leading jump apart, and of which record each is; None where it only carries.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        In order.
+    used : collection of int
+        Indices of the records to cut.
+    """
+    length = max(FEWEST, sum(records[i].size for i in used) // BLOCKS)
+    blocks: list[Record] = []
+    origin: list[int | None] = []
+    for index, record in enumerate(records):
+        if index not in used:
+            blocks.append(record)
+            origin.append(None)
+            continue
+        step = 0 if record.continues else step_length(record)
+        count = max(1, round((record.size - step) / length))
+        edges = {step, *(step + round(k * (record.size - step) / count) for k in range(1, count))}
+        cuts = record.split(*sorted(edges - {0}))
+        blocks += [cuts[0], *(replace(c, initial_voltage=None) for c in cuts[1:])]
+        origin += [index] * len(cuts)
+    return blocks, origin
+
+
+def _zeroed(model: Model) -> Model:
+    return model if Offset.name in model else model.with_effect(Offset())
+
+
+def _loop_is_off(model: Model) -> bool:
+    return BoucWen.name in model and model[BoucWen.name]["A"] == 0.0
+
+
+def _joint(model: Model, evidence: Evidence) -> Fit:
+    free = free_numbers(model, evidence.nuisance)
+    return fit(
+        model, evidence.records, free, floors=evidence.floors.tolist(), nuisance=evidence.nuisance, max_iterations=25
+    )
+
+
+def _next(selection: Selection, evidence: Evidence) -> NextExperiment | None:
+    for step in selection.accepted:
+        others = [r for r in step.rivals if r.effect.public_name() != step.best.effect.public_name()]
+        if others and step.best.fit is not None and others[0].fit is not None:
+            pair = (step.best.effect.public_name(), others[0].effect.public_name())
+            return propose(step.best.fit.model, others[0].fit.model, pair, evidence)
+    return None
