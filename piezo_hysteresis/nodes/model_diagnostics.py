@@ -30,7 +30,7 @@ class ModelDiagnostics:
         self._node, self._warn, self._error = node, warn, error
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: prediction"
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._problem = ""
+        self._problem = self._refused = ""
         self._problems = 0
         self._stage = ""
         self._model: Model | None = None
@@ -47,9 +47,15 @@ class ModelDiagnostics:
         self._problem = message
         self._problems += 1
 
+    def refused(self, message: str) -> None:
+        """Tell why a model was not taken, until another one is."""
+        self._node.get_logger().warning(message)
+        self._refused = message
+        self._problems += 1
+
     def model(self, model: Model) -> None:
         """Tell the model that is followed from now on."""
-        self._model = model
+        self._model, self._refused = model, ""
         try:
             self._promised = float(model.provenance["free_run_error"])
         except (KeyError, ValueError):
@@ -101,8 +107,8 @@ class ModelDiagnostics:
 
     def _findings(self, received: bool, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
         predictor, promised = self._predictor, self._promised
-        if self._problem:
-            yield DiagnosticStatus.ERROR, self._problem
+        for told in filter(None, (self._refused, self._problem)):
+            yield DiagnosticStatus.ERROR, told
         if predictor is None or not received:
             yield DiagnosticStatus.STALE, "no samples"
             return

@@ -101,13 +101,13 @@ class ModelNode(Node):
         try:
             self._follow(loads(message.data, "topic 'model'"))
         except PiezoError as error:
-            self._diagnostics.problem(str(error))
+            self._diagnostics.refused(str(error))
 
     def _load(self, path: str) -> None:
         try:
             self._follow(load(path))
         except PiezoError as error:
-            self._diagnostics.problem(f"model_file: {error}")
+            self._diagnostics.refused(f"model_file: {error}")
 
     def _follow(self, model: Model) -> None:
         if self._predictor is not None:
