@@ -33,6 +33,7 @@ from piezo_hysteresis.effects import (
     SensorBandwidth,
     Softening,
 )
+from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.model import Model
 from piezo_hysteresis.record import Record
 
@@ -207,7 +208,10 @@ def explain(suspect: Suspect) -> Explanation:
         return row(stage, published), row(stage, alone)
 
     def misfit(numbers: np.ndarray) -> np.ndarray:
-        dynamic, static = rows(numbers)
+        try:
+            dynamic, static = rows(numbers)
+        except DivergenceError:
+            return np.full(2 * len(FREQUENCIES), 100.0)
         return np.concatenate((dynamic - DYNAMIC, static - ALONE))
 
     start = np.array([*suspect.start, *([5.0] if suspect.trim else [])], float)

@@ -183,9 +183,12 @@ def fit(
             converged = True
             break
         decrease = 1.0 - cost / total[-1, -1]
+        try:
+            current = grams(better, records, free, nuisance)
+        except DivergenceError:  # a bounded output of unbounded slopes is the edge of stability
+            break
         model, theta = better, trial
         damping = max(damping / 10.0, 1e-12)
-        current = grams(model, records, free, nuisance)
         total = weighted(current, sizes)
         iterations += 1
         converged = decrease < tolerance

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import DivergenceError
 from ..model import Model
 from ..record import Record
 
@@ -94,6 +95,11 @@ def grams(
         Eliminated per record.
     extra : sequence of (k, n) ndarray, optional
         Further rows of every record, e.g. finite changes of the simulation.
+
+    Raises
+    ------
+    DivergenceError
+        If the output or a sensitivity leaves every range.
     """
     nuisance = nuisance or Nuisance()
     q = len(wanted) + (len(extra[0]) if extra else 0)
@@ -104,6 +110,8 @@ def grams(
         more = extra[index][:, part] if extra else np.empty((0, y.size))
         rows = np.vstack((*(slopes[n] for n in wanted), more, residual, nuisance.rows(record, part)))
         product = rows @ rows.T
+        if not np.isfinite(product).all():
+            raise DivergenceError(model.effects[-1].name, part.start, part.start * record.sample_period)
         if index == len(sums):
             sums.append(product)
         else:
