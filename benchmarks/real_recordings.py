@@ -1,0 +1,183 @@
+"""A measured piezo: what each model reaches on the recording it was fitted to and on another, in free run.
+
+Rows 0 to 7000 of the Model record of picma-p885 fit and choose everything; the whole Test record is predicted from
+0 V. One constant is free per record, nothing else. Errors are RMS in % of the range of the record.
+
+    python -m benchmarks.real_recordings --data ../shared/data
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from piezo_hysteresis import recording
+from piezo_hysteresis.discrepancy import diagnose
+from piezo_hysteresis.discrepancy.noise_floor import drive_period
+from piezo_hysteresis.effects import CATALOGUE, ThermalDrift
+from piezo_hysteresis.identification.dynamics import identify_arx
+from piezo_hysteresis.identification.fit import fit
+from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.normal_equations import Nuisance
+from piezo_hysteresis.identification.three_steps import voltage_signals
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Experiment, Record
+
+ROWS = (0, 7000)
+SETTLED = 1000
+"""First row of the part that shows hysteresis alone."""
+Prediction = Callable[[Record], np.ndarray]
+
+
+def read(folder: Path, name: str, rows: tuple[int, int] | None = None) -> Record:
+    """One of the records, in SI units, the stage settled at 0 V before it."""
+    return recording.read(
+        folder / "picma-p885" / name,
+        columns={"voltage": 1, "displacement": 5},
+        units={"displacement": "um"},
+        sample_period=5e-3,
+        initial_voltage=0.0,
+        rows=rows,
+        phases="record",
+    )[0]
+
+
+def percent(record: Record, prediction: Prediction) -> tuple[float, float]:
+    """Error over the whole record and behind row `SETTLED`, one constant for the record."""
+    left = record.displacement - prediction(record)
+    left -= left.mean()
+    reach = np.ptp(record.displacement)
+    return tuple(float(100.0 * np.sqrt(np.mean(part**2)) / reach) for part in (left, left[SETTLED:]))
+
+
+def free_run(model: Model) -> Prediction:
+    """A model as a prediction."""
+    return lambda record: model.simulate(record)[0]
+
+
+def static_cubic(record: Record) -> Prediction:
+    """y a cubic of the drive, without memory."""
+    cubic = np.polynomial.Polynomial.fit(record.voltage, record.displacement, 3)
+    return lambda other: cubic(other.voltage)
+
+
+def linear_arx(record: Record) -> Prediction:
+    """The best of some orders and delays by free run on the record, linear from drive to displacement."""
+    signals = voltage_signals([record], 3.6, 1e-6)
+    found = []
+    for order in (1, 2, 4, 8):
+        for delay in (1, 2):
+            arx = identify_arx(signals, delay, record.sample_period, (order, order)).arx
+            if arx.pole_radius < 1.0:
+                found.append(free_run(Model((arx,), record.sample_period, 3.6, 1e-6)))
+    return min(found, key=lambda prediction: percent(record, prediction)[0])
+
+
+def classical(modified: Model, record: Record) -> Prediction:
+    """Bouc-Wen without the cubic term, with the same lag."""
+    start = modified.with_values({"bouc_wen.p1": 0.0})
+    free = [*(f"bouc_wen.{n}" for n in ("A", "beta", "gamma", "p2")), "arx.a[0]", "arx.b[0]", "arx.delay"]
+    return free_run(fit(start, [record], free, nuisance=Nuisance(offset=True)).model)
+
+
+def sysidentpy(record: Record) -> Prediction | None:
+    """Polynomial NARX by forward regression; degree and lags by free run on the last quarter. None where missing."""
+    try:
+        from sysidentpy.basis_function import Polynomial
+        from sysidentpy.model_structure_selection import FROLS
+        from sysidentpy.parameter_estimation import LeastSquares
+    except ImportError:
+        return None
+    low, reach = record.displacement.min(), np.ptp(record.displacement)
+
+    def columns(other: Record) -> tuple[np.ndarray, np.ndarray]:
+        return other.voltage[:, None] / 3.6, ((other.displacement - low) / reach)[:, None]
+
+    def train(part: Record, degree: int, lags: int) -> Prediction:
+        network = FROLS(
+            order_selection=True,
+            n_info_values=20,
+            ylag=lags,
+            xlag=lags,
+            info_criteria="bic",
+            estimator=LeastSquares(),
+            basis_function=Polynomial(degree=degree),
+        )
+        u, y = columns(part)
+        network.fit(X=u, y=y)
+
+        def predict(other: Record) -> np.ndarray:
+            drive, start = columns(other)
+            # the recording begins with 0 V: its settled samples are the initial condition
+            rest = np.full((lags, 1), start[0, 0])
+            y = network.predict(X=np.vstack((np.full((lags, 1), other.settled_voltage), drive)), y=rest)
+            return low + reach * y[lags:, 0]
+
+        return predict
+
+    cut = 3 * record.size // 4
+    tried = []
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        for degree in (1, 2, 3):
+            for lags in (2, 4):
+                left = record.displacement - train(record[:cut], degree, lags)(record)
+                if np.isfinite(left).all():
+                    tried.append((float(np.std(left[cut:])), degree, lags))
+        return train(record, *min(tried)[1:])
+
+
+def predictions(record: Record) -> Iterator[tuple[str, Prediction | None]]:
+    """Every model, fitted to the record."""
+    whole = Experiment((record,))
+    modified = identify(whole).model
+    yield "static cubic", static_cubic(record)
+    yield "linear ARX", linear_arx(record)
+    yield "SysIdentPy, polynomial NARX", sysidentpy(record)
+    yield "classical Bouc-Wen and lag", classical(modified, record)
+    yield "modified Bouc-Wen and lag (identify --no-memory)", free_run(modified)
+    yield "plays, cubic and lag (identify)", free_run(identify(whole, memory=True).model)
+    for name, effects in (("plays, lag, drift", (ThermalDrift,)), ("what diagnose chooses", CATALOGUE)):
+        found = diagnose(whole, effects=effects)
+        assert found.model is not None and found.selection is not None
+        names = " + ".join(step.best.effect.public_name() for step in found.selection.accepted)
+        yield f"{name}: {names}", free_run(found.model)
+
+
+def repeatability(record: Record) -> float:
+    """Deviation of the cycles from their mean cycle [%], the first 5 left out."""
+    period = drive_period(record.voltage[SETTLED:]) or 200
+    cycles = record.displacement[SETTLED:][: (record.size - SETTLED) // period * period].reshape(-1, period)
+    return float(100.0 * np.std(cycles - cycles.mean(axis=0)) / np.ptp(record.displacement))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", default=os.environ.get("PIEZO_DATA", "../shared/data"), help="holds picma-p885")
+    folder = Path(parser.parse_args().data)
+    if not (folder / "picma-p885").is_dir():
+        print(f"no picma-p885 in {folder}: set PIEZO_DATA")
+        return
+    record, other = read(folder, "Model_Vi_Do.dat", ROWS), read(folder, "Test_Vi_Do_Di.dat")
+    table = Table(title="Free-run error [% of range]", box=None)
+    for column in ("model", "Model 0–7000", "Model 1000–7000", "Test"):
+        table.add_column(column, justify="left" if column == "model" else "right")
+    for name, prediction in predictions(record):
+        if prediction is None:
+            table.add_row(name, "not installed")
+            continue
+        (fitted, settled), (test, _) = percent(record, prediction), percent(other, prediction)
+        table.add_row(name, f"{fitted:.3f}", f"{settled:.3f}", f"{test:.3f}")
+    table.add_row("cycles about their mean", "", f"{repeatability(record):.3f}")
+    Console(width=140).print(table)
+
+
+if __name__ == "__main__":
+    main()
