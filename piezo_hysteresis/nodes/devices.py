@@ -1,0 +1,49 @@
+"""Real controllers: their ROS parameters, and how a stage is opened from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ..parameter import Parameter
+from ..stage.gcs2.setup import Gcs2Setup
+from ..stage.gcs2.stage import Gcs2Stage
+from ..stage.stage import Stage
+from .parameters import Row, Setting
+
+_UNVERIFIED = "not verified on a device: docs/hardware.md"
+_GCS2 = Gcs2Setup(host="-")
+
+GCS2: tuple[Row, ...] = (
+    Setting("host", "", "name or address of the controller"),
+    Setting("port", _GCS2.port, "TCP port"),
+    Setting("axis", _GCS2.axis, "axis identifier"),
+    Setting("channel", _GCS2.channel, "output channel of the piezo"),
+    Setting("generator", _GCS2.generator, "wave generator of the axis"),
+    Setting("wave_table", _GCS2.wave_table, "wave table that is overwritten"),
+    Setting("voltage_table", _GCS2.voltage_table, "recorder table of the piezo voltage"),
+    Setting("displacement_table", _GCS2.displacement_table, "recorder table of the position"),
+    Setting("points_per_command", _GCS2.points_per_command, f"wave points in one line; {_UNVERIFIED}"),
+    Setting("rows_per_answer", _GCS2.rows_per_answer, "recorded samples asked for at once"),
+    Setting("read_back", _GCS2.read_back, "compare the wave table with what was sent before anything moves"),
+    Setting("longest_wave", _GCS2.longest_wave, "points of the wave table; 0: ask the controller"),
+    Parameter(
+        "amplifier_gain", "G_a", "V/V", 1.0, -1e4, 1e4, "piezo voltage over drive voltage; 1: drive = piezo", "rig"
+    ),
+    Parameter("command_per_volt", "c", "1/V", 1.0, -1e3, 1e3, "open-loop command over piezo voltage", _UNVERIFIED),
+    Parameter("command_at_zero", "c_0", "1", 0.0, -1e4, 1e4, "open-loop command at 0 V", _UNVERIFIED),
+    Parameter("position_unit", "", "m", 1e-6, 1e-12, 1.0, "length of one unit of POS?", "manual of the controller"),
+    Parameter("safe_voltage", "u_s", "V", 0.0, -1e4, 1e4, "drive voltage of the stage at rest", "rig"),
+    Parameter("max_slew_rate", "S", "V/s", 0.0, 0.0, 1e12, "steepest drive; 0: no limit but the amplifier's", "rig"),
+    Parameter("voltage_tolerance", "", "V", 1.0, 1e-3, 1e3, "largest steady error of the piezo voltage", "rig"),
+    Parameter("settling_time", "", "s", 0.01, 0.0, 10.0, "time the piezo voltage needs to follow a step", "rig"),
+    Parameter("timeout", "", "s", 2.0, 0.01, 600.0, "longest silence of the controller", "network"),
+)
+"""Of a stage on a controller that speaks GCS 2.0."""
+
+
+def open_gcs2(values: Mapping[str, Any], _: float) -> Stage:
+    """Connect to a GCS 2.0 controller; StageError if it is not there or not what the values say."""
+    slew = values["max_slew_rate"] or math.inf
+    return Gcs2Stage(Gcs2Setup(**{**values, "max_slew_rate": slew}))
