@@ -28,7 +28,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .errors import PiezoError
-from .record import Experiment, Record
 
 if TYPE_CHECKING:
     from .discrepancy import diagnose
@@ -36,11 +35,14 @@ if TYPE_CHECKING:
     from .model import Model
     from .model_file import load, save
     from .predictor import Predictor
+    from .record import Experiment, Record
     from .recording import read
 
 _ROOMS = {
+    "Experiment": "record",
     "Model": "model",
     "Predictor": "predictor",
+    "Record": "record",
     "diagnose": "discrepancy",
     "identify": "identification",
     "load": "model_file",
