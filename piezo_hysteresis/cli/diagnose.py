@@ -10,10 +10,10 @@ from ..discrepancy import Diagnosis, diagnose
 from ..record import Experiment
 from ..report.answer_tables import effect_table, gap_table, rejection_table, where_table
 from ..report.comparison import Comparison, compare
+from ..report.json_file import write_json
 from ..report.page import page
 from ..report.verdict import answer_verdict
 from . import reading
-from .json_file import write_json
 from .terminal import console, progress, show, show_notices
 
 

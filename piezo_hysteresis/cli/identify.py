@@ -10,10 +10,10 @@ from ..effects import BoucWen, PublishedBoucWen
 from ..identification.identification import Identification
 from ..identification.identify import identify
 from ..identification.roles import HELD_OUT
+from ..report.json_file import write_json
 from ..report.parameter_table import correlation_table, parameter_table
 from ..report.table import Table
 from . import reading
-from .json_file import write_json
 from .terminal import console, progress, show, show_notices
 
 

@@ -6,9 +6,9 @@ import argparse
 
 from .. import recording
 from ..discrepancy.noise_floor import noise_floors
+from ..report.json_file import write_json
 from ..report.quality_table import notice_table, record_table
 from . import reading
-from .json_file import write_json
 from .terminal import console, show
 
 

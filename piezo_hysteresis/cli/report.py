@@ -8,9 +8,9 @@ from pathlib import Path
 from .. import model_file
 from ..identification.normal_equations import Nuisance
 from ..report.comparison import compare
+from ..report.json_file import read_json
 from ..report.page import page
 from . import reading
-from .json_file import read_json
 from .terminal import console, progress
 
 

@@ -8,8 +8,8 @@ from .. import recording
 from ..identification import protocol
 from ..identification.drive import DriveLimits
 from ..record import Experiment, Record
+from ..report.json_file import write_json
 from ..stage.simulated import SimulatedStage
-from .json_file import write_json
 from .plant_option import add_plant_arguments, plant
 from .terminal import console, progress
 

@@ -12,9 +12,9 @@ from ..errors import RecordError
 from ..identification.normal_equations import Nuisance
 from ..report.comparison import Comparison, compare
 from ..report.error_table import error_table, frequency_table
+from ..report.json_file import write_json
 from ..report.table import Table
 from . import reading
-from .json_file import write_json
 from .terminal import console, show, show_notices
 
 

@@ -15,6 +15,7 @@ from ..errors import IdentificationError, PiezoError
 from ..identification.identify import identify
 from ..model_file import dumps, loads
 from ..recording import read
+from ..report.json_file import write_json
 
 Report = Callable[[str, float], None]
 
@@ -50,8 +51,11 @@ def identification(path: Path, model: str, report: Report) -> Outcome:
 
 
 def diagnosis(path: Path, model: str, report: Report) -> Outcome:
-    """Find what the model so far lacks, or a new one where there is none, and extend it."""
+    """Find what the model so far lacks, or a new one where there is none, and extend it; writes ``answer.json``."""
     found = diagnose(read(path), loads(model) if model else None, progress=report)
+    folder = path if path.is_dir() else path.parent
+    model_file = "" if found.model is None else str(folder / "diagnosis.yaml")
+    write_json(str(folder / "answer.json"), found.answer(model_file))
     if found.model is None:
         raise IdentificationError(found.reason)
     return Outcome(dumps(found.model), found.summary(), f"{found.verdict}: {found.reason}")

@@ -20,6 +20,7 @@ from piezo_hysteresis.nodes.cloud import from_cloud
 from piezo_hysteresis.nodes.conversions import PREDICTED_SAMPLES, values_of
 from piezo_hysteresis.nodes.quality import LATCHED, SAMPLES
 from piezo_hysteresis.recording import read
+from piezo_hysteresis.report.json_file import read_json
 from piezo_hysteresis.stage.plant import PlantParameters
 
 pytestmark = pytest.mark.nodes
@@ -139,6 +140,8 @@ def test_from_an_unknown_stage_to_a_live_model(lab):
     told = identification.await_state("done", "failed", timeout=240.0)
     assert told.message.startswith("nothing_missing: "), told.message
     assert dumps(load(path / "diagnosis.yaml")) == dumps(from_parameters(identification.served())) == models[-1].data
+    answer = read_json(str(path / "answer.json"))
+    assert (answer["verdict"], answer["model"]) == ("nothing_missing", str(path / "diagnosis.yaml"))
 
     again = lab.start(NODE, "--params-file", str(path / "diagnosis.yaml"), namespace="/again")
     resumed = lab.listen(String, "/again/model", LATCHED)
