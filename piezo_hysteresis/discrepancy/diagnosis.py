@@ -80,7 +80,11 @@ class Diagnosis:
         for step in self.selection.steps:
             if self.verdict is Verdict.UNKNOWN and step.accepted:
                 closed = self.selection.explained(step.best.score)
-                told[step.best.name] = Rejection(step.best.name, f"closest, but explains {closed:.2f} of the gap only")
+                kept = self.model is not None and step.best.name in self.model
+                said = f"in the model, not named: up to here {closed:.2f} of the gap is explained"
+                told[step.best.name] = Rejection(
+                    step.best.name, said if kept else f"closest, but explains {closed:.2f} of the gap only"
+                )
             for rejection in step.rejected:
                 told[rejection.name] = rejection
         named = {s.best.name for s in self.selection.accepted} if self.names else set()
