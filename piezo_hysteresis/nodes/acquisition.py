@@ -14,6 +14,7 @@ from ..errors import PiezoError, StageError
 from ..stage.stage import Acquired, Samples, Stage, StreamingStage
 from .conversions import SampleBlock
 from .drive import Drive, Event, Phase
+from .late_drive import LateDrive
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
 from .time_base import TimeBase
@@ -95,6 +96,7 @@ class Acquisition:
         self.block_size, self.index = block_size, 0
         self._time_base, self._node_clock = time_base, node_clock
         self._deliver, self._fail, self._ready = deliver, fail, ready
+        self._late = LateDrive(round(stage.description.latency / time_base.sample_period), playback.phase.number)
         self._access = threading.Lock()
         self._halting = threading.Event()
         self._safe = threading.Event()
@@ -160,7 +162,7 @@ class Acquisition:
             self._time_base.anchor(0, time.monotonic(), self._node_clock())
             while not self._halting.is_set():
                 self._step()
-                if self.playback.is_safe:
+                if self.playback.is_safe and self._late.is_empty:
                     self._safe.set()
         except Exception as error:  # whatever it is, the stage must not stay energised
             self._fail(self._abandon(error))
@@ -184,7 +186,7 @@ class Acquisition:
             self.tally.postponed += self._time_base.postpone(self.index + self.block_size, now)
         with self._access:
             drive = self.playback.take(self.block_size)
-        self._tell(self.index, drive, stage.exchange(drive.voltage))
+        self._tell(self.index, self._late.follow(drive), stage.exchange(drive.voltage))
 
     def _wait_until(self, steady: float) -> bool:
         """False where the thread has to end first."""

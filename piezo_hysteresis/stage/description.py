@@ -43,6 +43,9 @@ class Description:
         Sensor range [m]; samples on it are clipped.
     measured_voltage : bool
         True where the voltage returned is measured, False where it is the one commanded.
+    latency : float
+        Streaming stages: time by which an answer is late [s]; sample i of what is returned was applied and measured
+        that long before sample i of the drive given is. 0 where they belong together.
     ignores_drive : bool
         True for a replayed recording: what is asked for is not played.
 
@@ -66,6 +69,7 @@ class Description:
     displacement_min: float = -math.inf
     displacement_max: float = math.inf
     measured_voltage: bool = False
+    latency: float = 0.0
     ignores_drive: bool = False
 
     def __post_init__(self) -> None:
@@ -80,6 +84,8 @@ class Description:
                     f"{self.name}: got {low} {getattr(self, low):g} above {high} {getattr(self, high):g}, "
                     "expected ordered limits"
                 )
+        if not 0 <= self.latency < math.inf:
+            raise StageError(f"{self.name}: got latency {self.latency:g} s, expected 0 or more")
         if not (self.sample_period_min > 0 and self.max_slew_rate > 0 and self.amplifier_gain != 0):
             raise StageError(f"{self.name}: expected a positive sample period and slew rate and a gain other than zero")
 

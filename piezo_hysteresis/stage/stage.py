@@ -83,7 +83,8 @@ class StreamingStage(Stage, Protocol):
     def exchange(self, voltage: Samples) -> Acquired:
         """Apply a block of drive voltages and return the samples applied and measured, as many as were given.
 
-        Sample i of the answer belongs to sample i of the drive; the next block follows without a gap.
+        Sample i of the answer belongs to sample i of the drive, or to the one `Description.latency` before it; voltage
+        and displacement of the answer belong together always. The next block follows without a gap.
 
         Raises
         ------

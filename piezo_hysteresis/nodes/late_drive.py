@@ -1,0 +1,52 @@
+"""`LateDrive`: labels of a drive that wait until its samples come back from a stage with latency. No ROS."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .drive import Drive, Event
+
+
+class LateDrive:
+    """Delays phases and events by the latency of a streaming stage.
+
+    Parameters
+    ----------
+    latency : int
+        Samples between a drive and its answer.
+    phase : int
+        Number of the phase that the first late samples belong to.
+    """
+
+    def __init__(self, latency: int, phase: int) -> None:
+        self._latency = latency
+        self._phase = np.full(latency, phase, dtype=np.uint32)
+        self._events: list[Event] = []
+
+    @property
+    def is_empty(self) -> bool:
+        """True when nothing that happened is still to be told."""
+        return not self._events
+
+    def follow(self, drive: Drive) -> Drive:
+        """Take the drive that is given now and return the labels of what comes back now.
+
+        Parameters
+        ----------
+        drive : Drive
+
+        Returns
+        -------
+        Drive
+            As many samples; its voltage is still that of the drive given.
+        """
+        if not self._latency:
+            return drive
+        count = drive.phase.size
+        phases = np.concatenate((self._phase, drive.phase))
+        self._phase = phases[count:]
+        events = [*self._events, *(replace(e, offset=e.offset + self._latency) for e in drive.events)]
+        self._events = [replace(e, offset=e.offset - count) for e in events if e.offset >= count]
+        return replace(drive, phase=phases[:count], events=tuple(e for e in events if e.offset < count))
