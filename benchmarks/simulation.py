@@ -1,4 +1,4 @@
-"""Speed of simulation and of sensitivities: the published chain, and every effect of the catalogue added to it.
+"""Speed of simulation and of sensitivities: the chain, and every effect of the catalogue added to it.
 
 Processor time of one core, after warm-up, over a drive that fits in no cache.
 
@@ -8,14 +8,11 @@ Processor time of one core, after warm-up, over a drive that fits in no cache.
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Callable
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
-from piezo_hysteresis.effects import CATALOGUE, Arx, BoucWen, Effect, PublishedBoucWen
+from benchmarks.figures import Cell, Figures, alone, seconds
+from piezo_hysteresis.effects import CATALOGUE, Arx, BoucWen, Effect
 from piezo_hysteresis.model import Model
 from piezo_hysteresis.record import Record
 
@@ -27,17 +24,6 @@ ARX = Arx(
 PERIOD = 2e-5
 
 
-def seconds(work: Callable[[], object], repeats: int = 5) -> float:
-    """Shortest processor time of `work`, after one run to warm up."""
-    work()
-    times = []
-    for _ in range(repeats):
-        start = time.process_time()
-        work()
-        times.append(time.process_time() - start)
-    return min(times)
-
-
 def record(size: int) -> Record:
     """Large slow sine with a little noise, every channel filled."""
     voltage = 3.5 + 2.5 * np.sin(np.arange(size) * 2e-3) + np.random.default_rng(0).normal(scale=0.01, size=size)
@@ -47,27 +33,26 @@ def record(size: int) -> Record:
 
 def measure(model: Model, data: Record, wanted: list[str]) -> tuple[float, float]:
     """Samples per second of the simulation, and the cost of its sensitivities as a multiple of it."""
-    value = seconds(lambda: model.simulate(data))
-    slopes = seconds(lambda: [None for _ in model.linearise([data], wanted)], 3)
+    value, slopes = seconds(lambda: model.simulate(data), lambda: [None for _ in model.linearise([data], wanted)])
     return data.size / value, slopes / value
 
 
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
     parser.add_argument("--samples", type=int, default=400_000)
-    data = record(parser.parse_args().samples)
-    table = Table("chain", "million samples/s", "numbers", "sensitivities / simulation", title="one core")
+
+
+def run(options: argparse.Namespace) -> list[Figures]:
+    """Every effect, added to the chain of the exact step."""
+    data = record(options.samples)
+    rows: list[tuple[Cell, ...]] = []
 
     def row(name: str, *effects: Effect) -> None:
         model = Model(effects, PERIOD)
         wanted = [n for n in model.values() if not model.row(n).fixed]
         speed, ratio = measure(model, data, wanted)
-        table.add_row(name, f"{speed / 1e6:.0f}", str(len(wanted)), f"{ratio:.1f}")
+        rows.append((name, speed / 1e6, len(wanted), ratio))
 
-    row("published_bouc_wen", PublishedBoucWen())
-    row("published_bouc_wen, arx", PublishedBoucWen(), ARX)
-    row("bouc_wen", BoucWen())
     row("bouc_wen, arx", BoucWen(), ARX)
     for kind in CATALOGUE:
         on = {
@@ -77,8 +62,9 @@ def main() -> None:
         }
         arrays = {p.name: (on[p.name],) * len(p.value) for p in kind.parameters if p.name in on and p.is_array}
         row(f"… with {kind.name}", BoucWen(), ARX, kind(**{**on, **arrays}))
-    Console().print(table)
+    columns = ("chain", "M samples/s", "numbers", "value + sensitivities / value")
+    return [Figures(f"Every effect of the catalogue, {data.size:.0e} samples", columns, rows)]
 
 
 if __name__ == "__main__":
-    main()
+    alone(__name__)

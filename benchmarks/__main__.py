@@ -1,0 +1,52 @@
+"""`make bench`: the figures of docs/performance, each beside a peer measured in the same run.
+
+Without a name: kernels, simulation, identification and streaming. Options of one benchmark belong to its own command
+line, as in `python -m benchmarks.streaming --rate 2e5`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+import time
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmarks.figures import Figures, machine, show, write
+
+SPEED = ("kernels", "simulation", "identification", "streaming")
+"""What runs where nothing is named."""
+QUALITY = ("recovery", "table_1")
+"""What takes minutes, by name only."""
+
+
+def main() -> int:
+    """Run benchmarks with their defaults; 1 where a promise was not kept."""
+    parser = argparse.ArgumentParser(
+        prog="benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(SPEED + QUALITY)} (default: the first 4)")
+    parser.add_argument("--json", type=Path, default=Path("benchmarks.json"), help="default: benchmarks.json")
+    chosen = parser.parse_args()
+    unknown = [name for name in chosen.names if name not in SPEED + QUALITY]
+    if unknown:
+        parser.error(f"no benchmark '{unknown[0]}', expected some of {', '.join(SPEED + QUALITY)}")
+    console, results = Console(), dict[str, list[Figures]]()
+    console.print(", ".join(f"{key} {value}" for key, value in machine().items()), highlight=False)
+    for name in chosen.names or SPEED:
+        begin = time.monotonic()
+        module = importlib.import_module(f"benchmarks.{name}")
+        options = argparse.ArgumentParser()
+        module.arguments(options)
+        results[name] = module.run(options.parse_args([]))
+        show(results[name], console)
+        console.print(f"[dim]{name}: {time.monotonic() - begin:.0f} s; python -m benchmarks.{name} --help[/]\n")
+        write(results, chosen.json)
+    console.print(f"written: {chosen.json}")
+    return int(any(figures.failures for group in results.values() for figures in group))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

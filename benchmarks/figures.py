@@ -1,0 +1,117 @@
+"""What every benchmark hands back, and how it is shown: tables on the terminal, one JSON file for machines.
+
+A benchmark is a module with ``arguments(parser)``, its options with defaults, and ``run(options)``, which returns a
+list of `Figures`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+Cell = str | int | float | None
+
+
+@dataclass(frozen=True)
+class Figures:
+    """A table of a benchmark.
+
+    Parameters
+    ----------
+    title : str
+        What was measured, and how.
+    columns : tuple of str
+        Heads, with units.
+    rows : list of tuple
+        One cell per column: words, or numbers in full.
+    failures : tuple of str
+        Promises that were not kept; any of them makes the exit code 1.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[Cell, ...]]
+    failures: tuple[str, ...] = ()
+
+    def table(self) -> Table:
+        """The table, numbers to three digits."""
+        table = Table(title=self.title, title_justify="left")
+        for k, column in enumerate(self.columns):
+            table.add_column(column, justify="left" if all(isinstance(row[k], str) for row in self.rows) else "right")
+        for row in self.rows:
+            table.add_row(*(_shown(cell) for cell in row))
+        return table
+
+
+def seconds(*works: Callable[[], object], repeats: int = 5) -> list[float]:
+    """Shortest processor time of every work [s], taken in turns, so that a busy machine is busy for all of them."""
+    best = [np.inf] * len(works)
+    for work in works:
+        work()
+    for _ in range(repeats):
+        for k, work in enumerate(works):
+            start = time.process_time()
+            work()
+            best[k] = min(best[k], time.process_time() - start)
+    return best
+
+
+def machine() -> dict[str, Any]:
+    """Where and when the figures were taken, and how busy the machine was."""
+    cpu = Path("/proc/cpuinfo")
+    lines = cpu.read_text().splitlines() if cpu.is_file() else []
+    model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+    return {
+        "cpu": model or platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "load": round(os.getloadavg()[0], 2),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "utc": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+    }
+
+
+def show(figures: list[Figures], console: Console) -> None:
+    """Print tables, and what failed below each."""
+    for one in figures:
+        console.print(one.table())
+        for failure in one.failures:
+            console.print(f"[red]failed:[/] {failure}", highlight=False)
+
+
+def write(results: dict[str, list[Figures]], path: Path) -> None:
+    """All results as JSON."""
+    document = {"machine": machine(), "benchmarks": {n: [asdict(f) for f in r] for n, r in results.items()}}
+    path.write_text(json.dumps(document, indent=1) + "\n")
+
+
+def alone(module: str) -> None:
+    """Command line of one benchmark: its own options, its tables, and exit code 1 where a promise was not kept."""
+    benchmark = sys.modules[module]
+    parser = argparse.ArgumentParser(description=(benchmark.__doc__ or "").splitlines()[0])
+    benchmark.arguments(parser)
+    parser.add_argument("--json", type=Path, help="write the figures there")
+    options = parser.parse_args()
+    figures = benchmark.run(options)
+    show(figures, Console())
+    if options.json:
+        write({Path(benchmark.__file__ or module).stem: figures}, options.json)
+    sys.exit(any(f.failures for f in figures))
+
+
+def _shown(cell: Cell) -> str:
+    if cell is None:
+        return "–"
+    return f"{cell:.3g}" if isinstance(cell, float) else str(cell)

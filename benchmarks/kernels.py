@@ -1,0 +1,144 @@
+"""Kernels beside the same loops in C, and beside scipy with plain Python.
+
+Ours and C take turns; of gcc -O3 with and without -march=native the faster one counts. The results are compared before
+anything is timed. Processor time of one core, warm.
+
+    python -m benchmarks.kernels --samples 10000000
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import lfilter
+
+from benchmarks.c_loops import CLoops, compiler
+from benchmarks.figures import Cell, Figures, alone, seconds
+from benchmarks.simulation import ARX, PERIOD, measure, record
+from piezo_hysteresis.effects import BoucWen, Effect, PublishedBoucWen
+from piezo_hysteresis.effects.published_bouc_wen import run_published
+from piezo_hysteresis.model import Model
+
+FLAGS = (("-O3",), ("-O3", "-march=native"))
+LOOP = PublishedBoucWen()
+NUMBERS = np.array([LOOP[n] for n in ("A", "beta", "gamma", "p1", "p2")])
+SCALES = (10.0, 1e-5)
+PYTHON = 20
+"""Plain Python gets so many times fewer samples."""
+CHAINS: dict[str, tuple[Effect, ...]] = {
+    "Eq. (7)": (PublishedBoucWen(),),
+    "Eq. (7) + delay + ARX(8,8)": (PublishedBoucWen(), ARX),
+    "exact step": (BoucWen(),),
+    "exact step + delay + ARX(8,8)": (BoucWen(), ARX),
+}
+Work = Callable[[], np.ndarray]
+
+
+def python_loop(v: np.ndarray) -> np.ndarray:
+    """Eq. (6) and (7) in plain Python."""
+    a, beta, gamma, p1, p2 = NUMBERS.tolist()
+    h, last, w = 0.0, float(v[0]), []
+    for x in v.tolist():
+        dv = x - last
+        last = x
+        h += a * dv - beta * abs(dv) * h - gamma * dv * abs(h)
+        w.append(p1 * x * x * x + p2 * x + h)
+    return np.array(w)
+
+
+def python_chain(u: np.ndarray) -> np.ndarray:
+    """The loop in plain Python, the dynamics by `scipy.signal.lfilter`."""
+    w = python_loop(u / SCALES[0])
+    start = LOOP["p1"] * (u[0] / SCALES[0]) ** 3 + LOOP["p2"] * u[0] / SCALES[0]
+    taps = np.concatenate((np.zeros(round(ARX["delay"])), ARX.array("b")))
+    return SCALES[1] * (ARX.dc_gain * start + lfilter(taps, np.append(1.0, ARX.array("a")), w - start))
+
+
+def own_loop(v: np.ndarray) -> Work:
+    """Our kernel of Eq. (6) and (7)."""
+    p, w = np.array([LOOP[n] for n in ("A", "beta", "gamma", "n", "p1", "p2")]), np.empty_like(v)
+
+    def work() -> np.ndarray:
+        run_published(v, p, np.array([0.0, v[0]]), w)
+        return w
+
+    return work
+
+
+def own_chain(u: np.ndarray) -> Work:
+    """What a user calls: `Model.run`, checks and copies included."""
+    model = Model((LOOP, ARX), PERIOD, *SCALES)
+    return lambda: model.run(u, model.rest(float(u[0])))[0]
+
+
+def c_works(u: np.ndarray, loops: CLoops) -> tuple[Work, Work]:
+    """The loop and the chain in C."""
+    v, w, y = u / SCALES[0], np.empty(u.size + 100), np.empty(u.size)
+    a, b, delay = ARX.array("a"), ARX.array("b"), round(ARX["delay"])
+
+    def loop() -> np.ndarray:
+        loops.bouc_wen(v, NUMBERS, w)
+        return w[: v.size]
+
+    def chain() -> np.ndarray:
+        loops.chain(u, SCALES, NUMBERS, delay, a, b, w, y)
+        return y
+
+    return loop, chain
+
+
+def compare(u: np.ndarray) -> Figures:
+    """The published loop and chain: ours, C and Python."""
+    short, v = u[: u.size // PYTHON], u / SCALES[0]
+    cases: list[tuple[str, Work, Work]] = [
+        ("Eq. (6), (7)", own_loop(v), lambda: python_loop(short / SCALES[0])),
+        ("Eq. (7) + delay + ARX(8,8)", own_chain(u), lambda: python_chain(short)),
+    ]
+    rows: list[tuple[Cell, ...]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        built = [c_works(u, CLoops(Path(folder), flags)) for flags in FLAGS] if compiler() else []
+        for k, (name, own, python) in enumerate(cases):
+            peers = [works[k] for works in built]
+            for peer in peers:
+                np.testing.assert_allclose(peer(), own(), rtol=1e-9, atol=1e-12 * np.ptp(own()))
+            np.testing.assert_allclose(python(), own()[: short.size], rtol=1e-9, atol=1e-12 * np.ptp(own()))
+            mine, *others = seconds(own, *peers, repeats=9)
+            (slow,) = seconds(python, repeats=2)
+            c, python_speed = min(others, default=None), short.size / slow / 1e6
+            speed = u.size / mine / 1e6
+            beside = (u.size / c / 1e6, mine / c) if c else (None, None)
+            rows.append((name, speed, *beside, python_speed, speed / python_speed))
+    told = "gcc -O3" if compiler() else "gcc not found: no C beside it"
+    columns = ("loop", "M samples/s", "C, M samples/s", "time / C", "Python + lfilter", "faster than Python by")
+    return Figures(f"Kernels, {u.size:.0e} samples, {told}", columns, rows)
+
+
+def sensitivities(samples: int) -> Figures:
+    """Simulation of records, and what all sensitivities cost beside it."""
+    data, rows = record(samples), []
+    for name, effects in CHAINS.items():
+        model = Model(effects, PERIOD)
+        wanted = [n for n in model.values() if not model.row(n).fixed]
+        speed, ratio = measure(model, data, wanted)
+        rows.append((name, speed / 1e6, len(wanted), ratio))
+    columns = ("chain", "M samples/s", "numbers", "value + sensitivities / value")
+    return Figures(f"Sensitivities to every number, {samples:.0e} samples", columns, rows)
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    parser.add_argument("--samples", type=int, default=1_000_000)
+
+
+def run(options: argparse.Namespace) -> list[Figures]:
+    """Both tables."""
+    u = np.array(record(options.samples).voltage)
+    return [compare(u), sensitivities(options.samples)]
+
+
+if __name__ == "__main__":
+    alone(__name__)
