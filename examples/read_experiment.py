@@ -2,9 +2,9 @@
 
 import sys
 
-from piezo_hysteresis import recording
+from piezo_hysteresis import read
 
-experiment = recording.read(sys.argv[1])
+experiment = read(sys.argv[1])
 for record in experiment:
     volts, micrometres = record.voltage, record.displacement * 1e6
     print(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from piezo_hysteresis.model_file import load
+from piezo_hysteresis import load
 
 model = load(Path(__file__).parents[1] / "config" / "published_stage.yaml")
 

@@ -26,9 +26,8 @@ from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from piezo_hysteresis.identification.drive import DriveLimits
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import load
+from piezo_hysteresis import Model, load
+from piezo_hysteresis.identification import DriveLimits
 from piezo_hysteresis.nodes.conversions import values_of
 
 ROOT = Path(__file__).parents[2]

@@ -15,7 +15,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
-from piezo_hysteresis.model import Model
+from piezo_hysteresis import Model
 from piezo_hysteresis.model_file import loads
 from piezo_hysteresis.model_parameters import hash_number
 from piezo_hysteresis.nodes.cloud import from_cloud

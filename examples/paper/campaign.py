@@ -12,14 +12,17 @@ from functools import cache
 import published
 from numpy.typing import NDArray
 
-from piezo_hysteresis.identification.drive import DriveLimits
+from piezo_hysteresis import Experiment, Model, Record
+from piezo_hysteresis.identification import (
+    DriveLimits,
+    Identification,
+    Protocol,
+    ThreeSteps,
+    identify,
+    paper,
+    three_steps,
+)
 from piezo_hysteresis.identification.excitation import triangle
-from piezo_hysteresis.identification.identification import Identification
-from piezo_hysteresis.identification.identify import identify
-from piezo_hysteresis.identification.protocol import Protocol, paper
-from piezo_hysteresis.identification.three_steps import ThreeSteps, three_steps
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 

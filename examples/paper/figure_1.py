@@ -10,8 +10,8 @@ import published
 from exhibit import MEASURED, STATIC, Exhibit, canvas, main
 from numpy.typing import NDArray
 
+from piezo_hysteresis import Model
 from piezo_hysteresis.effects import Effect
-from piezo_hysteresis.model import Model
 
 
 def loop(effect: Effect, v: NDArray[np.float64]) -> NDArray[np.float64]:

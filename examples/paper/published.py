@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from piezo_hysteresis import load
 from piezo_hysteresis.effects import PublishedBoucWen
-from piezo_hysteresis.model_file import load
 
 MODEL = load(Path(__file__).parents[2] / "config" / "published_stage.yaml")
 """The Hammerstein-like cascade of Sec. 3.3 and 3.4 with the printed numbers; v = u/10 V fits Table 1."""

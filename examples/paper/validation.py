@@ -9,8 +9,7 @@ from campaign import experiment, last_period
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.record import Record
+from piezo_hysteresis import Model, Record
 
 
 def sine(operator: str, frequency: float) -> Record:
