@@ -23,7 +23,6 @@ from rich.table import Table
 from benchmarks.naming_cases import GROUPS, NOISES, Case, cases
 from piezo_hysteresis.discrepancy import diagnose
 from piezo_hysteresis.effects import BY_NAME
-from piezo_hysteresis.errors import PiezoError
 
 VISIBLE = 1.5
 """V of the refitted baseline above which an effect can be seen."""
@@ -78,11 +77,7 @@ def answer(case: Case) -> Outcome:
     """Make the data of a case and diagnose them; the time is the processor time of the diagnosis."""
     experiment = case.experiment()
     begin = time.process_time()
-    try:
-        found = diagnose(experiment, effects=case.library)
-    except PiezoError as error:
-        Console().print(f"[red]{case.label}: {error}")
-        raise
+    found = diagnose(experiment, effects=case.library)
     seconds = time.process_time() - begin
     selection, gap = found.selection, found.gap
     steps = selection.steps if selection is not None else ()
@@ -173,9 +168,14 @@ def main() -> None:
     options = parser.parse_args()
     seeds, noises = (1, (NOISES[1],)) if options.quick else (options.seeds, NOISES)
     wanted = [c for c in cases(tuple(options.groups), seeds, noises) if options.only in c.label][: options.cases]
-    console, outcomes = Console(), list[Outcome]()
+    console, outcomes, crashes = Console(), list[Outcome](), 0
     for k, case in enumerate(wanted, 1):
-        outcome = answer(case)
+        try:
+            outcome = answer(case)
+        except Exception as error:  # a crash is counted, and the campaign goes on
+            console.print(f"{k}/{len(wanted)} {case.label} seed {case.seed}: [red]{error!r}")
+            crashes += 1
+            continue
         outcomes.append(outcome)
         said = " and ".join(outcome.names) or outcome.verdict
         mark = "[red]false[/]" if outcome.is_false else "" if outcome.family_right else "[yellow]missed[/]"
@@ -190,6 +190,7 @@ def main() -> None:
             options.json.write_text(json.dumps([asdict(o) for o in outcomes], indent=1))
     for table in (confusion(outcomes), figures(outcomes), gaps(outcomes)):
         console.print(table)
+    console.print(f"{crashes} of {len(wanted)} diagnoses crashed")
     spent = np.array([o.seconds for o in outcomes])
     console.print(f"processor time per diagnosis: median {np.median(spent):.1f} s, longest {spent.max():.1f} s")
 

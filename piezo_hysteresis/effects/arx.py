@@ -13,6 +13,9 @@ from .effect import Effect, Place, Setting
 from .lag import LagBlock
 from .softened_block import SoftenedBlock, StaticSoftening
 
+LONGEST_DELAY = 1e6
+"""Longest dead time, and longest group delay near dc [samples]."""
+
 
 class Arx(Effect):
     """G(z) = B(z)/A(z)·z^(−d) from w to the position, Eq. (4) and (5).
@@ -51,7 +54,7 @@ class Arx(Effect):
     parameters = (
         Parameter("a", "a_i", "1", (), -1e3, 1e3, "denominator coefficients", "paper, Eq. (5)"),
         Parameter("b", "b_i", "1", (1.0,), -1e6, 1e6, "numerator coefficients", "paper, Eq. (5)"),
-        Parameter("delay", "d", "samples", 1.0, 1.0, 1e6, "dead time of the stage", "paper, Eq. (4)"),
+        Parameter("delay", "d", "samples", 1.0, 1.0, LONGEST_DELAY, "dead time of the stage", "paper, Eq. (4)"),
     )
 
     def check(self) -> None:
@@ -98,6 +101,11 @@ class Arx(Effect):
         lag_a, lag_b = power @ a / at_a, np.arange(b.size) @ b / at_b
         gain_slopes = np.concatenate((np.full(a.size, -at_b / at_a**2), np.full(b.size, 1.0 / at_a), [0.0]))
         lag_slopes = ratio * np.concatenate((-(power - lag_a) / at_a, (np.arange(b.size) - lag_b) / at_b, [1.0]))
+        if not self.group_delay <= LONGEST_DELAY:
+            raise ParameterError(
+                f"arx: got a group delay of {self.group_delay:.3g} samples near dc, expected at most "
+                f"{LONGEST_DELAY:g}; B(1) or A(1) all but vanishes"
+            )
         lag = max(0.0, ratio * self.group_delay)
         slow = LagBlock(names, self.dc_gain, lag, gain_slopes, lag_slopes)
         return SeriesBlock((StaticSoftening(*softening[0]), slow)) if softening else slow

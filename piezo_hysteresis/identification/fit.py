@@ -167,8 +167,10 @@ def fit(
     while iterations < max_iterations and not converged:
         hessian = directions.T @ total[:-1, :-1] @ directions
         slope = directions.T @ total[:-1, -1]
-        diagonal = np.diag(hessian).copy()
-        diagonal[diagonal <= 0] = 1.0
+        # a number without influence: rounding may leave it below zero
+        idle = np.diag(hessian) <= np.finfo(float).tiny
+        hessian[idle, :] = hessian[:, idle] = 0.0
+        diagonal = np.where(idle, 1.0, np.diag(hessian))
         low, high = _box(lower, theta, directions, -np.inf), _box(upper, theta, directions, np.inf)
         while True:
             step = directions @ bounded_step(hessian + np.diag(damping * diagonal), slope, low, high)

@@ -17,6 +17,9 @@ from ..record import Record
 
 Array = NDArray[np.float64]
 
+RUNAWAY = 1e100
+"""Inner products beyond this are those of a simulation that diverges."""
+
 
 @dataclass(frozen=True, slots=True)
 class Nuisance:
@@ -110,7 +113,7 @@ def grams(
         more = extra[index][:, part] if extra else np.empty((0, y.size))
         rows = np.vstack((*(slopes[n] for n in wanted), more, residual, nuisance.rows(record, part)))
         product = rows @ rows.T
-        if not np.isfinite(product).all():
+        if not np.abs(product).max() < RUNAWAY:
             raise DivergenceError(model.effects[-1].name, part.start, part.start * record.sample_period)
         if index == len(sums):
             sums.append(product)
