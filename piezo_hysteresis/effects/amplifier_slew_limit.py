@@ -11,6 +11,7 @@ from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
 from .extent import Extent
+from .held_block import HeldBlock
 
 UNLIMITED = 1e9
 
@@ -79,35 +80,17 @@ def linearise_limit(x, dx, reach, period, state, tangent, y, dy):
     state[0] = held
 
 
-class AmplifierSlewLimitBlock(Block):
-    """State [y]."""
+class AmplifierSlewLimitBlock(HeldBlock):
+    """y_i = max(y_(i−1) − S T, min(y_(i−1) + S T, x_i))."""
 
-    keeps_state = True
     names = ("amplifier_slew_limit.S",)
 
     def __init__(self, slope: float, sample_period: float) -> None:
         self.reach = slope * sample_period if slope < UNLIMITED else np.inf
         self.sample_period = sample_period
 
-    def static(self, x0: float) -> float:
-        return x0
-
-    def static_slopes(self, x0: float) -> tuple[float, Array]:
-        return 1.0, np.zeros(1)
-
-    def rest(self, x0: float, time: float) -> State:
-        return np.array([x0])
-
-    def run(self, x: Array, state: State) -> tuple[Array, State]:
-        y, state = np.empty_like(x), state.copy()
+    def follow(self, x: Array, state: State, y: Array) -> None:
         run_limit(x, self.reach, state, y)
-        return y, state
 
-    def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.append(dx0, 0.0)
-
-    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
-        rows = np.empty((len(dx) + 1, x.size))
-        linearise_limit(x, np.ascontiguousarray(dx), self.reach, self.sample_period, state, tangent, y, rows)
-        return y, rows, state, tangent
+    def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
+        linearise_limit(x, dx, self.reach, self.sample_period, state, tangent, y, dy)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..kernel import kernel
 from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
+from .held_block import HeldBlock
 
 
 class Backlash(Effect):
@@ -65,34 +64,16 @@ def linearise_play(x, dx, b, state, tangent, y, dy):
     state[0] = held
 
 
-class BacklashBlock(Block):
-    """State [y]."""
+class BacklashBlock(HeldBlock):
+    """The play, centred at rest."""
 
-    keeps_state = True
     names = ("backlash.b",)
 
     def __init__(self, b: float) -> None:
         self.b = b
 
-    def static(self, x0: float) -> float:
-        return x0
-
-    def static_slopes(self, x0: float) -> tuple[float, Array]:
-        return 1.0, np.zeros(1)
-
-    def rest(self, x0: float, time: float) -> State:
-        return np.array([x0])
-
-    def run(self, x: Array, state: State) -> tuple[Array, State]:
-        y, state = np.empty_like(x), state.copy()
+    def follow(self, x: Array, state: State, y: Array) -> None:
         run_play(x, self.b, state, y)
-        return y, state
 
-    def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.append(dx0, 0.0)
-
-    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
-        rows = np.empty((len(dx) + 1, x.size))
-        linearise_play(x, np.ascontiguousarray(dx), self.b, state, tangent, y, rows)
-        return y, rows, state, tangent
+    def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
+        linearise_play(x, dx, self.b, state, tangent, y, dy)

@@ -29,7 +29,7 @@ def test_backlash_never_leaves_its_play_and_moves_only_when_pushed(x: list[float
     assert (np.abs(y - drive) <= b + 1e-15).all()
     moved = np.diff(y) != 0
     np.testing.assert_allclose(np.abs(y - drive)[1:][moved], b, atol=1e-15)
-    assert (np.diff(y)[moved] * np.diff(drive)[moved] > 0).all()
+    assert (np.sign(np.diff(y)[moved]) == np.sign(np.diff(drive)[moved])).all()
 
 
 def test_backlash_is_blind_below_its_half_width() -> None:

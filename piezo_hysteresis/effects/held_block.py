@@ -1,0 +1,46 @@
+"""`HeldBlock`: an output that follows the input as far as one number lets it, and is held in between."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+
+from .block import Array, Block, State
+
+
+class HeldBlock(Block):
+    """State [y]; settled on its input at rest, with one parameter of its own that plays no part there."""
+
+    keeps_state = True
+
+    @abstractmethod
+    def follow(self, x: Array, state: State, y: Array) -> None:
+        """Write the next samples to y (n,) and the last one to `state`."""
+
+    @abstractmethod
+    def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
+        """`follow`, with rows dx (m, n) to dy (m + 1, n); `tangent` (m + 1,) is updated."""
+
+    def static(self, x0: float) -> float:
+        return x0
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return 1.0, np.zeros(1)
+
+    def rest(self, x0: float, time: float) -> State:
+        return np.array([x0])
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        y, state = np.empty_like(x), state.copy()
+        self.follow(x, state, y)
+        return y, state
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return np.append(dx0, 0.0)
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
+        rows = np.empty((len(dx) + 1, x.size))
+        self.follow_tangent(x, np.ascontiguousarray(dx), state, tangent, y, rows)
+        return y, rows, state, tangent
