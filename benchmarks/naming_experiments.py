@@ -86,10 +86,10 @@ def noise(rms, duration, rng):
 
 
 def multisine(rms, rng, fundamental=20.0, top=1500.0, periods=3):
-    """Odd multisine with random phases around 3.5 V."""
+    """Odd multisine with random phases around 3.5 V, inside 0 to 7 V."""
     t = np.arange(0, periods / fundamental, NATIVE)
     x = sum(np.cos(2 * np.pi * f * t + rng.uniform(0, 2 * np.pi)) for f in np.arange(fundamental, top, 2 * fundamental))
-    return 3.5 + rms * x / x.std()
+    return 3.5 + x * min(rms / x.std(), 3.4 / np.abs(x).max())
 
 
 def ladder(levels, hold, rate, dt):

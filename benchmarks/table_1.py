@@ -11,14 +11,14 @@ published percentages.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.optimize import least_squares
 
+from benchmarks.figures import Cell, Figures, alone
 from piezo_hysteresis.effects import (
     AmplifierBandwidth,
     AmplifierSlewLimit,
@@ -223,23 +223,27 @@ def explain(suspect: Suspect) -> Explanation:
     return Explanation(suspect, found.x, *rows(found.x))
 
 
-def main() -> None:
-    """Print the ranking."""
-    console = Console()
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """No options."""
+
+
+def run(options: argparse.Namespace) -> list[Figures]:
+    """The ranking."""
     ranked = sorted((explain(s) for s in suspects()), key=lambda e: e.misfit)
-    heads = [f"{f} Hz" for f in FREQUENCIES]
-    console = Console(width=max(console.width, 130))
-    table = Table("missing effect", "numbers", "misfit, points", "row", *heads, title="both rows of Table 1, %")
-    table.add_row("(published)", "", "", "dynamic", *(f"{x:.2f}" for x in DYNAMIC))
-    table.add_row("", "", "", "alone", *(f"{x:.2f}" for x in ALONE), end_section=True)
+    rows: list[tuple[Cell, ...]] = [
+        ("(published)", "", None, "dynamic", *map(float, DYNAMIC)),
+        ("", "", None, "alone", *map(float, ALONE)),
+    ]
     for e in ranked:
         numbers = ", ".join(f"{x:.3g}" for x in e.numbers[: len(e.suspect.start)])
         if e.suspect.trim:
             numbers += f"{', ' if numbers else ''}{e.numbers[-1]:+.1f} µs"
-        table.add_row(e.suspect.name, numbers, f"{e.misfit:.2f}", "dynamic", *(f"{x:.2f}" for x in e.dynamic))
-        table.add_row("", "", "", "alone", *(f"{x:.2f}" for x in e.alone))
-    console.print(table)
+        rows.append((e.suspect.name, numbers, e.misfit, "dynamic", *e.dynamic.tolist()))
+        rows.append(("", "", None, "alone", *e.alone.tolist()))
+    heads = (f"{f} Hz" for f in FREQUENCIES)
+    columns = ("missing effect", "numbers", "misfit, points", "row", *heads)
+    return [Figures("Both rows of Table 1, %", columns, rows)]
 
 
 if __name__ == "__main__":
-    main()
+    alone(__name__)
