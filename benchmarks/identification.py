@@ -136,7 +136,7 @@ def state(converged: bool) -> str:
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
     parser.add_argument("--seeds", type=int, default=4, help="260 000 samples each")
-    parser.add_argument("--limit", type=int, default=30, help="steps of scipy at most")
+    parser.add_argument("--limit", type=int, default=60, help="steps of scipy at most")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:

@@ -2,7 +2,8 @@
 
 The driver plays sines and slow loops without a pause; this process is the recorder and writes every topic to a bag, in
 which the samples are counted afterwards. Latency counts from the last sample of a block to its residual in the
-recorder's hands. The exit code is 1 where a sample is missing or doubled, or was played at another voltage than was commanded.
+recorder's hands. The exit code is 1 where a sample is missing, doubled, or was played at another voltage than was
+commanded.
 
     python -m benchmarks.streaming --rate 50e3 200e3 --seconds 30
 """
@@ -49,7 +50,7 @@ LONGEST = 500_000
 PATIENCE = 60.0
 CATCH_UP = 5.0
 """What the model node may be behind at the end [s]; what comes later counts as lost."""
-HALF_STEP = 0.5 * 20.0 / 2**16
+STEP = 20.0 / 2**16
 """Of the 16-bit converter of the simulated stage [V]: the recording holds what was applied."""
 
 
@@ -210,9 +211,9 @@ def count(bag: Path, commands: list[Command]) -> tuple[dict[str, Cell], list[str
     for k, command in enumerate(commands):
         own = (at - (command.first - first)) % 2**32
         inside = own < command.voltage.size
-        other = int((np.abs(played[inside] - command.voltage[own[inside]]) > 1.001 * HALF_STEP).sum())
+        other = int((np.abs(played[inside] - command.voltage[own[inside]]) > 1.001 * STEP).sum())
         if other:
-            failures.append(f"command {k}: {other} samples further from the command than half a converter step")
+            failures.append(f"command {k}: {other} samples further from the command than a converter step")
     middle, late, latest = np.percentile(latencies, (50, 99, 100)).tolist()
     return {
         "samples sent by the driver": sent,
