@@ -23,7 +23,11 @@ setup(
     ],
     python_requires=">=3.11",
     install_requires=["h5py", "matplotlib", "mcap", "numba", "numpy", "PyYAML", "rich", "rosbags", "scipy"],
-    extras_require={"test": ["hypothesis", "pytest"]},
+    extras_require={
+        "hardware": ["nidaqmx[grpc]"],
+        "test": ["hypothesis", "pytest"],
+        "test-hardware": ["nidaqmx[grpc]==1.7.0", "pipython==2.11.0.6"],
+    },
     zip_safe=True,
     entry_points={
         "console_scripts": [

@@ -5,31 +5,43 @@ from __future__ import annotations
 import argparse
 import threading
 
+from ..stage.daqmx.emulator.card import FAULTS, Card
+from ..stage.daqmx.emulator.server import Server as NiServer
 from ..stage.gcs2.emulator.controller import Controller
 from ..stage.gcs2.emulator.faults import LASTING, ONCE, Fault
-from ..stage.gcs2.emulator.server import Server
+from ..stage.gcs2.emulator.server import Server as Gcs2Server
 from ..stage.simulated import SimulatedStage
 from .plant_option import add_plant_arguments, plant
 from .terminal import console
 
+_PORT = {"gcs2": 50000, "nidaqmx": 31763}
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
+    gcs2_faults = {**{kind: what for kind, (_, what) in ONCE.items()}, **LASTING}
     listed = "\n".join(
-        f"  {kind:18s}{what}" for kind, what in (*((k, w) for k, (_, w) in ONCE.items()), *LASTING.items())
+        f"{name}:\n" + "\n".join(f"  {kind:18s}{what}" for kind, what in faults.items())
+        for name, faults in (
+            ("faults of gcs2, as KIND, KIND@COMMAND or KIND@COMMAND:OCCURRENCE=VALUE", gcs2_faults),
+            ("faults of nidaqmx", FAULTS),
+        )
     )
     parser = subparsers.add_parser(
-        "emulate",
-        description=__doc__,
-        epilog=f"faults, as KIND, KIND@COMMAND or KIND@COMMAND:OCCURRENCE=VALUE:\n{listed}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "emulate", description=__doc__, epilog=listed, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("controller", choices=("gcs2",), help="what is emulated: a PI GCS 2.0 controller")
+    parser.add_argument(
+        "device",
+        choices=tuple(_PORT),
+        help="gcs2: a PI GCS 2.0 controller; nidaqmx: an NI gRPC device server with a card",
+    )
     parser.add_argument("--host", default="127.0.0.1", help="address to listen at (default: this machine only)")
-    parser.add_argument("--port", type=int, default=50000, help="TCP port, 0 for any free one (default: 50000)")
+    parser.add_argument("--port", type=int, help=f"TCP port, 0 for any free one (default: {_PORT})")
     add_plant_arguments(parser)
-    parser.add_argument("--servo-time", metavar="S", type=float, default=50e-6, help="[s] (default: 5e-05)")
-    parser.add_argument("--command-per-volt", metavar="C", type=float, default=1.0, help="SVA over piezo volt")
+    parser.add_argument("--servo-time", metavar="S", type=float, default=50e-6, help="of gcs2 [s] (default: 5e-05)")
+    parser.add_argument(
+        "--command-per-volt", metavar="C", type=float, default=1.0, help="of gcs2: open-loop command over piezo volt"
+    )
     parser.add_argument("--fault", action="append", default=[], metavar="FAULT", help="a failure to play; repeatable")
     parser.set_defaults(run=run)
 
@@ -42,18 +54,22 @@ def run(args: argparse.Namespace) -> int:
     ParameterError, StageError
         On a plant, a fault or a port that is not acceptable.
     """
-    faults = [Fault.parse(text) for text in args.fault]
     parameters, _ = plant(args)
-    stage = SimulatedStage(parameters, seed=args.seed, sample_period=args.servo_time)
-    controller = Controller(
-        stage, serial=str(args.seed), command_per_volt=args.command_per_volt, faults=faults, speed=1.0
-    )
-    with Server(controller, args.host, args.port) as server:
-        gain = stage.description.amplifier_gain
+    port = _PORT[args.device] if args.port is None else args.port
+    period = args.servo_time if args.device == "gcs2" else 20e-6
+    stage = SimulatedStage(parameters, seed=args.seed, sample_period=period)
+    server: Gcs2Server | NiServer
+    if args.device == "gcs2":
+        faults = [Fault.parse(text) for text in args.fault]
+        controller = Controller(stage, serial=str(args.seed), command_per_volt=args.command_per_volt, faults=faults)
+        server = Gcs2Server(controller, args.host, port)
+    else:
+        server = NiServer(Card(stage, faults=args.fault), args.host, port)
+    d = stage.description
+    with server:
         console().print(
-            f"GCS 2.0 at {server.host}:{server.port}, axis 1, servo time {args.servo_time:g} s, "
-            f"{stage.description.voltage_min * gain:g} to {stage.description.voltage_max * gain:g} V at the piezo; "
-            "end with Ctrl-C"
+            f"{args.device} emulated at {args.host}:{server.port}, drive {d.voltage_min:g} to {d.voltage_max:g} V, "
+            f"amplifier gain {d.amplifier_gain:g}; end with Ctrl-C"
         )
         try:
             threading.Event().wait()

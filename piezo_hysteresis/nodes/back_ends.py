@@ -16,7 +16,7 @@ from ..stage.plant import PlantParameters
 from ..stage.replay import ReplayStage
 from ..stage.simulated import SimulatedMemoryStage, SimulatedStage
 from ..stage.stage import Stage
-from .devices import GCS2, open_gcs2
+from .devices import GCS2, NIDAQMX, open_gcs2, open_nidaqmx
 from .parameters import Row, Setting
 
 
@@ -106,6 +106,7 @@ BACK_ENDS: Mapping[str, BackEnd] = {
     "simulated": BackEnd(_SIMULATED, _open_simulated, is_device=False),
     "replay": BackEnd(_REPLAY, _open_replay, is_device=False),
     "gcs2": BackEnd(GCS2, open_gcs2, is_device=True),
+    "nidaqmx": BackEnd(NIDAQMX, open_nidaqmx, is_device=True),
 }
 """Every back end by its word."""
 

@@ -7,13 +7,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..parameter import Parameter
+from ..stage.daqmx.setup import DaqmxSetup
+from ..stage.daqmx.stage import DaqmxStage
 from ..stage.gcs2.setup import Gcs2Setup
 from ..stage.gcs2.stage import Gcs2Stage
 from ..stage.stage import Stage
 from .parameters import Row, Setting
 
 _UNVERIFIED = "not verified on a device: docs/hardware.md"
-_GCS2 = Gcs2Setup(host="-")
+_GCS2, _DAQMX = Gcs2Setup(host="-"), DaqmxSetup(device="-")
 
 GCS2: tuple[Row, ...] = (
     Setting("host", "", "name or address of the controller"),
@@ -42,8 +44,37 @@ GCS2: tuple[Row, ...] = (
 )
 """Of a stage on a controller that speaks GCS 2.0."""
 
+NIDAQMX: tuple[Row, ...] = (
+    Setting("device", "", "name of the card, as NI MAX shows it"),
+    Setting("output", _DAQMX.output, "analogue output that drives the amplifier"),
+    Setting("displacement_input", _DAQMX.displacement_input, "analogue input of the position sensor"),
+    Setting("voltage_input", _DAQMX.voltage_input, "analogue input of the amplifier's monitor; empty: none"),
+    Setting("server", _DAQMX.server, "host:port of an NI gRPC device server; empty: the driver on this machine"),
+    Parameter("sample_period_min", "", "s", _DAQMX.sample_period_min, 1e-9, 1.0, "shortest sample period", "the card"),
+    Parameter("lead", "", "s", _DAQMX.lead, 1e-3, 10.0, "output that waits in the buffer: the latency", "the machine"),
+    Parameter("voltage_min", "u_min", "V", _DAQMX.voltage_min, -10.0, 10.0, "lowest drive voltage", "rig"),
+    Parameter("voltage_max", "u_max", "V", _DAQMX.voltage_max, -10.0, 10.0, "highest drive voltage", "rig"),
+    Parameter("max_slew_rate", "S", "V/s", 0.0, 0.0, 1e12, "steepest drive; 0: no limit but the amplifier's", "rig"),
+    Parameter("safe_voltage", "u_s", "V", 0.0, -10.0, 10.0, "drive voltage of the stage at rest", "rig"),
+    Parameter(
+        "amplifier_gain", "G_a", "V/V", _DAQMX.amplifier_gain, -1e4, 1e4, "piezo voltage over drive voltage", "rig"
+    ),
+    Parameter("monitor_gain", "", "V/V", _DAQMX.monitor_gain, -1e3, 1e3, "monitor voltage over piezo voltage", "rig"),
+    Parameter("sensor_gain", "", "m/V", _DAQMX.sensor_gain, -1.0, 1.0, "displacement over sensor voltage", "rig"),
+    Parameter("sensor_range", "", "V", _DAQMX.sensor_range, 1e-3, 10.0, "the inputs span ± this voltage", "the card"),
+    Parameter("io_delay", "", "s", 0.0, 0.0, 1.0, "delay of the card itself, from a loop-back", "loop_back_delay"),
+)
+"""Of a stage on a National Instruments card."""
+
 
 def open_gcs2(values: Mapping[str, Any], _: float) -> Stage:
     """Connect to a GCS 2.0 controller; StageError if it is not there or not what the values say."""
     slew = values["max_slew_rate"] or math.inf
     return Gcs2Stage(Gcs2Setup(**{**values, "max_slew_rate": slew}))
+
+
+def open_nidaqmx(values: Mapping[str, Any], sample_period: float) -> Stage:
+    """Open a stage on a National Instruments card; StageError if it is not there or not what the values say."""
+    slew = values["max_slew_rate"] or math.inf
+    period = {"sample_period": sample_period} if sample_period else {}
+    return DaqmxStage(DaqmxSetup(**{**values, "max_slew_rate": slew, **period}))

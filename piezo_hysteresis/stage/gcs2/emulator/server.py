@@ -42,9 +42,11 @@ class Server:
         self._controller, self._turn, self._ended = controller, threading.Lock(), threading.Event()
         self._links: set[socket.socket] = set()
         self._threads: list[threading.Thread] = []
+        if not 0 <= port <= 65535:
+            raise StageError(f"gcs2 emulator: got port {port}, expected 0 to 65535")
         try:
             self._listener = socket.create_server((host, port))
-        except (OSError, OverflowError) as error:
+        except OSError as error:
             raise StageError(f"gcs2 emulator: cannot listen at {host}:{port} ({error}); name another port") from None
         self.host, self.port = host, int(self._listener.getsockname()[1])
 

@@ -1,0 +1,89 @@
+"""`DaqmxSetup`: how amplifier and sensor are wired to a card, and their scales."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ...errors import StageError
+
+
+@dataclass(frozen=True, slots=True)
+class DaqmxSetup:
+    """Wiring and scales of one axis.
+
+    Parameters
+    ----------
+    device : str
+        Name of the card, as NI MAX shows it.
+    output : str
+        Analogue output that drives the amplifier.
+    displacement_input : str
+        Analogue input of the position sensor.
+    voltage_input : str
+        Analogue input of the amplifier's monitor; empty where the drive is not measured.
+    server : str
+        ``host:port`` of an NI gRPC device server; empty for the driver on this machine.
+    sample_period : float
+        Time between samples [s].
+    sample_period_min : float
+        Shortest period the card is to be used at [s].
+    lead : float
+        Output that waits in the buffer of the card [s]: its latency, and how late a block may come.
+    voltage_min, voltage_max : float
+        Limits of the drive before the amplifier [V].
+    max_slew_rate : float
+        Steepest drive [V/s]; also the way to the safe voltage.
+    safe_voltage : float
+        Drive voltage of the stage at rest [V].
+    amplifier_gain : float
+        Piezo voltage over drive voltage [V/V].
+    monitor_gain : float
+        Voltage at `voltage_input` over piezo voltage [V/V].
+    sensor_gain : float
+        Displacement over sensor voltage [m/V].
+    sensor_range : float
+        The sensor's output and the inputs span ± this voltage [V].
+    io_delay : float
+        Delay of the card from output to input, measured by `loop_back_delay` [s]. Its whole samples are taken off, so
+        that the rest belongs to the stage; irrelevant where the drive is measured.
+    timeout : float
+        Longest wait for samples beyond their own time [s].
+
+    Raises
+    ------
+    StageError
+        On a value that cannot be.
+    """
+
+    device: str
+    output: str = "ao0"
+    displacement_input: str = "ai0"
+    voltage_input: str = ""
+    server: str = ""
+    sample_period: float = 20e-6
+    sample_period_min: float = 4e-6
+    lead: float = 0.1
+    voltage_min: float = 0.0
+    voltage_max: float = 10.0
+    max_slew_rate: float = math.inf
+    safe_voltage: float = 0.0
+    amplifier_gain: float = 20.0
+    monitor_gain: float = 0.1
+    sensor_gain: float = 6e-6
+    sensor_range: float = 10.0
+    io_delay: float = 0.0
+    timeout: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in ("device", "output", "displacement_input"):
+            if not getattr(self, name):
+                raise StageError(f"daqmx.{name}: got no name, expected one as NI MAX shows it")
+        for name in ("sample_period", "sample_period_min", "lead", "max_slew_rate", "sensor_range", "timeout"):
+            if not getattr(self, name) > 0:
+                raise StageError(f"daqmx.{name}: got {getattr(self, name)!r}, expected more than 0")
+        for name in ("amplifier_gain", "monitor_gain", "sensor_gain"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) != 0):
+                raise StageError(f"daqmx.{name}: got {getattr(self, name)!r}, expected a number other than 0")
+        if not 0 <= self.io_delay < 1:
+            raise StageError(f"daqmx.io_delay: got {self.io_delay!r} s, expected 0 to 1 s")

@@ -1,0 +1,137 @@
+"""`Tasks`: the output and the input task of a card, running on one clock. Nothing else calls NI-DAQmx."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ...errors import StageError
+from ..description import Samples
+from .setup import DaqmxSetup
+
+
+class DaqmxError(StageError):
+    """NI-DAQmx reports a fault."""
+
+
+class Tasks:
+    """Tasks on a card, through the local driver or a gRPC device server.
+
+    Parameters
+    ----------
+    setup : DaqmxSetup
+
+    Raises
+    ------
+    StageError
+        If the package ``nidaqmx`` is not installed.
+    """
+
+    def __init__(self, setup: DaqmxSetup) -> None:
+        try:
+            import nidaqmx
+        except ImportError:
+            raise StageError(
+                "NI-DAQmx: the package nidaqmx is not installed, expected it; pip install 'nidaqmx[grpc]'"
+            ) from None
+        self._setup, self._nidaqmx = setup, nidaqmx
+        self._channel: Any = None
+        self._output: Any = None
+        self._input: Any = None
+        if setup.server:
+            import grpc
+
+            unlimited = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
+            self._channel = grpc.insecure_channel(setup.server, options=unlimited)
+
+    @property
+    def is_running(self) -> bool:
+        """True while output and input stream."""
+        return self._output is not None
+
+    def start(self, sample_period: float, first: Samples) -> None:
+        """Stream from now on: output without regeneration, beginning with `first`; input on the output's clock."""
+        s, constants = self._setup, self._nidaqmx.constants
+        size = max(4 * first.size, round(1.0 / sample_period))
+        continuous = constants.AcquisitionType.CONTINUOUS
+        with self._faults("starting output and input"):
+            try:
+                self._output, self._input = self._output_task(), self._input_task()
+                self._output.timing.cfg_samp_clk_timing(1 / sample_period, sample_mode=continuous, samps_per_chan=size)
+                self._output.out_stream.regen_mode = constants.RegenerationMode.DONT_ALLOW_REGENERATION
+                self._input.timing.cfg_samp_clk_timing(
+                    1 / sample_period, f"/{s.device}/ao/SampleClock", sample_mode=continuous, samps_per_chan=size
+                )
+                self._output.write(first, auto_start=False)
+                self._input.start()  # waits for the clock of the output
+                self._output.start()
+            except BaseException:
+                self.stop()
+                raise
+
+    def write(self, drive: Samples) -> None:
+        """Append drive voltages [V] to the output."""
+        with self._faults("writing output"):
+            self._output.write(drive, auto_start=False, timeout=self._setup.timeout)
+
+    def read(self, count: int) -> Samples:
+        """The next input voltages [V], shape (channels, count)."""
+        with self._faults("reading input"):
+            values = self._input.read(count, timeout=self._setup.timeout + self._setup.lead)
+        samples = np.atleast_2d(np.asarray(values, dtype=np.float64))
+        if samples.shape[1] != count:
+            raise DaqmxError(f"NI-DAQmx: got {samples.shape[1]} samples, expected {count}")
+        return samples
+
+    def stop(self) -> None:
+        """End both tasks; the output holds its last voltage."""
+        tasks, self._output, self._input = (self._output, self._input), None, None
+        for task in tasks:
+            if task is not None:
+                with self._faults("closing a task"):
+                    task.close()
+
+    def write_once(self, drive: float) -> None:
+        """Put out one voltage [V] without a clock."""
+        with self._faults("writing one voltage"), self._output_task() as task:
+            task.write(drive, auto_start=True)
+
+    def read_once(self) -> Samples:
+        """One reading of every input [V], without a clock."""
+        with self._faults("reading one sample"), self._input_task() as task:
+            return np.atleast_1d(np.asarray(task.read(), dtype=np.float64))
+
+    def close(self) -> None:
+        """Release the link to a server."""
+        if self._channel is not None:
+            self._channel.close()
+
+    def _task(self) -> Any:
+        if self._channel is None:
+            return self._nidaqmx.Task()
+        return self._nidaqmx.Task(grpc_options=self._nidaqmx.GrpcSessionOptions(self._channel, ""))
+
+    def _output_task(self) -> Any:
+        s, task = self._setup, self._task()
+        task.ao_channels.add_ao_voltage_chan(f"{s.device}/{s.output}", min_val=s.voltage_min, max_val=s.voltage_max)
+        return task
+
+    def _input_task(self) -> Any:
+        s, task = self._setup, self._task()
+        for name in (s.displacement_input, s.voltage_input):
+            if name:
+                channels = task.ai_channels
+                channels.add_ai_voltage_chan(f"{s.device}/{name}", min_val=-s.sensor_range, max_val=s.sensor_range)
+        return task
+
+    @contextmanager
+    def _faults(self, doing: str) -> Iterator[None]:
+        errors = self._nidaqmx.errors
+        try:
+            yield
+        except (errors.Error, OSError, ValueError) as error:
+            words = " ".join(str(error).split())
+            raise DaqmxError(f"NI-DAQmx, {self._setup.device}: {doing} failed: {words[:300]}") from None

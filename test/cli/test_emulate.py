@@ -1,0 +1,50 @@
+"""``piezo emulate`` is a device for whoever connects, until it is interrupted."""
+
+import re
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
+from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
+from piezo_hysteresis.stage.gcs2.setup import Gcs2Setup
+from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
+
+
+def opened(device, port):
+    if device == "gcs2":
+        return Gcs2Stage(Gcs2Setup("127.0.0.1", port, amplifier_gain=20.0))
+    return DaqmxStage(DaqmxSetup("Dev1", server=f"127.0.0.1:{port}"))
+
+
+@pytest.mark.parametrize("device", ["gcs2", "nidaqmx"])
+def test_a_process_that_is_a_device(device):
+    if device == "nidaqmx":
+        pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
+    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "emulate", device, "--port", "0", "--noise", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            said = process.stdout.readline()
+            stage = opened(device, int(re.search(r"127\.0\.0\.1:(\d+)", said)[1]))
+            stage.set_voltage(3.0)
+            assert stage.voltage == 3.0
+            assert np.isfinite(stage.read_displacement())
+            stage.close()
+        finally:
+            process.send_signal(signal.SIGINT)
+        assert "ended" in process.stdout.read()
+        assert process.wait() == 0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("gcs2", "--fault", "earthquake"), ("gcs2", "--port", "99999"), ("gcs2", "--servo-time", "0")],
+)
+def test_what_cannot_be_emulated_is_one_line(piezo, words):
+    done = piezo("emulate", *words)
+    assert done.status == 2
+    assert done.err.count("\n") == 1
+    assert "expected" in done.err or "cannot listen" in done.err

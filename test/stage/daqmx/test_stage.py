@@ -1,0 +1,171 @@
+"""NI's own client, unmodified, streams through our back end to the emulated card over real gRPC."""
+
+import math
+import sys
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
+pytest.importorskip("grpc")
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.daqmx.emulator.card import Card
+from piezo_hysteresis.stage.daqmx.emulator.server import Server
+from piezo_hysteresis.stage.daqmx.loop_back import loop_back_delay
+from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
+from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
+from piezo_hysteresis.stage.simulated import SimulatedStage
+from piezo_hysteresis.stage.stage import Stage, StreamingStage
+
+TS = 20e-6
+WAVE = 2.0 - 2.0 * np.cos(2 * np.pi * np.arange(4000) / 2000)
+LEAD = 500
+
+
+@pytest.fixture
+def opened():
+    """Make an emulated card and the back end on it."""
+    made = []
+
+    def make(*faults, plant=None, speed=math.inf, **changes):
+        card = Card(SimulatedStage(plant, seed=3), speed=speed, faults=faults)
+        server = Server(card).__enter__()
+        made.append(server)
+        setup = {"voltage_input": "ai1", "lead": LEAD * TS} | changes
+        return card, DaqmxStage(DaqmxSetup("Dev1", server=f"127.0.0.1:{server.port}", **setup))
+
+    yield make
+    for server in made:
+        server.close()
+
+
+def streamed(stage, drive, *cuts):
+    parts = [stage.exchange(block) for block in np.split(drive, cuts)]
+    return (np.concatenate([getattr(p, name) for p in parts]) for name in ("voltage", "displacement"))
+
+
+def test_it_is_a_streaming_stage_that_says_how_late_it_is(opened):
+    card, stage = opened()
+    promised = {name for part in (Stage, StreamingStage) for name in vars(part) if not name.startswith("_")}
+    assert promised <= set(dir(stage))
+    assert stage.description.streaming and stage.description.measured_voltage
+    assert stage.description.latency == LEAD * TS
+    assert card.voltage == stage.voltage == 0.0, "opening moves nothing"
+    stage.close()
+
+
+@pytest.mark.parametrize("monitor", ["ai1", ""])
+def test_a_stream_gives_what_the_simulated_stage_gives(opened, ideal, monitor):
+    _, stage = opened(plant=ideal(), voltage_input=monitor)
+    voltage, displacement = streamed(stage, WAVE, 1, 700, 2000, 2001)
+    expected = SimulatedStage(ideal(), sample_period=TS).play(np.r_[np.zeros(LEAD), WAVE], initial_voltage=0.0)
+    np.testing.assert_allclose(voltage, expected.voltage[: WAVE.size], atol=1e-12)
+    np.testing.assert_allclose(displacement, expected.displacement[: WAVE.size], rtol=1e-9, atol=1e-15)
+    stage.close()
+
+
+def test_a_stream_ends_safe_and_nothing_in_the_buffer_is_lost(opened):
+    card, stage = opened(max_slew_rate=2000.0)
+    stage.exchange(np.linspace(0.0, 4.0, 200))
+    assert card.voltage == 4.0 or card.voltage == pytest.approx(4.0, abs=2e-4)
+    stage.safe()
+    assert card.voltage == stage.voltage == 0.0
+    stage.exchange(np.full(10, 0.01))
+    stage.close()
+    assert card.voltage == 0.0
+    with pytest.raises(StageError, match="closed"):
+        stage.exchange(np.zeros(1))
+
+
+def test_slow_path_sets_and_reads(opened, ideal):
+    _, stage = opened(plant=ideal())
+    stage.exchange(np.full(100, 1.0))
+    stage.set_voltage(4.0)
+    simulated = SimulatedStage(ideal(), sample_period=TS)
+    simulated.play(np.r_[np.zeros(LEAD), np.full(100 + LEAD, 1.0)], initial_voltage=0.0)
+    simulated.set_voltage(4.0)
+    for _ in range(4):
+        assert stage.read_displacement() == pytest.approx(simulated.read_displacement(), rel=1e-6)
+    stage.close()
+
+
+def test_what_breaks_a_limit_is_not_put_out(opened):
+    card, stage = opened()
+    for drive in ([10.1], [-0.1], [math.nan], []):
+        with pytest.raises(StageError, match="expected"):
+            stage.exchange(np.array(drive))
+    assert card.voltage == 0.0
+    stage.close()
+
+
+def test_a_block_that_comes_too_late_is_told_and_ends_safe(opened):
+    card, stage = opened(speed=1.0, lead=0.5)
+    stage.exchange(np.full(100, 2.0))
+    time.sleep(0.7)
+    with pytest.raises(StageError, match=r"generation has stopped.*safe voltage, 0 V"):
+        stage.exchange(np.full(100, 2.0))
+    assert card.voltage == 0.0
+    stage.close()
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ("device_lost", "Device not available"),
+        ("underflow", "generation has stopped"),
+        ("slow", "not yet been acquired"),
+        ("link_lost", "Failed to connect to server"),
+        ("short_read", r"got \d+ samples, expected 400"),
+    ],
+)
+def test_every_failure_is_told_clearly_and_ends_safe(opened, fault, message):
+    card, stage = opened(fault)
+    with pytest.raises(StageError, match=rf"{message}.*safe voltage, 0 V") as told:
+        streamed(stage, WAVE, *range(400, 4000, 400))
+    assert "\n" not in str(told.value)
+    assert card.voltage == 0.0
+    stage.close()
+
+
+def test_a_server_that_went_away_leaves_the_voltage_unknown_and_says_so(opened):
+    _, stage = opened()
+    stage.exchange(WAVE[:400])
+    stage._tasks._channel.close()
+    with pytest.raises(StageError, match=r"voltage of the stage is unknown, last given .* by hand"):
+        stage.exchange(WAVE[400:800])
+
+
+def test_the_delay_of_the_card_is_measured_apart_and_taken_off(opened):
+    _, looped = opened(displacement_input="ai2", voltage_input="", sensor_gain=1.0)
+    delay = loop_back_delay(looped)
+    looped.close()
+    assert delay == pytest.approx(2 * TS, abs=0.05 * TS)
+    _, corrected = opened(displacement_input="ai2", voltage_input="", sensor_gain=1.0, io_delay=delay)
+    voltage, echo = streamed(corrected, WAVE, 1000)
+    np.testing.assert_allclose(echo, voltage, atol=2e-4)
+    corrected.close()
+
+
+def test_an_input_that_hears_nothing_has_no_delay(opened):
+    _, stage = opened(displacement_input="ai0", voltage_input="", sensor_gain=1.0)
+    with pytest.raises(StageError, match="expected"):
+        loop_back_delay(stage)
+    stage.close()
+
+
+def test_a_machine_without_the_package_is_told_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "nidaqmx", None)
+    with pytest.raises(StageError, match=r"pip install 'nidaqmx\[grpc\]'"):
+        DaqmxStage(DaqmxSetup("Dev1"))
+
+
+def test_setups_and_cards_that_cannot_be(opened):
+    with pytest.raises(StageError, match="does not exist"):
+        opened(displacement_input="ai9")
+    for wrong in ({"device": ""}, {"lead": 0.0}, {"sensor_gain": 0.0}, {"io_delay": -1.0}):
+        with pytest.raises(StageError, match="expected"):
+            DaqmxSetup(**{"device": "Dev1", **wrong})
+    with pytest.raises(StageError, match="expected one of"):
+        Card(SimulatedStage(), faults=("earthquake",))
