@@ -114,7 +114,7 @@ LAYOUTS = (Layout(), Layout(shift=-4.0), Layout(slowest=0.1), Layout(hold=10.0, 
 
 
 def _effect_free(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
-    for k in range(20 * seeds):
+    for k in range(60 * seeds):
         plant = "packaged" if k % 4 == 3 else "independent"
         layout = LAYOUTS[0] if plant == "packaged" else LAYOUTS[(k // len(noises)) % 4]
         yield Case("effect_free", (), k, noises[k % len(noises)], plant, layout)
