@@ -124,3 +124,6 @@ def _work(answers: Connection, job: Job, path: Path, model: str) -> None:
         answers.send(job(path, model, lambda word, fraction: answers.send((word, fraction))))
     except PiezoError as error:
         answers.send(str(error))
+    except Exception as error:
+        answers.send(f"fault of the fit: {error!r}; the traceback is in the log")
+        raise

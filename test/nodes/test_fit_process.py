@@ -1,5 +1,6 @@
 """A fit in another process: its outcome, its failure in one line, its death, and its end."""
 
+import operator
 import os
 import signal
 import time
@@ -52,6 +53,13 @@ def test_the_outcome_is_that_of_the_same_fit_here(experiment):
     assert "bouc_wen.beta" in found.summary
     assert "% of range" in found.verdict
     assert fit.progress[1] > 0.0
+
+
+def test_a_fault_of_the_program_is_told_as_one(tmp_path):
+    fit = FitProcess(operator.not_, tmp_path)  # takes one argument
+    with pytest.raises(IdentificationError, match="fault of the fit: TypeError"):
+        outcome(fit)
+    fit.close()
 
 
 def test_a_failure_is_one_line(tmp_path):
