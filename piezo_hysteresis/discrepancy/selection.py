@@ -5,7 +5,7 @@ Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 20
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -179,18 +179,9 @@ def _turn(
     tell("score test of the catalogue", 0.0)
     present = {e.public_name() for e in model.effects}
     screened = screen(model, evidence, [e for e in effects if e.public_name() not in present])
-    refits = []
-    for k, candidate in enumerate(screened[:REFITS]):
-        tell(f"refit with {candidate.name}", (k + 1) / (REFITS + 1))
-        result = refit(model, candidate)
-        if result is not None:
-            refits.append(result)
+    refits = _refitted(model, screened[:REFITS], before, tell)
     if not refits:
         return None
-    refits.sort(key=lambda c: c.score.cost)
-    tell("dynamics anew", 0.9)
-    again = [_settled(c) for c in refits[:AGAIN]]
-    refits = sorted(again + refits[AGAIN:], key=lambda c: c.score.cost)
     best = _simplest(refits)
     rivals, rejected = [], []
     gain = before.cost - best.score.cost
@@ -213,6 +204,26 @@ def _turn(
         reason = f"closest, but a held-out gain of {gain:.2f} and {left:.2f} of V left do not suffice"
         rejected.insert(0, Rejection(best.name, reason))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected))
+
+
+def _refitted(model: Model, candidates: Sequence[Candidate], before: Score, tell: Progress) -> list[Candidate]:
+    """Joint refits, best first; the leading ones begun anew, but not those far behind a best at the floor."""
+    refits = []
+    for k, candidate in enumerate(candidates):
+        tell(f"refit with {candidate.name}", (k + 1) / (len(candidates) + 1))
+        result = refit(model, candidate)
+        if result is not None:
+            refits.append(result)
+    if not refits:
+        return []
+    refits.sort(key=lambda c: c.score.cost)
+    tell("dynamics anew", 0.9)
+    best = _settled(refits[0])
+    reach = np.inf
+    if best.score.excess <= ADEQUATE:
+        reach = best.score.cost + CLOSE * (before.cost - best.score.cost)
+    again = [_settled(c) if c.score.cost < reach else c for c in refits[1:AGAIN]]
+    return sorted([best, *again, *refits[AGAIN:]], key=lambda c: c.score.cost)
 
 
 def _settled(candidate: Candidate) -> Candidate:
