@@ -10,19 +10,22 @@ import published
 from campaign import alone, joint
 from exhibit import STATIC, Exhibit, canvas, main
 from table_1 import lag_error
+from table_1_stages import errors_by_frequency
 from validation import draw_loops
 
 
 def figure_8() -> Exhibit:
     """Loops of MBW alone at the frequencies of Table 1."""
     figure, axes = canvas(2, 3)
-    row = draw_loops(axes, alone(joint("bouc_wen").model), "bouc_wen", "MBW alone", {"color": STATIC})
+    model = alone(joint("bouc_wen").model)
+    row = draw_loops(axes, model, "bouc_wen", "MBW alone", {"color": STATIC})
     return Exhibit(
         "figure_8",
         figure,
         {
             "frequency [Hz]": list(published.FREQUENCIES),
             "MBW alone, simulated stage [% of peak-to-peak]": row,
+            "MBW alone, simulated stage [% of range]": errors_by_frequency(model, "bouc_wen"),
             "lag of the published G [% of peak-to-peak]": [lag_error(f) for f in published.FREQUENCIES],
             "MBW alone, paper [%]": list(published.MBW_ROW),
         },

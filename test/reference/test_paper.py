@@ -46,6 +46,14 @@ def test_figure_7_the_three_steps_alone_grow_with_frequency_as_the_paper_does(ex
     assert row[-1] > 1.0
 
 
+def test_table_1_on_the_bouc_wen_stage(exhibit):
+    numbers = exhibit("figure_7")
+    assert max(numbers["dynamic model, joint fit [% of range]"]) <= 0.10
+    alone = exhibit("figure_8")["MBW alone, simulated stage [% of range]"]
+    assert alone == sorted(alone)
+    assert alone[-1] > 1.0
+
+
 def test_figure_8_mbw_alone_on_the_stage_is_the_row_that_the_coefficients_predict(exhibit):
     numbers = exhibit("figure_8")
     assert numbers["MBW alone, simulated stage [% of peak-to-peak]"] == pytest.approx(
