@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class Creep(Effect):
         "grows with log t after each change of level; on sines a gain falling linearly in log f at constant phase"
     )
     source = "Croft, Shed, Devasia 2001; relaxation bank of the logarithmic law"
-    parameters = (
+    parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter("gamma", "γ", "1/decade", 0.0, -0.2, 0.2, "creep per decade of time", "Croft 2001", 0.0, 0.01),
         Parameter(
             "tau_min",
