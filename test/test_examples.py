@@ -37,3 +37,8 @@ def test_hide_effect_says_nothing_and_writes_the_plant_that_the_seed_draws(tmp_p
     written = PlantParameters.from_mapping(yaml.safe_load((tmp_path / "plant.yaml").read_text()))
     assert written.full_stroke != PlantParameters().full_stroke
     assert written == hidden_effect(3, written, highest_voltage=10.0).parameters
+
+
+def test_own_stage(capsys):
+    runpy.run_path(str(EXAMPLES / "own_stage.py"), run_name="__main__")
+    assert capsys.readouterr().out == "50 samples, 23.5 µm, 0 V at the end\n"

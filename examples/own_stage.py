@@ -1,0 +1,136 @@
+"""A back end for a device of your own: everything the driver needs, from two functions that your lab has already.
+
+`put(volts)` sets the drive, `get()` reads the sensor in metres. Whoever has those two has a stage, paced by the clock
+of this machine: for sample periods of a millisecond or more. A device with a clock or a memory of its own is written
+the same way: `stage/daqmx/stage.py` streams on a hardware clock, `stage/gcs2/stage.py` uploads, plays and reads back.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.simulated import SimulatedStage
+from piezo_hysteresis.stage.stage import Acquired, Description, Samples
+
+
+class OwnStage:
+    """A streaming stage, sample by sample.
+
+    Parameters
+    ----------
+    name : str
+        Model and serial number: one driver per name.
+    put : callable
+        Sets the drive voltage [V].
+    get : callable
+        Reads the displacement [m].
+    voltage_max : float
+        Highest drive voltage [V]; the lowest, and the safe one, is 0.
+    max_slew_rate : float
+        Steepest drive [V/s].
+    """
+
+    def __init__(
+        self,
+        name: str,
+        put: Callable[[float], None],
+        get: Callable[[], float],
+        voltage_max: float,
+        max_slew_rate: float,
+    ) -> None:
+        # 1. Say what the device is and what it may be asked for. `check_voltage` and `check_sample_period` of the
+        #    description then refuse everything else, before anything moves.
+        self._description = Description(
+            name=name,
+            streaming=True,
+            sample_period_min=1e-3,
+            sample_period_max=1.0,
+            voltage_min=0.0,
+            voltage_max=voltage_max,
+            max_slew_rate=max_slew_rate,
+        )
+        self._put, self._get = put, get
+        self._sample_period, self._voltage, self._closed = 1e-3, 0.0, False
+        self._due = 0.0
+
+    @property
+    def description(self) -> Description:
+        """Limits and kind of the device."""
+        return self._description
+
+    @property
+    def sample_period(self) -> float:
+        """Sample period in force [s]."""
+        return self._sample_period
+
+    @property
+    def voltage(self) -> float:
+        """Drive voltage in force [V]."""
+        return self._voltage
+
+    def configure(self, sample_period: float) -> None:
+        """Sample every so many seconds [s]."""
+        self._require_open()
+        self._sample_period = self._description.check_sample_period(sample_period)
+
+    # 2. The fast path: as many samples back as were given, each measured while its voltage was applied. If the device
+    #    fails in the midst of it, raise StageError; the driver then calls `safe`.
+    def exchange(self, voltage: Samples) -> Acquired:
+        """Apply a block of drive voltages [V], one per sample period."""
+        self._require_open()
+        drive = self._description.check_voltage(voltage, self._voltage, self._sample_period)
+        displacement = np.empty(drive.size)
+        self._due = max(self._due, time.monotonic())
+        for i, level in enumerate(drive):
+            self._move(float(level))
+            self._due += self._sample_period
+            time.sleep(max(self._due - time.monotonic(), 0.0))
+            displacement[i] = self._get()
+        return Acquired(drive, displacement)
+
+    # 3. The slow path.
+    def set_voltage(self, voltage: float) -> None:
+        """Apply one voltage [V] and hold it."""
+        self._require_open()
+        self._move(float(self._description.check_voltage(np.array([voltage]), self._voltage, self._sample_period)[0]))
+
+    def read_displacement(self) -> float:
+        """One reading [m]."""
+        self._require_open()
+        return self._get()
+
+    # 4. The way to safety: no steeper than allowed, harmless when repeated, and it must work in every state. What
+    #    cannot be made safe has to be said: raise StageError with what is known about the voltage.
+    def safe(self) -> None:
+        """Go to 0 V."""
+        step = self._description.max_slew_rate * 1e-3
+        while not self._closed and self._voltage:
+            self._move(max(self._voltage - step, 0.0))
+            time.sleep(1e-3)
+
+    def close(self) -> None:
+        """Make safe; every later call but `close` and `safe` raises StageError."""
+        self.safe()
+        self._closed = True
+
+    def _move(self, voltage: float) -> None:
+        self._put(voltage)
+        self._voltage = voltage
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise StageError(f"{self._description.name}: is closed, expected an open stage; make a new one")
+
+
+if __name__ == "__main__":
+    device = SimulatedStage(sample_period=1e-3)  # in place of yours
+    stage = OwnStage("bench 3", device.set_voltage, device.read_displacement, voltage_max=10.0, max_slew_rate=2000.0)
+    record = stage.exchange(np.linspace(0.0, 5.0, 50))
+    stage.close()
+    print(
+        f"{record.voltage.size} samples, {1e6 * np.ptp(record.displacement):.1f} µm, {device.voltage:.0f} V at the end"
+    )
