@@ -33,6 +33,8 @@ class Tasks:
     def __init__(self, setup: DaqmxSetup) -> None:
         try:
             import nidaqmx
+            import nidaqmx.stream_readers
+            import nidaqmx.stream_writers
         except ImportError:
             raise StageError(
                 "NI-DAQmx: the package nidaqmx is not installed, expected it; pip install 'nidaqmx[grpc]'"
@@ -41,6 +43,8 @@ class Tasks:
         self._channel: Any = None
         self._output: Any = None
         self._input: Any = None
+        self._writer: Any = None
+        self._reader: Any = None
         if setup.server:
             import grpc
 
@@ -54,7 +58,7 @@ class Tasks:
 
     def start(self, sample_period: float, first: Samples) -> None:
         """Stream from now on: output without regeneration, beginning with `first`; input on the output's clock."""
-        s, constants = self._setup, self._nidaqmx.constants
+        s, streams, constants = self._setup, self._nidaqmx, self._nidaqmx.constants
         size = max(4 * first.size, round(1.0 / sample_period))
         continuous = constants.AcquisitionType.CONTINUOUS
         with self._faults("starting output and input"):
@@ -65,7 +69,10 @@ class Tasks:
                 self._input.timing.cfg_samp_clk_timing(
                     1 / sample_period, f"/{s.device}/ao/SampleClock", sample_mode=continuous, samps_per_chan=size
                 )
-                self._output.write(first, auto_start=False)
+                self._writer = streams.stream_writers.AnalogSingleChannelWriter(self._output.out_stream, False)
+                self._reader = streams.stream_readers.AnalogMultiChannelReader(self._input.in_stream)
+                self._writer.verify_array_shape = self._reader.verify_array_shape = False  # asks the card every time
+                self._writer.write_many_sample(first, s.timeout)
                 self._input.start()  # waits for the clock of the output
                 self._output.start()
             except BaseException:
@@ -75,15 +82,15 @@ class Tasks:
     def write(self, drive: Samples) -> None:
         """Append drive voltages [V] to the output."""
         with self._faults("writing output"):
-            self._output.write(drive, auto_start=False, timeout=self._setup.timeout)
+            self._writer.write_many_sample(drive, self._setup.timeout)
 
     def read(self, count: int) -> Samples:
         """The next input voltages [V], shape (channels, count)."""
+        samples = np.empty((2 if self._setup.voltage_input else 1, count))
         with self._faults("reading input"):
-            values = self._input.read(count, timeout=self._setup.timeout + self._setup.lead)
-        samples = np.atleast_2d(np.asarray(values, dtype=np.float64))
-        if samples.shape[1] != count:
-            raise DaqmxError(f"NI-DAQmx: got {samples.shape[1]} samples, expected {count}")
+            got = self._reader.read_many_sample(samples, count, self._setup.timeout + self._setup.lead)
+        if got != count:
+            raise DaqmxError(f"NI-DAQmx: got {got} samples, expected {count}")
         return samples
 
     def stop(self) -> None:
