@@ -19,7 +19,9 @@ from scipy.signal import lfilter
 from benchmarks.c_loops import CLoops, compiler
 from benchmarks.figures import Cell, Figures, alone, seconds
 from benchmarks.simulation import ARX, PERIOD, measure, record
+from piezo_hysteresis.chain import BLOCK
 from piezo_hysteresis.effects import BoucWen, Effect, PublishedBoucWen
+from piezo_hysteresis.effects.arx_block import ArxBlock, arx_filter
 from piezo_hysteresis.effects.published_bouc_wen import run_published
 from piezo_hysteresis.model import Model
 
@@ -75,6 +77,24 @@ def own_chain(u: np.ndarray) -> Work:
     return lambda: model.run(u, model.rest(float(u[0])))[0]
 
 
+def own_kernels(u: np.ndarray) -> Work:
+    """The kernels of the chain alone, block by block as `Model.run` calls them."""
+    arx, v, y = ArxBlock((), ARX.array("a"), ARX.array("b"), ARX["delay"]), u / SCALES[0], np.empty_like(u)
+    p, w = np.array([LOOP[n] for n in ("A", "beta", "gamma", "n", "p1", "p2")]), np.empty(BLOCK)
+    w0 = LOOP["p1"] * v[0] ** 3 + LOOP["p2"] * v[0]
+
+    def work() -> np.ndarray:
+        state, z = np.array([0.0, v[0]]), arx.zeros(1)
+        for start in range(0, v.size, BLOCK):
+            part = v[start : start + BLOCK]
+            run_published(part, p, state, w)
+            deviation = w[None, : part.size] - w0
+            arx_filter(deviation, arx.taps, arx.offset, arx.feedback, z, y[None, start : start + BLOCK])
+        return SCALES[1] * (arx.gain * w0 + y)
+
+    return work
+
+
 def c_works(u: np.ndarray, loops: CLoops) -> tuple[Work, Work]:
     """The loop and the chain in C."""
     v, w, y = u / SCALES[0], np.empty(u.size + 100), np.empty(u.size)
@@ -96,13 +116,14 @@ def compare(u: np.ndarray) -> Figures:
     short, v = u[: u.size // PYTHON], u / SCALES[0]
     cases: list[tuple[str, Work, Work]] = [
         ("Eq. (6), (7)", own_loop(v), lambda: python_loop(short / SCALES[0])),
-        ("Eq. (7) + delay + ARX(8,8)", own_chain(u), lambda: python_chain(short)),
+        ("Eq. (7) + delay + ARX(8,8), Model.run", own_chain(u), lambda: python_chain(short)),
+        ("Eq. (7) + delay + ARX(8,8), kernels alone", own_kernels(u), lambda: python_chain(short)),
     ]
     rows: list[tuple[Cell, ...]] = []
     with tempfile.TemporaryDirectory() as folder:
         built = [c_works(u, CLoops(Path(folder), flags)) for flags in FLAGS] if compiler() else []
         for k, (name, own, python) in enumerate(cases):
-            peers = [works[k] for works in built]
+            peers = [works[min(k, 1)] for works in built]
             for peer in peers:
                 np.testing.assert_allclose(peer(), own(), rtol=1e-9, atol=1e-12 * np.ptp(own()))
             np.testing.assert_allclose(python(), own()[: short.size], rtol=1e-9, atol=1e-12 * np.ptp(own()))
