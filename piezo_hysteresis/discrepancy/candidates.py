@@ -41,12 +41,15 @@ class Evidence:
         Free per record.
     extent : Extent
         What the records span.
+    alone : tuple of int
+        Records whose kind has no other; they are never left out.
     """
 
     records: tuple[Record, ...]
     floors: Array
     nuisance: Nuisance
     extent: Extent
+    alone: tuple[int, ...] = ()
 
     def broadband(self) -> list[int]:
         """Records whose drive determines linear dynamics."""
@@ -117,7 +120,7 @@ def score_model(model: Model, evidence: Evidence) -> Score:
     """Score of a fitted model on records left out."""
     names = free_numbers(model, evidence.nuisance)
     products = grams(model, evidence.records, names, evidence.nuisance)
-    return held_out(products, evidence.floors, directions(model, names))
+    return held_out(products, evidence.floors, directions(model, names), evidence.alone)
 
 
 def screen(model: Model, evidence: Evidence, effects: Iterable[type[Effect]]) -> list[Candidate]:
@@ -171,7 +174,7 @@ def _screen_off(model: Model, evidence: Evidence, base: list[str], members: list
     for effect in members:
         wanted = [kept + names.index(n) - len(base) for n in own[effect.name]]
         part = columns[:, [*range(kept), *wanted]]
-        found.append(Candidate(effect, evidence, held_out(products, evidence.floors, part)))
+        found.append(Candidate(effect, evidence, held_out(products, evidence.floors, part, evidence.alone)))
     return found
 
 
@@ -192,7 +195,11 @@ def _screen_moves(model: Model, evidence: Evidence, base: list[str], moves: list
     columns = directions(model, base, len(usable))
     kept = columns.shape[1] - len(usable)
     return [
-        Candidate(effect, evidence, held_out(products, evidence.floors, columns[:, [*range(kept), kept + k]]))
+        Candidate(
+            effect,
+            evidence,
+            held_out(products, evidence.floors, columns[:, [*range(kept), kept + k]], evidence.alone),
+        )
         for k, effect in enumerate(usable)
     ]
 

@@ -6,7 +6,7 @@ step that the other records ask for, and the record left out is judged with it. 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,7 +56,9 @@ class Score:
         return float(gain.mean()), float(gain.std(ddof=1) / np.sqrt(gain.size)) if gain.size > 1 else np.inf
 
 
-def held_out(grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array) -> Score:
+def held_out(
+    grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array, alone: Collection[int] = ()
+) -> Score:
     """Score of a model extended by `columns`, every record judged with parameters from the others.
 
     Parameters
@@ -68,11 +70,14 @@ def held_out(grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Ar
     columns : (rows, q) ndarray
         Directions in which the parameters may move, as combinations of the rows of `grams`; the residual's row,
         the last, is zero.
+    alone : collection of int
+        Indices of records whose kind has no other: they are judged with the parameters from all.
     """
-    inner, cross, power = [], [], []
-    for gram, floor in zip(grams, floors, strict=True):
+    inner, cross, power, spared = [], [], [], []
+    for index, (gram, floor) in enumerate(zip(grams, floors, strict=True)):
         if not np.isfinite(floor):
             continue
+        spared.append(index not in alone)
         weight = 1.0 / (gram.size * floor * floor)
         inner.append(weight * columns.T @ gram.matrix @ columns)
         cross.append(weight * columns.T @ gram.matrix[:, -1])
@@ -80,8 +85,8 @@ def held_out(grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Ar
     hessian, slope = np.sum(inner, axis=0), np.sum(cross, axis=0)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
     squares = []
-    for h, g, e in zip(inner, cross, power, strict=True):
-        step = _solve(hessian - h, slope - g, scale) if len(inner) > 1 else _solve(hessian, slope, scale)
+    for h, g, e, out in zip(inner, cross, power, spared, strict=True):
+        step = _solve(hessian - h, slope - g, scale) if out and len(inner) > 1 else _solve(hessian, slope, scale)
         squares.append(max(0.0, e - 2.0 * step @ g + step @ h @ step))
     return Score(np.sqrt(squares), _solve(hessian, slope, scale))
 

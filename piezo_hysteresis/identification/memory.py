@@ -25,7 +25,9 @@ from .normal_equations import Nuisance, residuals
 Array = NDArray[np.float64]
 
 PLAYS = 16
-"""Plays, from 1/64 of the range of the drive to half of it."""
+"""Plays, geometric in their half widths."""
+WIDEST = 0.47
+"""Half width of the widest play, share of the range of the drive; one of half the range would stand still in a loop."""
 BLOCKS = 8
 """Blocks into which the records are cut, about."""
 FOLDS = 4
@@ -50,7 +52,7 @@ def with_plays(model: Model, records: Sequence[Record]) -> Model:
     """
     low = min(min(float(r.voltage.min()), r.settled_voltage) for r in records)
     high = max(max(float(r.voltage.max()), r.settled_voltage) for r in records)
-    plays = HysteresisMemory(c=(0.0,) * PLAYS, reach=(high - low) / (2.0 * model.voltage_scale))
+    plays = HysteresisMemory(c=(0.0,) * PLAYS, reach=WIDEST * (high - low) / model.voltage_scale)
     loop = BoucWen(A=0.0, gamma=0.0, p1=model[BoucWen.name]["p1"], p2=model[BoucWen.name]["p2"])
     return model.with_effect(loop).with_effect(plays)
 
