@@ -96,7 +96,7 @@ def read(
     Raises
     ------
     RecordingError
-        If the path cannot be read as an experiment.
+        If the path cannot be read as an experiment, or `decimate` names a phase that it does not hold.
     RecordError
         If the samples form no record.
     """
@@ -112,6 +112,9 @@ def read(
         )
     if decimate is None:
         decimate = load_decimation(place)
+    elif unknown := set(decimate) - {name for r in records for name in (r.phase, r.phase.split("_")[0])}:
+        held = ", ".join(dict.fromkeys(r.phase for r in records))
+        raise RecordingError(f"{place}: decimate: no phase {min(unknown)!r}, expected one of {held}")
     if decimate:
         records = tuple(r.decimate(decimate.get(r.phase, decimate.get(r.phase.split("_")[0], 1))) for r in records)
     experiment = replace(experiment, records=records)

@@ -87,6 +87,7 @@ def files(tmp_path_factory, folder):
         ("validate {fine} {experiment} --column wolt=1", "wolt"),
         ("validate {fine} {experiment} --unit displacement=inch", "inch"),
         ("validate {fine} {experiment} --decimate noise=few", "a whole number"),
+        ("validate {fine} {experiment} --decimate noize=2", "no phase 'noize', expected one of"),
         ("validate {fine} {experiment} --rows 5", "expected FROM:TO"),
         ("validate {fine} {experiment} --sample-period -1", "expected a positive time"),
         ("validate {fine} {experiment} --phase 0=a --phase b", "TIME=NAME"),
