@@ -159,6 +159,7 @@ def repeatability(record: Record) -> float:
 
 
 def main() -> None:
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", default=os.environ.get("PIEZO_DATA", "../shared/data"), help="holds picma-p885")
     folder = Path(parser.parse_args().data)
