@@ -6,7 +6,7 @@ Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 20
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -161,7 +161,24 @@ def select(
             break
         assert step.best.fit is not None
         model, score, evidence = step.best.fit.model, step.best.score, step.best.evidence
+    model, score = _pruned(model, score, steps)
     return Selection(baseline, model, score, tuple(steps), null)
+
+
+def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score]:
+    """Take back effects that a later one makes superfluous; `steps` is updated."""
+    accepted = [k for k, step in enumerate(steps) if step.accepted]
+    for k in accepted[:-1]:
+        name, last = steps[k].best.name, steps[accepted[-1]].best
+        lean = refit(model.without(name), replace(last, effect=model[last.name]))
+        if lean is None:
+            continue
+        lean = _settled(lean)
+        if lean.score.cost - score.cost < LEAST_GAIN and lean.fit is not None:
+            told = Rejection(name, f"superfluous once {last.name} is there")
+            steps[k] = replace(steps[k], accepted=False, rejected=(told, *steps[k].rejected))
+            model, score = lean.fit.model, lean.score
+    return model, score
 
 
 def _turn(
