@@ -14,7 +14,7 @@ from ..model import Model
 from ..record import Record
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BLACK, GREEN, PREDICTED, SKY, canvas, legend_above, plain_log, styled
+from .style import BLACK, GREEN, PREDICTED, SKY, canvas, handles_of, legend_above, plain_log, styled
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def bode(comparison: Comparison) -> Drawing | None:
     phase_axis.set_ylabel("phase [°]")
     phase_axis.set_xlabel("frequency [Hz]")
     plain_log(gain_axis.yaxis)
-    legend_above(figure, gain_axis, 2)
+    legend_above(figure, handles_of(gain_axis), 2)
     figure.align_ylabels()
     return Drawing(
         "bode",

@@ -6,7 +6,7 @@ import numpy as np
 
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BLUE, GREY, ORANGE, canvas, legend_above, plain_log, styled
+from .style import BLUE, GREY, ORANGE, canvas, handles_of, legend_above, plain_log, styled
 
 
 @styled
@@ -44,7 +44,7 @@ def gap(comparison: Comparison) -> Drawing | None:
     axis.set_yticks(place, names)
     axis.invert_yaxis()
     axis.set_xlabel("rms error [% of range]")
-    legend_above(figure, axis)
+    legend_above(figure, handles_of(axis))
     worst = names[int(np.argmax(after))]
     return Drawing(
         "gap",

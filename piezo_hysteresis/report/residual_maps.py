@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BLUE, GREY, ORANGE, canvas, legend_above, styled
+from .style import BLUE, GREY, ORANGE, canvas, handles_of, legend_above, styled
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def residual_maps(comparison: Comparison) -> Drawing | None:
                 told.append(f"over {name} {word} the mean residual spans {1e9 * np.ptp(mean):.3g} nm")
         axis.set_xlabel(label)
     axes[0, 0].set_ylabel("residual [nm]")
-    legend_above(figure, axes[0, 0])
+    legend_above(figure, handles_of(axes[0, 0]))
     return Drawing(
         "residual_maps",
         "Residual against drive, displacement and rate",

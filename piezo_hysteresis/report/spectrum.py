@@ -8,7 +8,7 @@ from scipy.signal import welch
 
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BEFORE, FLOOR, MEASURED, PREDICTED, canvas, legend_above, styled
+from .style import BEFORE, FLOOR, MEASURED, PREDICTED, canvas, handles_of, legend_above, styled
 from .words import duration
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ def residual_spectrum(comparison: Comparison) -> Drawing | None:
         worst = f[int(np.argmax(left / floor))] if floor > 0 else f[int(np.argmax(left))]
         told.append(f"sampled every {duration(period)} the residual stands out most at {worst:.3g} Hz")
     axes[0, 0].set_ylabel("amplitude density [nm/√Hz]")
-    legend_above(figure, axes[0, 0])
+    legend_above(figure, handles_of(axes[0, 0]))
     return Drawing(
         "residual_spectrum",
         "Spectrum of the residual",

@@ -5,7 +5,7 @@ Colours are those of Okabe and Ito; what is measured is always the grey solid li
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -85,7 +85,25 @@ def plain_log(axis: Any) -> None:
     axis.set_minor_formatter(FuncFormatter(lambda value, _: ""))
 
 
-def legend_above(figure: Figure, axes: Axes, columns: int = 4) -> None:
-    """One legend for the figure, outside of the panels."""
+def legend_above(figure: Figure, handles: Mapping[str, Any], columns: int = 4) -> None:
+    """One legend for the figure, outside of the panels.
+
+    Parameters
+    ----------
+    figure : Figure
+        Laid out with constraints; its panels give way.
+    handles : mapping of str to Artist
+        Label to what it stands for.
+    columns : int
+        At most so many side by side.
+    """
+    legend = figure.legend(handles.values(), handles.keys(), loc="upper center", ncols=min(columns, len(handles)))
+    # loc="outside upper center" would do, but ROS 2 Jazzy comes with Matplotlib 3.6
+    taken = legend.get_window_extent().height / figure.bbox.height
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - taken - 0.01))
+
+
+def handles_of(axes: Axes) -> dict[str, Any]:
+    """Label to what it stands for, in the order of drawing."""
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(columns, len(labels)))
+    return dict(zip(labels, handles, strict=True))

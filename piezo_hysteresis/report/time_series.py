@@ -12,7 +12,7 @@ from ..discrepancy.residual import drive_frequency
 from ..record import Record
 from .comparison import Comparison
 from .drawing import Drawing
-from .style import BEFORE, FLOOR, MEASURED, PREDICTED, RESIDUAL, canvas, styled
+from .style import BEFORE, FLOOR, MEASURED, PREDICTED, RESIDUAL, canvas, handles_of, legend_above, styled
 from .thinning import thinned
 
 Array = NDArray[np.float64]
@@ -102,11 +102,11 @@ def time_series(comparison: Comparison) -> Drawing:
     for place in range(len(shown), bands * columns):
         for extra in range(step):
             axes[step * (place // columns) + extra, place % columns].set_axis_off()
-    handles = dict(zip(*(axes[0, 0].get_legend_handles_labels())[::-1], strict=True))
+    handles = handles_of(axes[0, 0])
     if now is not None:
-        handles |= dict(zip(*(axes[1, 0].get_legend_handles_labels())[::-1], strict=True))
+        handles |= handles_of(axes[1, 0])
         handles["± 2 × floor"] = axes[1, 0].get_lines()[-1]
-    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles))
+    legend_above(figure, handles, columns=len(handles))
     figure.align_ylabels()
     names = ", ".join(comparison.experiment[i].phase for i in shown)
     words = "no model was given" if now is None else f"largest residual {1e9 * now.largest:.3g} nm"
