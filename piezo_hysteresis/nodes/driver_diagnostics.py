@@ -10,6 +10,7 @@ from rclpy.node import Node
 
 from .acquisition import Acquisition
 from .conversions import diagnostic
+from .sending import send
 
 
 class DriverDiagnostics:
@@ -73,4 +74,4 @@ class DriverDiagnostics:
             tally.latest = 0.0
         array = DiagnosticArray(status=[diagnostic(level, self._name, message, stage, **values)])
         array.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(array)
+        send(self._publisher, array)

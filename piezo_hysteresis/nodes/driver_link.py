@@ -17,6 +17,7 @@ from ..identification.drive import DriveLimits
 from ..identification.protocol import Phase
 from .conversions import command_to_cloud, values_of
 from .quality import COMMAND, COMMAND_STATUS
+from .sending import send
 
 _NAMES = ("sample_period", "voltage_min", "voltage_max", "safe_voltage", "max_slew_rate", "ramp_rate")
 
@@ -86,7 +87,8 @@ class DriverLink:
         stamp = self._node.get_clock().now().to_msg()
         self._sent = (phase.name, f"{stamp.sec}.{stamp.nanosec:09d}")
         self.state, self.reason = "sent", ""
-        self._command.publish(command_to_cloud(phase.voltage, phase.sample_period, phase.name, stamp))
+        if not send(self._command, command_to_cloud(phase.voltage, phase.sample_period, phase.name, stamp)):
+            self.state, self.reason = "refused", "the middleware did not take the waveform"
 
     def stop(self) -> Future | None:
         """Ask the driver to go to the safe voltage; None where there is no driver to ask."""

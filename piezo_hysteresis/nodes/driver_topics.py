@@ -12,6 +12,7 @@ from .acquisition import Delivery
 from .conversions import SampleBlock, diagnostic, live, samples_to_cloud, to_stamp
 from .drive import Event, Happening, Phase
 from .quality import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
+from .sending import send
 
 _STATES = {Happening.BEGAN: "playing", Happening.DONE: "done", Happening.STOPPED: "stopped"}
 
@@ -62,9 +63,11 @@ class DriverTopics:
         begun = [e for e in delivery.events if e.happening is Happening.BEGAN]
         ended = [e for e in delivery.events if e.happening is not Happening.BEGAN]
         for event in begun:
-            self._phase.publish(String(data=str(event.phase)))
+            send(self._phase, String(data=str(event.phase)))
             self._tell(event, delivery.first)
-        self._samples.publish(samples_to_cloud(delivery.block))
+        if not send(self._samples, samples_to_cloud(delivery.block)):
+            told = f"a block of {delivery.block.size} samples was not taken by the middleware; it is lost"
+            self._node.get_logger().warning(told)
         for event in ended:
             self._tell(event, delivery.first)
         last = delivery.first + delivery.block.size - 1
@@ -109,11 +112,11 @@ class DriverTopics:
         values = {"state": state, "stamp": f"{at.sec}.{at.nanosec:09d}", "phase": phase}
         if isinstance(first, int):
             values["first_index"] = first % (1 << 32)
-        self._status.publish(diagnostic(level, name, message, self._stage, **values))
+        send(self._status, diagnostic(level, name, message, self._stage, **values))
 
     def _publish_live(self, block: SampleBlock) -> None:
         voltage, displacement = float(block.voltage[-1]), float(block.displacement[-1])
-        self._voltage.publish(Float64(data=voltage))
-        self._displacement.publish(Float64(data=displacement))
+        send(self._voltage, Float64(data=voltage))
+        send(self._displacement, Float64(data=displacement))
         stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
-        self._live.publish(live(stamp, self._stage, voltage=voltage, displacement=displacement))
+        send(self._live, live(stamp, self._stage, voltage=voltage, displacement=displacement))

@@ -29,6 +29,7 @@ from .identification_status import IdentificationStatus
 from .parameters import Row, Setting, declare, read
 from .process import run
 from .quality import LATCHED
+from .sending import send
 from .served_model import ServedModel
 
 PROTOCOLS: dict[str, Callable[[DriveLimits, int], Protocol]] = {"paper": paper, "short": short, "rich": rich}
@@ -65,7 +66,7 @@ class IdentificationNode(Node):
         except PiezoError as error:
             self._status.failed(f"no model from the parameters: {error}")
         if self._served.model is not None:
-            self._models.publish(String(data=dumps(self._served.model)))
+            send(self._models, String(data=dumps(self._served.model)))
         self.add_on_set_parameters_callback(self._check)
         for name, callback in (
             ("plan", self._on_plan),
@@ -163,7 +164,7 @@ class IdentificationNode(Node):
         found = loads(outcome.model)
         save(found, (path if path.is_dir() else path.parent) / f"{job.__name__}.yaml")
         self._served.serve(found)
-        self._models.publish(String(data=outcome.model))
+        send(self._models, String(data=outcome.model))
         for line in outcome.summary.splitlines():
             self.get_logger().info(line)
         self._status.done(outcome.verdict)

@@ -9,6 +9,7 @@ from rclpy.node import Node
 from .campaign import Progress
 from .conversions import diagnostic
 from .quality import LATCHED
+from .sending import send
 
 
 class IdentificationStatus:
@@ -66,9 +67,9 @@ class IdentificationStatus:
         )
         if status != self._shown:
             self._shown = status
-            self._publisher.publish(status)
+            send(self._publisher, status)
 
     def _repeat(self) -> None:
         array = DiagnosticArray(status=[self._shown])
         array.header.stamp = self._node.get_clock().now().to_msg()
-        self._diagnostics.publish(array)
+        send(self._diagnostics, array)

@@ -13,6 +13,7 @@ from ..model import Model
 from ..model_parameters import model_hash
 from ..predictor import Predictor
 from .conversions import SampleBlock, diagnostic
+from .sending import send
 
 
 class ModelDiagnostics:
@@ -103,7 +104,7 @@ class ModelDiagnostics:
         self._problem, self._latency = "", 0.0
         array = DiagnosticArray(status=[diagnostic(level, self._name, message, self._stage, **values)])
         array.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(array)
+        send(self._publisher, array)
 
     def _findings(self, received: bool, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
         predictor, promised = self._predictor, self._promised

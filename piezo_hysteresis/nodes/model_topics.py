@@ -12,6 +12,7 @@ from ..model_parameters import hash_number
 from ..predictor import Prediction, Predictor
 from .conversions import SampleBlock, live, predicted_to_cloud, to_stamp
 from .quality import COMMAND, SAMPLES
+from .sending import send
 
 
 class ModelTopics:
@@ -43,9 +44,10 @@ class ModelTopics:
         assert answer.model is not None
         if self._named is None or self._named[0] is not answer.model:
             self._named = (answer.model, hash_number(answer.model))
-        self._samples.publish(
-            predicted_to_cloud(block, answer.prediction, answer.residual, self._named[1], valid=not answer.warming_up)
+        told = predicted_to_cloud(
+            block, answer.prediction, answer.residual, self._named[1], valid=not answer.warming_up
         )
+        send(self._samples, told)
         step = max(1, round(1.0 / (self._live_rate * predictor.sample_period)))
         received = predictor.continuity.received
         if received >= self._next_live or received < self._next_live - step:
@@ -54,10 +56,10 @@ class ModelTopics:
 
     def _publish_live(self, block: SampleBlock, answer: Prediction, rms: float | None) -> None:
         prediction, residual = float(answer.prediction[-1]), float(answer.residual[-1])
-        self._prediction.publish(Float64(data=prediction))
-        self._residual.publish(Float64(data=residual))
+        send(self._prediction, Float64(data=prediction))
+        send(self._residual, Float64(data=residual))
         if rms is not None:
-            self._rms.publish(Float64(data=rms))
+            send(self._rms, Float64(data=rms))
         values = {
             "voltage": float(block.voltage[-1]),
             "displacement": float(block.displacement[-1]),
@@ -65,4 +67,4 @@ class ModelTopics:
             "residual": residual,
         }
         stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
-        self._live.publish(live(stamp, block.stage, **values))
+        send(self._live, live(stamp, block.stage, **values))
