@@ -80,6 +80,12 @@ class Samples:
     def __getattr__(self, name: str) -> np.ndarray:
         return np.concatenate([getattr(block, name) for block in list(self.blocks)])
 
+    def so_far(self) -> Samples:
+        """What has come in until now; blocks go on arriving in another thread."""
+        part = Samples()
+        part.blocks = list(self.blocks)
+        return part
+
     @property
     def newest(self) -> SampleBlock:
         """The last block."""
@@ -100,10 +106,11 @@ class Samples:
 
     def played(self, waveform: np.ndarray, first: int, number: int) -> bool:
         """True where phase `number` is the waveform from index `first` on, but for samples that were lost."""
-        inside = self.phase == number
-        at = self.place()[inside] - first
-        whole = inside.sum() + self.lost >= len(waveform)
-        return whole and np.array_equal(self.voltage[inside], np.asarray(waveform)[at])
+        part = self.so_far()
+        inside = part.phase == number
+        at = part.place()[inside] - first
+        whole = inside.sum() + part.lost >= len(waveform)
+        return whole and np.array_equal(part.voltage[inside], np.asarray(waveform)[at])
 
 
 class Lab:

@@ -34,9 +34,11 @@ def driven(streaming_lab):
 
 def test_every_sample_of_a_command_arrives_or_is_told_lost(driven):
     samples, statuses, phases = driven.streaming(), driven.statuses(), driven.phases()
-    wave = np.concatenate(([0.0], np.random.default_rng(1).uniform(0, 7, 50_000), [0.0]))
+    seconds = 30.0
+    wave = np.concatenate(([0.0], np.random.default_rng(1).uniform(0, 7, round(seconds / PERIOD)), [0.0]))
     driven.send(wave, "noise")
-    driven.wait(lambda: driven.states(statuses, "noise") == ["accepted", "playing", "done"], "the end of the command")
+    done = ["accepted", "playing", "done"]
+    driven.wait(lambda: driven.states(statuses, "noise") == done, "the end of the command", 90.0 + seconds)
     number, first = (driven.value(statuses, "noise", "done", key) for key in ("phase", "first_index"))
     driven.wait(lambda: samples.newest.index[-1] > first + wave.size, "the samples after it")
     assert (np.diff(samples.place()) > 0).all()
