@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import threading
 
 from ..stage.daqmx.emulator.card import FAULTS, Card
@@ -71,8 +72,9 @@ def run(args: argparse.Namespace) -> int:
             f"{args.device} emulated at {args.host}:{server.port}, drive {d.voltage_min:g} to {d.voltage_max:g} V, "
             f"amplifier gain {d.amplifier_gain:g}; end with Ctrl-C"
         )
-        try:
-            threading.Event().wait()
-        except KeyboardInterrupt:
-            console().print("ended")
+        ended = threading.Event()
+        for ending in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(ending, lambda *_: ended.set())
+        ended.wait()
+        console().print("ended")
     return 0
