@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordError
 from ..identification.normal_equations import Nuisance
+from ..identification.roles import CARRYING
 from ..model import Model
 from ..record import Experiment, Record
 from .noise_floor import stroke
@@ -45,6 +46,8 @@ class Error:
         Largest absolute residual [m].
     fit : float
         100·(1 − ‖e‖/‖y − mean y‖) [%]; NaN where the displacement is constant.
+    has_known_start : bool
+        False where the state of the stage at the first sample is not known: a conditioning phase, a truncated record.
     """
 
     phase: str
@@ -55,6 +58,7 @@ class Error:
     percent: float
     largest: float
     fit: float
+    has_known_start: bool = True
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -80,9 +84,14 @@ class Errors:
     residuals: tuple[Array, ...]
 
     @property
+    def judged(self) -> tuple[Error, ...]:
+        """Rows that count: those whose start is known, or all where none is."""
+        return tuple(row for row in self.rows if row.has_known_start) or self.rows
+
+    @property
     def rms(self) -> float:
-        """Root of the mean over the records of their mean square [m]: every phase counts the same."""
-        return float(np.sqrt(np.mean([row.rms**2 for row in self.rows])))
+        """Root of the mean over the judged records of their mean square [m]: every phase counts the same."""
+        return float(np.sqrt(np.mean([row.rms**2 for row in self.judged])))
 
     @property
     def percent(self) -> float:
@@ -91,8 +100,8 @@ class Errors:
 
     @property
     def largest(self) -> float:
-        """Largest absolute residual [m]."""
-        return max(row.largest for row in self.rows)
+        """Largest absolute residual of the judged records [m]."""
+        return max(row.largest for row in self.judged)
 
     @property
     def by_frequency(self) -> dict[float, float]:
@@ -152,7 +161,9 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
         )
     free_run = model.simulate(experiment)
     if nuisance is None:
-        zero = float(np.mean([np.mean(r.displacement - y) for r, y in zip(experiment, free_run, strict=True)]))
+        means = np.array([np.mean(r.displacement - y) for r, y in zip(experiment, free_run, strict=True)])
+        known = np.array([_has_known_start(r) for r in experiment])
+        zero = float(means[known if known.any() else ~known].mean())
         predicted = [y + zero for y in free_run]
     else:
         zero = 0.0
@@ -169,6 +180,10 @@ def _with_nuisance(record: Record, y: Array, nuisance: Nuisance) -> Array:
     return np.asarray(y + np.linalg.lstsq(rows.T, record.displacement - y, rcond=None)[0] @ rows)
 
 
+def _has_known_start(record: Record) -> bool:
+    return record.phase not in CARRYING and not record.truncated
+
+
 def _row(index: int, record: Record, residual: Array, span: float) -> Error:
     rms = float(np.sqrt(np.mean(residual**2)))
     deviation = float(np.std(record.displacement))
@@ -181,4 +196,5 @@ def _row(index: int, record: Record, residual: Array, span: float) -> Error:
         percent=100.0 * rms / span,
         largest=float(np.max(np.abs(residual))),
         fit=100.0 * (1.0 - rms / deviation) if deviation > 0.0 else float("nan"),
+        has_known_start=_has_known_start(record),
     )

@@ -42,6 +42,12 @@ class Comparison:
     floors: Array
 
     @property
+    def floor(self) -> float:
+        """Floor of all judged records together, each counting the same [m]."""
+        floors = self.floors if self.now is None else self.floors[[row.index for row in self.now.judged]]
+        return float(np.sqrt(np.mean(floors**2)))
+
+    @property
     def label(self) -> str | None:
         """Label of the model that is reported, None where there is no model."""
         return list(self.models)[-1] if self.models else None

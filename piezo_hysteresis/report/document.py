@@ -86,7 +86,7 @@ def _figures_of_merit(comparison: Comparison) -> Iterator[tuple[str, str]]:
         if before is not None:
             yield "error before", f"{before.percent:.3g} %"
         yield "error after" if before is not None else "error", f"{now.percent:.3g} %"
-        yield "floor", f"{100 * float((comparison.floors**2).mean() ** 0.5) / now.range:.2g} %"
+        yield "floor", f"{100 * comparison.floor / now.range:.2g} %"
         yield "rms error", nanometre(now.rms)
         yield "range", nanometre(now.range)
     yield "phases", f"{len(comparison.experiment)}"

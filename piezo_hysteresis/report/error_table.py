@@ -21,9 +21,18 @@ def error_table(comparison: Comparison) -> Table | None:
         fit = "–" if math.isnan(row.fit) else f"{row.fit:.2f}"
         rows.append((row.phase, f"{row.size}", f"{floor:.3f}", *errors, _nm(row.rms), _nm(row.largest), fit))
     totals = [f"{comparison.errors[label].percent:.3f}" for label in labels]
-    floor = 100.0 * float((comparison.floors**2).mean() ** 0.5) / now.range
+    floor = 100.0 * comparison.floor / now.range
+    whole = len(now.judged) == len(now.rows)
     rows.append(
-        ("all phases", f"{comparison.experiment.size}", f"{floor:.3f}", *totals, _nm(now.rms), _nm(now.largest), "")
+        (
+            "all phases" if whole else "known start",
+            f"{comparison.experiment.size}",
+            f"{floor:.3f}",
+            *totals,
+            _nm(now.rms),
+            _nm(now.largest),
+            "",
+        )
     )
     header = (
         "phase",
@@ -39,7 +48,9 @@ def error_table(comparison: Comparison) -> Table | None:
         header,
         tuple(rows),
         f"Per cent of range; the range is {1e6 * now.range:.4g} µm, peak to peak over the experiment. Every phase "
-        "counts the same in the last row. Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase; it means little where "
+        "counts the same in the last row"
+        + ("" if whole else ", but for those that begin in an unknown state (conditioning, truncated)")
+        + ". Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase; it means little where "
         "the stage hardly moves.",
         frozenset(range(1, len(header))),
     )

@@ -48,7 +48,7 @@ def answer_verdict(answer: Mapping[str, Any]) -> Verdict:
 
 def _excess(comparison: Comparison) -> float:
     assert comparison.now is not None
-    ratios = [(row.rms / comparison.floors[row.index]) ** 2 for row in comparison.now.rows]
+    ratios = [(row.rms / comparison.floors[row.index]) ** 2 for row in comparison.now.judged]
     return float(sum(ratios) / len(ratios))
 
 
@@ -61,8 +61,8 @@ def _fit_headline(comparison: Comparison) -> str:
 def _fit_sentences(comparison: Comparison) -> tuple[str, ...]:
     now, before = comparison.now, comparison.before
     assert now is not None
-    worst = max(now.rows, key=lambda row: row.rms / comparison.floors[row.index])
-    floor = 100.0 * float((comparison.floors**2).mean() ** 0.5) / now.range
+    worst = max(now.judged, key=lambda row: row.rms / comparison.floors[row.index])
+    floor = 100.0 * comparison.floor / now.range
     sentences = [
         f"In free run the error is {nanometre(now.rms)} rms over all phases, {now.percent:.3g} % of a range of "
         f"{nanometre(now.range)}; the floor is {floor:.2g} %."

@@ -50,6 +50,16 @@ def test_frequencies_pool_the_repetitions_of_a_sine():
     assert table.percent == pytest.approx(np.sqrt(np.mean([r.percent**2 for r in table.rows])))
 
 
+def test_a_record_that_begins_in_an_unknown_state_is_shown_but_counts_in_no_total():
+    def added(number, time):
+        return 1e-6 if number == 0 else 1e-8 * np.sign(np.sin(2 * np.pi * 50 * time + 0.1))
+
+    conditioned = errors(MODEL, measured(added, ("conditioning", "triangle", "sine_1hz")))
+    assert conditioned.rms == pytest.approx(1e-8, rel=1e-2)
+    assert conditioned.rows[0].rms == pytest.approx(1e-6, rel=1e-2)
+    assert errors(MODEL, measured(added, ("rest", "triangle", "sine_1hz"))).rms > 3e-7
+
+
 @given(zero=st.floats(-1e-3, 1e-3))
 def test_the_zero_of_the_sensor_does_not_matter(zero):
     wave = measured(lambda n, t: 1e-8 * np.sin(2 * np.pi * 20 * t))
