@@ -173,7 +173,8 @@ def main() -> int:
     subprocess.run([*hide, *(["--name", arguments.effect] if arguments.effect else [])], check=True)
 
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the nodes first
+    for ending in (signal.SIGINT, signal.SIGTERM):  # also where a shell has told it to ignore them
+        signal.signal(ending, signal.default_int_handler)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     demo = Demo(folder)
     with ExitStack() as stack:

@@ -66,15 +66,15 @@ def run(args: argparse.Namespace) -> int:
         server = Gcs2Server(controller, args.host, port)
     else:
         server = NiServer(Card(stage, faults=args.fault), args.host, port)
+    ended = threading.Event()
+    for ending in (signal.SIGINT, signal.SIGTERM):  # also where a shell has told it to ignore them
+        signal.signal(ending, lambda *_: ended.set())
     d = stage.description
     with server:
         console().print(
             f"{args.device} emulated at {args.host}:{server.port}, drive {d.voltage_min:g} to {d.voltage_max:g} V, "
             f"amplifier gain {d.amplifier_gain:g}; end with Ctrl-C"
         )
-        ended = threading.Event()
-        for ending in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(ending, lambda *_: ended.set())
         ended.wait()
         console().print("ended")
     return 0

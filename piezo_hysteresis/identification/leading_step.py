@@ -31,9 +31,9 @@ def step_length(record: Record) -> int:
 
     Examples
     --------
-    >>> drive = 1.0 + 0.01 * np.arange(400)
+    >>> drive = 1.0 + np.arange(400) / 128
     >>> step_length(Record(drive, drive, 0.01, initial_voltage=0.0))
-    101
+    128
     """
     jump = abs(float(record.voltage[0]) - record.settled_voltage)
     speed = np.abs(np.diff(record.voltage))

@@ -17,7 +17,7 @@ from .drive import Drive, Event, Phase
 from .late_drive import LateDrive
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
-from .time_base import TimeBase
+from .time_base import TimeBase, read_together
 
 _WRAP = 1 << 32
 
@@ -159,7 +159,7 @@ class Acquisition:
             while not self._ready():
                 if self._halting.wait(0.01):
                     return
-            self._time_base.anchor(0, time.monotonic(), self._node_clock())
+            self._time_base.anchor(0, *read_together(self._node_clock))
             while not self._halting.is_set():
                 self._step()
                 if self.playback.is_safe and self._late.is_empty:
@@ -194,7 +194,7 @@ class Acquisition:
 
     def _tell(self, first: int, drive: Drive, acquired: Acquired) -> None:
         """Deliver samples that begin at index `first`; what lies before them was never measured."""
-        self.tally.clock_jumps += abs(self._time_base.follow(first, time.monotonic(), self._node_clock()))
+        self.tally.clock_jumps += abs(self._time_base.follow(first, *read_together(self._node_clock)))
         count = acquired.voltage.size
         block = SampleBlock(
             stamp=self._time_base.stamp(first),

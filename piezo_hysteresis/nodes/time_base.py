@@ -2,7 +2,29 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 _NANO = 1_000_000_000
+_TOGETHER = 2e-5
+"""Two readings so close count as one moment [s]."""
+_ATTEMPTS = 8
+
+
+def read_together(node_clock: Callable[[], int]) -> tuple[float, int]:
+    """The steady clock [s] and the node's [ns] at one moment.
+
+    A busy computer may take the processor away between the two readings, which then would look like a jump of the
+    node's clock: of several attempts the closest counts.
+    """
+    apart, steady, node = float("inf"), 0.0, 0
+    for _ in range(_ATTEMPTS):
+        before, reading, after = time.monotonic(), node_clock(), time.monotonic()
+        if after - before < apart:
+            apart, steady, node = after - before, (before + after) / 2, reading
+        if apart < _TOGETHER:
+            break
+    return steady, node
 
 
 class TimeBase:

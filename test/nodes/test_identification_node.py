@@ -215,8 +215,9 @@ def test_every_early_end_leaves_the_stage_safe_and_the_recording_readable(lab):
     starts = [round((record.start_time - records[0].start_time) / PERIOD) for record in records]
     # a second is what the recorder keeps in memory, a quarter what may be on its way while the computer is busy
     assert starts[-1] + records[-1].size >= last - began - 1.25 / PERIOD
-    inside = samples.phase == number
-    place, voltage = samples.place()[inside] - began, samples.voltage[inside]
+    heard = samples.so_far()
+    inside = heard.phase == number
+    place, voltage = heard.place()[inside] - began, heard.voltage[inside]
     for start, record in zip(starts, records, strict=True):
         common = (place >= start) & (place < start + record.size)
         np.testing.assert_array_equal(record.voltage[place[common] - start], voltage[common])

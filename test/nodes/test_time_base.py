@@ -1,10 +1,12 @@
 """Index, steady clock and stamp agree; only a jump of the node's clock moves the stamps."""
 
+from time import monotonic_ns, sleep
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.nodes.time_base import TimeBase
+from piezo_hysteresis.nodes.time_base import TimeBase, read_together
 
 START = 1_700_000_000_000_000_000
 
@@ -41,6 +43,19 @@ def test_a_jump_of_the_clock_anchors_anew_once(jump):
     assert time.stamp(600) == START + 500 * 20_000 + moved
     assert time.follow(1100, 50.02, START + 20_000_000 + moved) == 0.0
     assert time.due(1100) == pytest.approx(50.02)
+
+
+def test_a_reading_torn_apart_is_no_jump():
+    waits = iter([0.0, 0.01, 0.01, 0.0])
+
+    def clock():
+        sleep(next(waits, 0.0))  # the processor was away, before the reading or behind it
+        now = monotonic_ns() + START
+        sleep(next(waits, 0.0))
+        return now
+
+    steady, node = read_together(clock)
+    assert abs(node - START - round(steady * 1e9)) < 1_000_000
 
 
 def test_postponing_moves_stamps_in_real_time_only():
