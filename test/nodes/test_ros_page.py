@@ -31,8 +31,9 @@ def nodes(shared_lab):
         shared_lab.start(executable)
     there = shared_lab.node.get_node_names
     shared_lab.wait(lambda: set(NODES.values()) <= set(there()), "all nodes")
-    for node, last in (("driver_node", "/samples"), ("model_node", "/predicted_live"), ("identification_node", "/command")):
-        shared_lab.wait(lambda node=node, last=last: last in published(shared_lab, node), f"{last} of the {node}")
+    last = {"driver_node": "/samples", "model_node": "/predicted_live", "identification_node": "/command"}
+    for node, topic in last.items():
+        shared_lab.wait(lambda node=node, topic=topic: topic in published(shared_lab, node), f"{topic} of the {node}")
     return shared_lab
 
 
