@@ -10,7 +10,6 @@ import numpy as np
 import published
 from campaign import joint, last_period, plant, published_steps
 from exhibit import DYNAMIC, Exhibit, canvas, main
-from table_1_stages import errors_by_frequency
 from validation import draw_loops, error_row, sine
 
 
@@ -26,7 +25,6 @@ def figure_7() -> Exhibit:
         {
             "frequency [Hz]": list(published.FREQUENCIES),
             "dynamic model, joint fit [% of peak-to-peak]": row,
-            "dynamic model, joint fit [% of range]": errors_by_frequency(joint("bouc_wen").model, "bouc_wen"),
             "dynamic model, three steps alone [% of peak-to-peak]": error_row(
                 published_steps("bouc_wen").model, "bouc_wen"
             ),

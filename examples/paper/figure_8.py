@@ -10,7 +10,6 @@ import published
 from campaign import alone, joint
 from exhibit import STATIC, Exhibit, canvas, main
 from table_1 import lag_error
-from table_1_stages import errors_by_frequency
 from validation import draw_loops
 
 
@@ -25,7 +24,6 @@ def figure_8() -> Exhibit:
         {
             "frequency [Hz]": list(published.FREQUENCIES),
             "MBW alone, simulated stage [% of peak-to-peak]": row,
-            "MBW alone, simulated stage [% of range]": errors_by_frequency(model, "bouc_wen"),
             "lag of the published G [% of peak-to-peak]": [lag_error(f) for f in published.FREQUENCIES],
             "MBW alone, paper [%]": list(published.MBW_ROW),
         },
