@@ -18,8 +18,8 @@ from benchmarks.figures import Figures, machine, show, write
 
 SPEED = ("kernels", "simulation", "identification", "streaming")
 """What runs where nothing is named."""
-QUALITY = ("recovery", "table_1")
-"""What takes minutes, by name only."""
+QUALITY = ("recovery", "table_1", "real_recordings")
+"""What takes minutes or needs data, by name only."""
 
 
 def main() -> int:
