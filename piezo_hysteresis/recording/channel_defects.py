@@ -14,6 +14,7 @@ FEWEST_LEVELS = 1000
 _DRIVE_MOVES = 0.05
 _DRIVE_RETURNS = 0.01
 _RETURN = 0.03
+_ARC = 0.3
 _SEVERE_SHARE = 0.05
 
 
@@ -71,8 +72,11 @@ def _clipped_voltage(record: Record) -> list[Notice]:
         runs = _runs_of_equal(np.where(u == rail, rail, np.arange(u.size)), 5)
         for a, b in runs.tolist():
             way = sign * y[a:b] * np.sign(np.dot(u - u.mean(), y - y.mean()) or 1.0)
-            # a stage that rings after a step also goes on and comes back, but ends far from where it was
-            if way.max() - max(way[0], way[-1]) > max(_RETURN * np.ptp(y), abs(way[0] - way[-1])):
+            rise = way - np.linspace(way[0], way[-1], way.size)
+            # a stage that rings after a step also goes on and comes back, but ends far from where it was, or swings
+            # about its level; a turning point that the recording lacks is one arc over the whole run
+            returns = way.max() - max(way[0], way[-1]) > max(_RETURN * np.ptp(y), abs(way[0] - way[-1]))
+            if returns and rise.mean() > _ARC * rise.max():
                 samples += b - a
     if not samples:
         return []

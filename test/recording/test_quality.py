@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import inspect
@@ -131,6 +132,18 @@ def test_a_voltage_that_its_recorder_cuts_off_is_clipped():
 def test_a_drive_that_saturates_is_no_defect():
     drive = np.minimum(sine(), 5.5)
     assert "clipped" not in kinds(Record(drive, stage(drive), PERIOD, "x"))
+
+
+@pytest.mark.parametrize("damping", [0.005, 0.02, 0.1])
+@pytest.mark.parametrize("rise", [0.002, 0.01])
+def test_a_stage_that_rings_on_the_flat_tops_of_a_trapezoid_is_not_clipped(damping, rise):
+    t = np.arange(10_000) * 1e-4
+    phase = t * 10.0 % 1.0
+    drive = 9.0 * np.clip(np.minimum(phase, 1.0 - phase) / (10.0 * rise), 0.0, 1.0)
+    pole = np.exp(2 * np.pi * 180.0 * 1e-4 * (-damping + 1j * np.sqrt(1 - damping**2)))
+    mode = np.real(np.poly([pole, np.conj(pole)]))
+    y = 2e-6 * lfilter([mode.sum()], mode, drive)
+    assert "clipped" not in kinds(Record(drive, y, 1e-4, "steps"))
 
 
 def test_a_stage_with_backlash_is_not_clipped():
