@@ -13,7 +13,7 @@ from .continuity import LONGEST_SILENCE, Continuity
 from .errors import DivergenceError, RecordError
 from .model import Model, samples
 from .sensor_zero import SensorZero
-from .voltage_history import VoltageHistory, is_held
+from .voltage_history import FULL_SAMPLES, VoltageHistory, is_held
 from .warmup import Warmup, chain_at
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ class Prediction:
     model : Model or None
         Model they come from.
     warming_up : bool
-        True while what happened before the first block still matters: the stream was joined in motion.
+        True while what the drive did unseen still matters: before the first block, or in a gap.
     """
 
     first: int
@@ -117,9 +117,11 @@ class Predictor:
 
     @property
     def warming_up(self) -> bool:
-        """True while what the drive did before the first block still matters."""
-        forgotten = self.model is not None and self._history.travel >= FORGETTING * self.model.voltage_scale
-        return self._history.began_in_motion and not forgotten
+        """True while what the drive did unseen, before the first block or in a gap, still matters."""
+        if self._unseen is None:
+            return False
+        travelled = self._history.travel - self._unseen
+        return self.model is None or travelled < FORGETTING * self.model.voltage_scale
 
     @property
     def residual_rms(self) -> float | None:
@@ -148,7 +150,13 @@ class Predictor:
         self._zero_from(self._history.count)
 
     def predict(
-        self, index: int, stamp: int, voltage: ArrayLike, displacement: ArrayLike, follows_gap: bool = False
+        self,
+        index: int,
+        stamp: int,
+        voltage: ArrayLike,
+        displacement: ArrayLike,
+        follows_gap: bool = False,
+        settled: bool = True,
     ) -> Prediction:
         """Follow the stage over the next block.
 
@@ -163,7 +171,9 @@ class Predictor:
         displacement : (n,) array_like
             Measured displacement [m].
         follows_gap : bool
-            True where the samples missing before the block were never measured.
+            True where the samples missing before the block were never measured: the drive was held meanwhile.
+        settled : bool
+            False where the stage has been driven before, so that a stream that begins here begins with loops unknown.
 
         Returns
         -------
@@ -183,11 +193,13 @@ class Predictor:
         drive, measured = drive[arrival.repeated :], measured[arrival.repeated :]
         modelled: Array | None = None
         if drive.size:
-            if arrival.restarted and self._history.count:
-                self._begin()
+            if arrival.restarted:
+                if self._history.count:
+                    self._begin()
+                self._joined_unseen = not (settled and is_held(drive))
+                self._unseen = 0.0 if self._joined_unseen else None
             if arrival.missing:
-                gap = min(arrival.missing, round(LONGEST_SILENCE / self.sample_period))
-                self._run(np.full(gap, self._history.last))
+                self._bridge(arrival.missing, follows_gap)
             modelled = self._run_and_zero(drive, measured)
         prediction = np.empty(0) if modelled is None else modelled + self.offset
         residual = measured[: prediction.size] - prediction
@@ -201,6 +213,8 @@ class Predictor:
         self._history = VoltageHistory(self.sample_period)
         self._state: ChainState | None = None
         self._warmup = None
+        self._unseen: float | None = None  # travel [V] at which the drive was last unknown
+        self._joined_unseen = False
         self._zero_from(0)
         if newest is not None:
             self.swap(newest)
@@ -208,6 +222,13 @@ class Predictor:
     def _zero_from(self, start: int, at_rest: bool = False) -> None:
         self._zero = SensorZero(start, self._window, at_rest)
         self._squares: deque[tuple[int, float]] = deque()
+
+    def _bridge(self, missing: int, never_measured: bool) -> None:
+        """Hold the last voltage; what was really driven is unknown where the samples were lost on the way."""
+        if not never_measured:
+            self._unseen = self._history.travel
+        gap = min(missing, round(LONGEST_SILENCE / self.sample_period), FULL_SAMPLES)
+        self._run(np.full(gap, self._history.last))
 
     def _run(self, drive: Array) -> Array | None:
         self._history.append(drive)
@@ -223,11 +244,12 @@ class Predictor:
         return modelled
 
     def _run_and_zero(self, drive: Array, measured: Array) -> Array | None:
-        start, had_rested, was_warming = self._history.count, self._history.has_rested, self.warming_up
+        start, had_rested = self._history.count, self._history.has_rested
         modelled = self._run(drive)
         if self._history.has_rested and not had_rested:
             self._zero_from(start, at_rest=True)
-        elif was_warming and not self.warming_up:
+        elif self._joined_unseen and not self.warming_up:
+            self._joined_unseen = False
             self._zero_from(start)
             self._zero.until = 2.0 * self._history.travel  # once more as far as what was forgotten
         elif self._zero.at_rest and not is_held(drive):

@@ -47,11 +47,11 @@ class VoltageHistory:
         self.count = 0
         """Samples of the stream so far."""
         self.travel = 0.0
-        """Way of the drive since the beginning of the stream [V]."""
+        """Way of the drive since the beginning of the stream [V], at least: from end to end of every block that is not
+        held, so that the noise of a measured drive is no way."""
+        self._counted = 0.0
         self.has_rested = False
         """True once a block of the drive stood still."""
-        self.began_in_motion = False
-        """True where the first block did not."""
         self._has_moved = False
         full = min(duration / sample_period, FULL_SAMPLES)
         self._limit = self.factor * max(1, round(full / self.factor))
@@ -74,14 +74,14 @@ class VoltageHistory:
         """Add the next samples [V], shape (n,)."""
         held = is_held(voltage)
         if self.count == 0:
-            self.began_in_motion = not held
             self.rest_voltage = float(np.median(voltage)) if held else float(voltage[0])
+            self._counted = self.rest_voltage
         self.count += voltage.size
         self.has_rested |= held
         if not self._has_moved and held and np.abs(voltage - self.rest_voltage).max() <= REST_TOLERANCE:
             return
         self._has_moved = True
-        self.travel += float(np.abs(np.diff(voltage, prepend=self.last)).sum())
+        self._travel(float(voltage.min()), float(voltage.max()), float(voltage[-1]))
         if self._kept + voltage.size > self._full.size:
             grown = np.empty(2 * (self._kept + voltage.size))
             grown[: self._kept] = self._full[: self._kept]
@@ -118,6 +118,12 @@ class VoltageHistory:
     @property
     def _full_start(self) -> int:
         return self.count - self._kept
+
+    def _travel(self, low: float, high: float, last: float) -> None:
+        way = max(high, self._counted) - min(low, self._counted)
+        if way > 2 * REST_TOLERANCE:
+            self.travel += way
+            self._counted = last
 
     def _average(self) -> None:
         old = (self._kept - self._limit) // self.factor * self.factor

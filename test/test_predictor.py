@@ -215,6 +215,46 @@ def test_a_stream_joined_in_motion_is_flagged_until_the_loops_have_forgotten() -
     assert np.abs(residual(answers[:3])).max() > 1e-2 * np.ptp(measured)
 
 
+def test_after_a_gap_nothing_counts_until_the_loops_have_forgotten() -> None:
+    """What the drive did in the gap is unknown: from the bottom to the top and back, or nothing."""
+    voltage = sine(30_000, rest=1000)
+    measured = truth(MODEL, voltage)
+    predictor = Predictor(PERIOD, MODEL)
+    assert not any(a.warming_up for a in feed(predictor, voltage[:11_400], measured[:11_400]))
+    after = feed(predictor, voltage[12_200:], measured[12_200:], first=12_200, stamp=244_000_000)
+    flags = [a.warming_up for a in after]
+    assert flags[0]
+    assert flags == sorted(flags, reverse=True)
+    known = [a for a in after if not a.warming_up]
+    assert len(known) > len(after) / 2
+    assert np.abs(residual(known)).max() < 1e-3 * np.ptp(measured)
+    assert np.abs(residual(after[:3])).max() > 1e-2 * np.ptp(measured)
+
+
+def test_a_gap_at_rest_may_hide_a_loop() -> None:
+    predictor = Predictor(PERIOD, MODEL)
+    rest = np.zeros(500)
+    assert not any(a.warming_up for a in feed(predictor, rest, rest))
+    assert predictor.predict(2000, 40_000_000, rest, rest).warming_up
+    assert predictor.predict(2500, 50_000_000, rest, rest).warming_up
+
+
+def test_what_was_never_measured_is_known_and_a_stage_driven_before_is_not() -> None:
+    rest = np.zeros(500)
+    for settled in (True, False):
+        predictor = Predictor(PERIOD, MODEL)
+        assert predictor.predict(0, 0, rest, rest, settled=settled).warming_up is not settled
+        assert predictor.predict(2000, 40_000_000, rest, rest, follows_gap=True).warming_up is not settled
+
+
+def test_noise_of_a_measured_drive_forgets_nothing() -> None:
+    voltage = sine(1000, rest=0)[500:]
+    held = voltage[-1] + 1e-3 * np.random.default_rng(1).standard_normal(200_000)
+    predictor = Predictor(PERIOD, MODEL)
+    stream = np.concatenate((voltage, held))
+    assert all(answer.warming_up for answer in feed(predictor, stream, truth(MODEL, stream)))
+
+
 def test_the_offset_comes_from_the_first_rest_only() -> None:
     """Ten noisy milliseconds per block average out; what moves later cannot shift the zero."""
     random = np.random.default_rng(1)

@@ -12,7 +12,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
 
-from ..errors import RecordingError
+from ..errors import RecordError, RecordingError
 from ..recording import BagWriter
 from .conversions import samples_from_cloud
 from .quality import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES
@@ -78,7 +78,10 @@ class BagRecorder:
         """True where the newest sample written is number `index` (modulo 2³²) or a later one."""
         if not self._newest:
             return False
-        newest = int(samples_from_cloud(deserialize_message(self._newest, PointCloud2)).index[-1])
+        try:
+            newest = int(samples_from_cloud(deserialize_message(self._newest, PointCloud2)).index[-1])
+        except RecordError:
+            return False
         return (newest - index) % 2**32 < 2**31
 
     def close(self) -> None:

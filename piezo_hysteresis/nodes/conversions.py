@@ -36,6 +36,9 @@ COMMAND = {"time": "f8", "voltage": "f8"}
 _PERIOD_TOLERANCE = 0.01
 """Largest departure of a sample from its place on the clock, in sample periods."""
 
+_END_OF_TIME = 2**31
+"""Messages count seconds in 32 bits."""
+
 _PHASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 
@@ -96,12 +99,30 @@ def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
     Raises
     ------
     RecordError
-        On missing or wrong fields, wrong sizes, non-finite values.
+        On missing or wrong fields, wrong sizes, non-finite values, or samples that do not follow one another evenly.
     """
     arrays = from_cloud(cloud, SAMPLES)
-    return SampleBlock(
+    block = SampleBlock(
         from_stamp(cloud.header.stamp), **arrays, stage=cloud.header.frame_id, follows_gap=not cloud.is_dense
     )
+    _require_consecutive(block)
+    return block
+
+
+def _require_consecutive(block: SampleBlock) -> None:
+    count = np.arange(block.size)
+    jumps = block.index - block.index[0] != count.astype(np.uint32)
+    if jumps.any():
+        raise RecordError(f"samples: the index jumps at sample {int(jumps.argmax())}, expected consecutive samples")
+    first, last = float(block.time[0]), float(block.time[-1])
+    if not all(0 <= block.stamp * 1e-9 + time < _END_OF_TIME for time in (first, last)):
+        raise RecordError(f"samples: got {first:g} to {last:g} s after the stamp {block.stamp} ns, expected a date")
+    period = block.sample_period
+    if period is None:
+        return
+    off = float(np.abs(block.time - first - period * count).max())
+    if not off <= _PERIOD_TOLERANCE * period:
+        raise RecordError(f"samples: times are {off:.3g} s off a period of {period:.6g} s, expected even ones")
 
 
 def predicted_to_cloud(
@@ -224,5 +245,13 @@ def to_stamp(nanoseconds: int) -> Time:
 
 
 def from_stamp(stamp: Time) -> int:
-    """Nanoseconds since the epoch of a message time."""
+    """Nanoseconds since the epoch of a message time.
+
+    Raises
+    ------
+    RecordError
+        On a full second or more of nanoseconds.
+    """
+    if stamp.nanosec >= 1_000_000_000:
+        raise RecordError(f"stamp: got {stamp.nanosec} ns, expected less than a second")
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

@@ -14,6 +14,11 @@ from .driver_session import DriverSession
 from .driver_topics import DriverTopics
 from .quality import COMMAND
 
+_LONGEST_NAME = 64
+
+_LOG_INTERVAL = 0.1
+"""Shortest time between two lines of one kind in the log [s]: a flood of commands fills no disk."""
+
 
 class DriverCommands:
     """Passes commands to the attached stage, or refuses them whole; every refusal is told with its reason.
@@ -50,16 +55,18 @@ class DriverCommands:
         return int(self._node.get_clock().now().nanoseconds)
 
     def _on_command(self, cloud: PointCloud2) -> None:
-        name, stamp = cloud.header.frame_id, from_stamp(cloud.header.stamp)
+        name, stamp = cloud.header.frame_id[:_LONGEST_NAME], 0
         try:
+            stamp = from_stamp(cloud.header.stamp)
             session, topics = self._stage()
-            name = phase_name(name)
+            name = phase_name(cloud.header.frame_id)
             waveform = session.check.waveform(cloud, self._now())
             phase = session.streaming.play(waveform, name, stamp, session.check.first_step, topics.accepted)
         except PiezoError as error:
             self._refuse(name, stamp, error)
         else:
-            self._node.get_logger().info(f"playing {phase}: {waveform.size * session.sample_period:g} s")
+            told = f"playing {phase}: {waveform.size * session.sample_period:g} s"
+            self._node.get_logger().info(told, throttle_duration_sec=_LOG_INTERVAL)
 
     def _on_set_voltage(self, message: Float64) -> None:
         try:
@@ -79,11 +86,11 @@ class DriverCommands:
         if not was_playing:
             topics.stopped(phase)
         response.message = f"on the way to the safe voltage, {session.limits.safe_voltage:g} V"
-        self._node.get_logger().info(f"stopped {phase}: {response.message}")
+        self._node.get_logger().info(f"stopped {phase}: {response.message}", throttle_duration_sec=_LOG_INTERVAL)
         return response
 
     def _refuse(self, name: str, stamp: int, reason: PiezoError) -> None:
         self._diagnostics.refused += 1
-        self._node.get_logger().warning(f"refused '{name}': {reason}")
+        self._node.get_logger().warning(f"refused '{name}': {reason}", throttle_duration_sec=_LOG_INTERVAL)
         if self._attached is not None:
             self._attached[1].refused(name, stamp, str(reason))

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
-from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from ..errors import PiezoError
 from ..identification.drive import DriveLimits
 from ..identification.protocol import Phase
-from .conversions import command_to_cloud, values_of
+from .command_sender import CommandSender
+from .conversions import values_of
 from .quality import COMMAND, COMMAND_STATUS
-from .sending import send
 
 _NAMES = ("sample_period", "voltage_min", "voltage_max", "safe_voltage", "max_slew_rate", "ramp_rate")
 
@@ -42,7 +42,7 @@ class DriverLink:
     limits : DriveLimits or None
         What the driver accepts; None while there is no configured driver.
     state, reason : str
-        Fate of the last phase sent: ``sent``, ``accepted``, ``playing``, ``done``, ``refused`` or ``stopped``.
+        Fate of the last phase: ``sending``, ``sent``, ``accepted``, ``playing``, ``done``, ``refused`` or ``stopped``.
     first_index : int
         Index of its first sample, once it plays.
     """
@@ -57,7 +57,7 @@ class DriverLink:
         self._pending: Future | None = None
         self._parameters = AsyncParameterClient(node, driver)
         self._stop = node.create_client(Trigger, f"{driver}/stop")
-        self._command = node.create_publisher(PointCloud2, "command", COMMAND)
+        self._command = CommandSender(node)
         node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
         node.create_subscription(Float64, "voltage", self._on_voltage, COMMAND)
         node.create_timer(_POLL_INTERVAL, self._poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -67,7 +67,7 @@ class DriverLink:
         """What is still missing before a phase can be sent; empty when nothing is."""
         if self.limits is None:
             return f"a configured '{self._driver}' in {self._node.get_namespace()}"
-        if self._command.get_subscription_count() == 0:
+        if self._command.subscribers == 0:
             return "a subscriber of 'command'"
         if self._newest is None:
             return "a first 'voltage'; is the driver active?"
@@ -83,15 +83,23 @@ class DriverLink:
         )
 
     def send(self, phase: Phase) -> None:
-        """Send a phase as a command with the stamp of now."""
-        stamp = self._node.get_clock().now().to_msg()
-        self._sent = (phase.name, f"{stamp.sec}.{stamp.nanosec:09d}")
-        self.state, self.reason = "sent", ""
-        if not send(self._command, command_to_cloud(phase.voltage, phase.sample_period, phase.name, stamp)):
+        """Send a phase as a command, without waiting until it has left."""
+        self._sent, self.state, self.reason = None, "sending", ""
+
+        def leaving(stamp: Time) -> None:
+            self._sent, self.state = (phase.name, f"{stamp.sec}.{stamp.nanosec:09d}"), "sent"
+
+        def lost() -> None:
             self.state, self.reason = "refused", "the middleware did not take the waveform"
 
+        self._command.send(phase, leaving, lost)
+
     def stop(self) -> Future | None:
-        """Ask the driver to go to the safe voltage; None where there is no driver to ask."""
+        """Ask the driver to go to the safe voltage; None where there is no driver to ask.
+
+        A phase that is on its way arrives first.
+        """
+        self._command.call_off()
         self._sent = None
         return self._stop.call_async(Trigger.Request()) if self._stop.service_is_ready() else None
 
@@ -111,8 +119,8 @@ class DriverLink:
         if len(values) == len(_NAMES) and values[0]:
             try:
                 self.limits = DriveLimits(**dict(zip(_NAMES, values, strict=True)))
-            except PiezoError as error:
-                self._node.get_logger().warning(f"the driver's limits: {error}")
+            except (PiezoError, TypeError) as error:
+                self._node.get_logger().warning(f"the driver's limits: {error}", throttle_duration_sec=10.0)
 
     def _on_voltage(self, message: Float64) -> None:
         self._newest = float(message.data)
@@ -121,4 +129,6 @@ class DriverLink:
         values = values_of(status)
         if self._sent == (status.name, values.get("stamp")):
             self.state, self.reason = values.get("state", ""), status.message
-            self.first_index = int(values.get("first_index", self.first_index))
+            first = values.get("first_index", "")
+            if first.isdecimal() and len(first) <= 10:
+                self.first_index = int(first)

@@ -15,6 +15,9 @@ from ..predictor import Predictor
 from .conversions import SampleBlock, diagnostic
 from .sending import send
 
+_LOG_INTERVAL = 0.1
+"""Shortest time between two lines of one kind in the log [s]: no stream of faults fills a disk."""
+
 
 class ModelDiagnostics:
     """Publishes rate, losses, latency, and the residual against what the model file promises.
@@ -44,13 +47,13 @@ class ModelDiagnostics:
     def problem(self, message: str) -> None:
         """Tell one line of what went wrong, now and in the next report."""
         if message != self._problem:
-            self._node.get_logger().warning(message)
+            self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
         self._problem = message
         self._problems += 1
 
     def refused(self, message: str) -> None:
         """Tell why a model was not taken, until another one is."""
-        self._node.get_logger().warning(message)
+        self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
         self._refused = message
         self._problems += 1
 
@@ -61,7 +64,8 @@ class ModelDiagnostics:
             self._promised = float(model.provenance["free_run_error"])
         except (KeyError, ValueError):
             self._promised = None
-        self._node.get_logger().info(f"model {model_hash(model)}: {', '.join(e.name for e in model.effects)}")
+        told = f"model {model_hash(model)}: {', '.join(e.name for e in model.effects)}"
+        self._node.get_logger().info(told, throttle_duration_sec=_LOG_INTERVAL)
 
     def follow(self, predictor: Predictor) -> None:
         """Tell the figures of a predictor from now on."""
@@ -124,7 +128,10 @@ class ModelDiagnostics:
         if predictor.model is None:
             return
         if predictor.warming_up:
-            yield DiagnosticStatus.WARN, "warming up: joined in motion, what was before is unknown"
+            yield (
+                DiagnosticStatus.WARN,
+                "warming up: what the drive did before, or in a gap, is unknown",
+            )
         rms = predictor.residual_rms
         if rms is not None and promised is not None and rms > self._warn * promised:
             level = DiagnosticStatus.ERROR if rms > self._error * promised else DiagnosticStatus.WARN

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
@@ -64,13 +63,17 @@ class ModelNode(Node):
     def _on_samples(self, cloud: PointCloud2) -> None:
         try:
             block = samples_from_cloud(cloud)
-            if (np.diff(block.index) != 1).any():
-                raise RecordError("samples: got an index that jumps within a block, expected consecutive samples")
             predictor = self._predictor_for(block)
             if predictor is None:
                 return
-            start = block.stamp + round(float(block.time[0]) * 1e9)
-            answer = predictor.predict(int(block.index[0]), start, block.voltage, block.displacement, block.follows_gap)
+            answer = predictor.predict(
+                int(block.index[0]),
+                block.stamp + round(float(block.time[0]) * 1e9),
+                block.voltage,
+                block.displacement,
+                follows_gap=block.follows_gap,
+                settled=block.index[0] == 0 or block.phase[0] == 0,  # nothing was driven since the driver began
+            )
         except PiezoError as error:
             self._diagnostics.problem(str(error))
             return

@@ -121,6 +121,41 @@ def test_a_broken_cloud_is_refused_in_one_line(what):
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"index": np.array([0, 1, 2, 4], np.uint32)}, "index jumps"),
+        ({"index": np.array([3, 2, 1, 0], np.uint32)}, "index jumps"),
+        ({"time": np.array([0.0, 1.0, 2.0, 3.5])}, "even"),
+        ({"time": -np.arange(4.0)}, "even"),
+        ({"time": np.zeros(4)}, None),
+        ({"time": np.full(4, 1e300)}, "expected a date"),
+        ({"time": np.array([0.0, 1e308, -1e308, 3.0])}, "even"),
+        ({"stamp": (2**31 - 1) * 10**9, "time": np.arange(4.0)}, "expected a date"),
+    ],
+)
+def test_a_block_is_consecutive_even_and_has_a_date(changes, reason):
+    """What would break a node that counts on it further on."""
+    message = conversions.samples_to_cloud(block_of(4, **changes))
+    if reason is None:
+        assert conversions.samples_from_cloud(message).sample_period == 0.0
+        return
+    with pytest.raises(RecordError, match=reason):
+        conversions.samples_from_cloud(message)
+
+
+def test_an_index_that_wraps_is_consecutive():
+    block = block_of(10, 2**32 - 5)
+    assert np.array_equal(conversions.samples_from_cloud(conversions.samples_to_cloud(block)).index, block.index)
+
+
+def test_a_stamp_with_a_second_of_nanoseconds_is_refused():
+    message = conversions.command_to_cloud([0.0], 1.0, "step")
+    message.header.stamp.nanosec = 4_000_000_000
+    with pytest.raises(RecordError, match="less than a second"):
+        conversions.from_stamp(message.header.stamp)
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("name", ["time", "voltage", "displacement"])
 def test_non_finite_samples_are_refused(name, value):
