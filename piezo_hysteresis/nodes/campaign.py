@@ -115,7 +115,7 @@ def _play(driver: DriverLink, recorder: BagRecorder, phase: Phase, told: Progres
     while driver.state != "done":
         if driver.state in ("refused", "stopped"):
             raise StageError(f"phase '{phase.name}' was {driver.state}: {driver.reason}")
-        if driver.state == "sent" and time.monotonic() > deadline:
+        if driver.state in ("sending", "sent") and time.monotonic() > deadline:
             raise StageError(f"phase '{phase.name}': no answer on 'command_status' within {PATIENCE:g} s")
         if recorder.silence > longest_silence:
             raise StageError(f"phase '{phase.name}': no samples for {longest_silence:g} s; is the driver alive?")

@@ -51,6 +51,8 @@ def to_cloud(
         points[name] = columns[name]
         fields.append(PointField(name=name, offset=offset, datatype=_CODES[word], count=1))
         offset += int(word[1])
+    data = array.array("B")
+    data.frombytes(points.view(np.uint8))
     return PointCloud2(
         header=Header(stamp=stamp, frame_id=frame_id),
         height=1,
@@ -59,7 +61,7 @@ def to_cloud(
         is_bigendian=False,
         point_step=offset,
         row_step=offset * points.size,
-        data=array.array("B", points.tobytes()),
+        data=data,
         is_dense=dense,
     )
 

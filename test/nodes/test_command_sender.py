@@ -1,0 +1,73 @@
+"""Long waveforms: the node goes on while one is packed, its age is that of its way, and what was called off stays."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.identification.protocol import Phase
+from piezo_hysteresis.nodes.driver_link import DriverLink
+
+pytestmark = pytest.mark.nodes
+
+PERIOD = 2e-5
+MAX_AGE = 2.0
+
+
+class SlowToPack:
+    """A waveform that takes longer to pack than a command may be old."""
+
+    def __init__(self, voltage, delay):
+        self._voltage, self._delay, self.begun = voltage, delay, threading.Event()
+
+    def __array__(self, dtype=None, copy=None):
+        self.begun.set()
+        time.sleep(self._delay)
+        return self._voltage
+
+
+@pytest.fixture(scope="module")
+def link(shared_lab):
+    """The driver as the identification node sees it, and the states that its node saw while it went on."""
+    lab = shared_lab
+    lab.driver(simulated__electronics__dac_bits=0.0, command_max_age=MAX_AGE)
+    lab.streaming()
+    link = lab.do(lambda: DriverLink(lab.node, "driver_node"))
+    link.seen = []
+    lab.node.create_timer(0.005, lambda: link.seen.append(link.state))
+    lab.wait(lambda: not link.missing, "the driver")
+    return link
+
+
+def test_a_waveform_that_is_long_in_packing_keeps_nobody_waiting_and_is_not_too_old(shared_lab, link):
+    lab = shared_lab
+    samples = lab.samples()
+    wave = np.linspace(0, 1, 2000)
+    lab.do(lambda: link.send(Phase("slow", SlowToPack(wave, 1.05 * MAX_AGE), PERIOD)))
+    lab.wait(lambda: link.state in ("done", "refused"), "the end of the phase")
+    assert (link.state, link.reason) == ("done", "done")
+    assert link.seen.count("sending") > 10, "the node went on meanwhile"
+    lab.wait(lambda: samples.newest.voltage[-1] == 1.0, "the last sample")
+
+
+def test_eighty_seconds_of_drive_in_one_message(shared_lab, link):
+    lab = shared_lab
+    lab.do(lambda: link.send(Phase("staircase", np.zeros(4_000_000), PERIOD)))
+    lab.wait(lambda: link.state in ("playing", "refused"), "the phase")
+    assert link.state == "playing", link.reason
+    statuses = lab.statuses()
+    assert lab.do(link.stop) is not None
+    lab.wait(lambda: "stopped" in lab.states(statuses, "staircase"), "the stop")
+
+
+def test_what_is_called_off_while_it_is_packed_never_leaves(shared_lab, link):
+    lab = shared_lab
+    statuses = lab.statuses()
+    slow = SlowToPack(np.full(2000, 1.0), 0.5)
+    lab.do(lambda: link.send(Phase("called_off", slow, PERIOD)))
+    assert slow.begun.wait(30.0)
+    lab.do(link.stop)
+    lab.send(np.linspace(0, 1, 2000), "next")
+    lab.wait(lambda: "done" in lab.states(statuses, "next"), "the next command")
+    assert lab.states(statuses, "called_off") == []
