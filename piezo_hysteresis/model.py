@@ -27,14 +27,14 @@ def _place(effect: Effect) -> tuple[int, int]:
 
 
 def samples(values: ArrayLike, name: str) -> Array:
-    """A fresh contiguous float64 copy, so that kernels meet one array type; finite, shape (n,).
+    """As float64, finite, shape (n,); not a copy where the values are that already.
 
     Raises
     ------
     ModelError
         On another shape, no sample, or a non-finite one.
     """
-    array = np.array(values, dtype=np.float64, order="C")
+    array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1 or array.size == 0:
         raise ModelError(f"{name}: got shape {array.shape}, expected one dimension with at least one sample")
     if not np.isfinite(array).all():
@@ -210,7 +210,7 @@ class Model:
                 state = chain.rest(record.settled_voltage, record.start_time)
             elif before is not chain:
                 state = chain.resume(state)
-            y, state = chain.run(np.array(record.voltage), state, channels_of(record))
+            y, state = chain.run(record.voltage, state, channels_of(record))
             if index is not None:
                 outputs.append(y)
         return outputs

@@ -11,6 +11,9 @@ from .linear_block import LinearBlock
 ORDER = 8
 """Taps and feedback go in groups of this many, padded with zeros: eight numbers stay in registers."""
 
+TILE = 1024
+"""Samples that go through taps and feedback together, so that they stay in the first cache."""
+
 
 def lagrange(fraction: float) -> tuple[Array, Array]:
     """Third-order interpolation at delay 1 + fraction over taps 0 … 3, and its derivative, each shape (4,).
@@ -75,17 +78,31 @@ def recur(a, z, y):
 
 
 @kernel
-def arx_filter(x, taps, offset, a, z, y):
-    """Rows of x (r, n) through taps delayed by offset and 1/A; z (r, inputs + a.size) is updated, y (r, n) filled."""
-    inputs, n = offset + taps.size - 1, x.shape[1]
-    held = np.empty(inputs + n)
-    for r in range(x.shape[0]):
-        held[:inputs] = z[r, :inputs]
-        held[inputs:] = x[r]
-        weigh(held[: inputs + n - offset], taps, y[r])
+def arx_row(x, x0, y0, taps, offset, a, z, y):
+    """y (n,) = y0 + x (n,) − x0 through taps delayed by offset and 1/A; z (inputs + a.size,) is updated."""
+    inputs = offset + taps.size - 1
+    held = np.empty(inputs + min(TILE, x.size))
+    held[:inputs] = z[:inputs]
+    for start in range(0, x.size, TILE):
+        near, out = x[start : start + TILE], y[start : start + TILE]
+        n = near.size
+        for i in range(n):
+            held[inputs + i] = near[i] - x0
+        weigh(held[: inputs + n - offset], taps, out)
         if a.size:
-            recur(a, z[r, inputs:], y[r])
-        z[r, :inputs] = held[n:]
+            recur(a, z[inputs:], out)
+        for i in range(n):
+            out[i] += y0
+        for i in range(inputs):
+            held[i] = held[n + i]
+    z[:inputs] = held[:inputs]
+
+
+@kernel
+def arx_filter(x, taps, offset, a, z, y):
+    """Rows of x (r, n) through `arx_row` at rest at zero; z (r, inputs + a.size) is updated, y (r, n) filled."""
+    for r in range(x.shape[0]):
+        arx_row(x[r], 0.0, 0.0, taps, offset, a, z[r], y[r])
 
 
 @kernel
@@ -125,6 +142,12 @@ class ArxBlock(LinearBlock):
 
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.offset + self.taps.size - 1 + self.feedback.size))
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        x0, z = state
+        y, z = np.empty_like(x), z.copy()
+        arx_row(x, x0, self.gain * x0, self.taps, self.offset, self.feedback, z[0], y)
+        return y, (x0, z)
 
     def filter(self, x: Array, z: Array, y: Array) -> Array:
         z = z.copy()

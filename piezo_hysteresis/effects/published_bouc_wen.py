@@ -46,6 +46,14 @@ class PublishedBoucWen(Effect):
 
 
 @kernel
+def step(h, drive, damp, turn, n):
+    """h of Eq. (7) after drive = A Δv, damp = β|Δv|, turn = γ Δv; for n = 1 little waits for the last h."""
+    if n == 1.0:
+        return (h * (1.0 - damp) + drive) - turn * abs(h)
+    return h + (drive - (damp * h + turn * abs(h)) * abs(h) ** (n - 1.0))
+
+
+@kernel
 def run_published(v, p, state, w):
     """Eq. (6) and (7); p = [A, beta, gamma, n, p1, p2], state = [h, v_last] is updated, w (n,) filled."""
     a, beta, gamma, n, p1, p2 = p[0], p[1], p[2], p[3], p[4], p[5]
@@ -55,10 +63,7 @@ def run_published(v, p, state, w):
         dv = x - last
         last = x
         damp, turn = beta * abs(dv), gamma * dv
-        loss = (damp + turn if h >= 0.0 else damp - turn) * h
-        if n != 1.0:
-            loss *= abs(h) ** (n - 1.0)
-        h = h + (a * dv - loss)
+        h = step(h, a * dv, damp, turn, n)
         w[i] = p1 * x * x * x + p2 * x + h
     state[0], state[1] = h, last
 
@@ -97,7 +102,7 @@ def linearise_published(v, dv_in, p, state, tangent, last_in, w, dw):
             dw[j, i] = tangent[j]
         dw[m + 4, i] = x * x * x
         dw[m + 5, i] = x
-        h = h + (a * dv - loss)
+        h = step(h, a * dv, damp, turn, n)
         w[i] = p1 * x * x * x + p2 * x + h
     state[0], state[1] = h, last
 
