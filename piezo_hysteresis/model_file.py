@@ -11,7 +11,7 @@ from pathlib import Path
 from .errors import ModelError
 from .model import Model
 from .model_parameters import PREFIX, SCALES, from_parameters, to_parameters
-from .parameter_file import Entry, entry, parameters
+from .parameter_file import LONGEST_TEXT, Entry, entry, parameters
 
 _HEADER = """\
 # Model of a piezo stage: a ROS 2 parameter file, in SI units. Load it with --params-file, or give it to `piezo`.
@@ -109,7 +109,8 @@ def load(path: str | Path) -> Model:
     """
     path = Path(path).expanduser()
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open(encoding="utf-8") as file:
+            text = file.read(LONGEST_TEXT + 1)
     except OSError as error:
         raise ModelError(f"{path}: {error.strerror or error}, expected a model file") from None
     except UnicodeError:

@@ -19,9 +19,13 @@ Entry = Scalar | list[Scalar]
 
 _TRUE = {"y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
 _FALSE = {"n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
-_INTEGER = re.compile(r"[-+]?(0[xX][0-9a-fA-F]+|[0-9]+)")
+_INTEGER = re.compile(r"[-+]?(0[xX][0-9a-fA-F]{1,15}|[0-9]{1,18})")  # longer ones are doubles to rcl
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.?[0-9]*)([eE][-+]?[0-9]+)?")
 _SPECIAL = re.compile(r"([-+]?)\.(inf|Inf|INF|nan|NaN|NAN)")
+
+
+LONGEST_TEXT = 1_000_000
+"""Characters of a parameter file at most: parsing takes a hundred times as much memory, and a second."""
 
 
 def number(value: float) -> str:
@@ -73,15 +77,17 @@ def parameters(text: str, source: str = "parameter file") -> dict[str, dict[str,
     Raises
     ------
     ParameterError
-        If the text is no YAML, gives a parameter twice, or holds no ``ros__parameters``.
+        If the text is no YAML, too long, uses aliases, gives a parameter twice, or holds no ``ros__parameters``.
 
     Examples
     --------
     >>> parameters("/**: {ros__parameters: {rate: 1e3, x: {y: [a, b]}}}")
     {'/**': {'rate': 1000.0, 'x.y': ['a', 'b']}}
     """
+    if len(text) > LONGEST_TEXT:
+        raise ParameterError(f"{source}: got more than {LONGEST_TEXT} characters, expected a ROS 2 parameter file")
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        root = yaml.compose(text, Loader=_Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f" in line {mark.line + 1}" if mark else ""
@@ -99,6 +105,17 @@ def parameters(text: str, source: str = "parameter file") -> dict[str, dict[str,
     if not found:
         raise ParameterError(f"{source}: got no 'ros__parameters', expected a ROS 2 parameter file keyed '/**'")
     return found
+
+
+class _Loader(yaml.SafeLoader):
+    """Without aliases, as rcl: a few of them in one another stand for a text without end."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.composer.ComposerError(
+                None, None, "got an alias, which ROS does not read", self.peek_event().start_mark
+            )
+        return super().compose_node(parent, index)
 
 
 def _nodes(node: yaml.Node | None, path: str, depth: int = 0) -> Iterator[tuple[str, yaml.MappingNode]]:

@@ -27,6 +27,9 @@ ZERO_SAMPLES = 20
 PIECE = 50_000
 """Samples of the history that a new model is run over with every block: a few milliseconds of computing."""
 
+SHORTEST_PERIOD, LONGEST_PERIOD = 1e-7, 1e3
+"""Sample periods of a stream [s]: memory goes with their inverse."""
+
 FORGETTING = 2.0
 """Voltage scales after which loops have forgotten where they came from, exponentially with the way travelled."""
 
@@ -81,6 +84,8 @@ class Predictor:
 
     Raises
     ------
+    RecordError
+        On a sample period that no stage has.
     ModelError
         If the stream is faster than the model.
 
@@ -94,11 +99,17 @@ class Predictor:
     """
 
     def __init__(self, sample_period: float, model: Model | None = None, rms_time: float = 1.0) -> None:
+        if not SHORTEST_PERIOD <= sample_period <= LONGEST_PERIOD:
+            raise RecordError(
+                f"sample period: got {sample_period:g} s, expected {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
+            )
         self.sample_period = sample_period
         self.continuity = Continuity(sample_period)
         self.model: Model | None = None
         self._chain: Chain | None = None
         self._warmup: Warmup | None = None
+        self._unseen: float | None = None  # travel [V] at which the drive was last unknown
+        self._joined_unseen = False
         self._window = max(ZERO_SAMPLES, round(ZERO_TIME / sample_period))
         self._rms_samples = max(1, round(rms_time / sample_period))
         self._begin()
@@ -213,8 +224,6 @@ class Predictor:
         self._history = VoltageHistory(self.sample_period)
         self._state: ChainState | None = None
         self._warmup = None
-        self._unseen: float | None = None  # travel [V] at which the drive was last unknown
-        self._joined_unseen = False
         self._zero_from(0)
         if newest is not None:
             self.swap(newest)

@@ -45,7 +45,7 @@ def _read(path: str | None) -> PlantParameters:
         mapping = yaml.safe_load(Path(path).expanduser().read_text(encoding="utf-8"))
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}, expected a YAML file") from None
-    except (yaml.YAMLError, UnicodeError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ParameterError(f"{path}: broken YAML ({' '.join(str(error).split())[:120]})") from None
     if not isinstance(mapping, dict):
         raise ParameterError(f"{path}: got a {type(mapping).__name__}, expected part.quantity: value")

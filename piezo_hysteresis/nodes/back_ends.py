@@ -83,7 +83,7 @@ def _read_mapping(path: Path) -> Mapping[str, Any]:
         mapping = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise StageError(f"simulated.plant_file: cannot read {path} ({error.strerror})") from None
-    except (yaml.YAMLError, UnicodeDecodeError):
+    except (yaml.YAMLError, ValueError, RecursionError):
         raise StageError(f"simulated.plant_file: {path} is no YAML, expected plant parameters by name") from None
     if not isinstance(mapping, Mapping):
         raise StageError(f"simulated.plant_file: {path} holds no mapping, expected plant parameters by name")

@@ -71,7 +71,7 @@ class Bag:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        files = [path] if path.is_file() else sorted(path.iterdir(), key=_order)
+        files = [path] if path.is_file() else sorted((f for f in path.iterdir() if f.is_file()), key=_order)
         self._files: list[BagFile] = [STORAGES[f.suffix](f) for f in files if f.suffix in STORAGES]
         packed = [f.name for f in files if f.suffix == ".zstd"]
         if packed:
@@ -127,6 +127,7 @@ def _message_compression(path: Path) -> bool:
         return False
     try:
         information = yaml.safe_load(metadata.read_text(errors="replace"))["rosbag2_bagfile_information"]
-        return str(information.get("compression_mode", "")).lower() == "message"
-    except (yaml.YAMLError, TypeError, KeyError, AttributeError, RecursionError):
+        mode = information.get("compression_mode", "")
+        return isinstance(mode, str) and mode.lower() == "message"
+    except (yaml.YAMLError, TypeError, KeyError, AttributeError, ValueError, RecursionError):
         return False  # metadata are not needed to read a bag

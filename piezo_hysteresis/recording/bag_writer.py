@@ -19,8 +19,8 @@ from .damage import naming
 CHUNK_BYTES = 256 * 1024
 """Messages are indexed and written in chunks of this size; a cut file loses at most the last one."""
 
-FLUSH_INTERVAL = 1.0
-"""Longest time for which a message stays in memory while others arrive [s]."""
+FLUSH_INTERVAL = 0.5
+"""Longest time for which a message stays in memory while others arrive [s]: no message older than a second is lost."""
 
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _EXPECTED = "a folder in which a bag can be written"
@@ -29,7 +29,7 @@ _EXPECTED = "a folder in which a bag can be written"
 class BagWriter:
     """Incremental recorder of serialised messages as rosbag2 directory, storage mcap, version 9.
 
-    ``<bag>/<bag>_0.mcap`` grows in small chunks that reach the file at least once a second; ``metadata.yaml`` is valid
+    ``<bag>/<bag>_0.mcap`` grows in small chunks that reach the file twice a second; ``metadata.yaml`` is valid
     from the start and complete after `close`.
 
     Parameters

@@ -34,9 +34,9 @@ def load_decimation(folder: Path) -> dict[str, int]:
         factors = yaml.safe_load((folder / FILE).read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
         return {}
-    except (OSError, UnicodeError, yaml.YAMLError):
+    except (OSError, ValueError, RecursionError, yaml.YAMLError):  # ValueError: dates that do not exist
         raise RecordingError(f"{folder / FILE}: cannot be read, expected phase names and whole numbers") from None
     whole = isinstance(factors, dict) and all(type(n) is int and n >= 1 for n in factors.values())
     if not whole:
-        raise RecordingError(f"{folder / FILE}: got {factors!r}, expected phase names and whole numbers")
+        raise RecordingError(f"{folder / FILE}: got something else, expected phase names and whole numbers")
     return {str(name): number for name, number in factors.items()}
