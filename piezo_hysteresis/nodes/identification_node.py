@@ -39,8 +39,10 @@ IDENTIFICATION: tuple[Row, ...] = (
     Setting("protocol", "short", "what is played to the stage", tuple(PROTOCOLS)),
     Setting("seed", 0, "fixes everything random in the protocol"),
     Setting("driver", "driver_node", "name of the driver node in the same namespace; read at start"),
-    Setting("experiment", "", "recording for ~/diagnose; empty: the last one"),
-    Setting("experiment_root", "", "folder of the recordings; empty: ~/.ros/piezo_hysteresis/<namespace>"),
+    Setting("experiment", "", "recording for ~/diagnose, inside experiment_root; empty: the last one"),
+    Setting(
+        "experiment_root", "", "folder of the recordings, read at start; empty: ~/.ros/piezo_hysteresis/<namespace>"
+    ),
 )
 
 START = Model((BoucWen(), Arx(), Offset()), 2e-5)
@@ -193,11 +195,22 @@ class IdentificationNode(Node):
             for parameter in parameters:
                 if parameter.name in rows:
                     rows[parameter.name].check(parameter.value)
+                    self._check_place(parameter)
                 elif not (parameter.name.startswith(PREFIX) or self.has_parameter(parameter.name)):
                     raise ParameterError(f"{parameter.name} is no parameter of this node, expected {', '.join(rows)}")
         except PiezoError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _check_place(self, parameter: Parameter) -> None:
+        """Others shall not choose where this node writes: a diagnosis leaves files beside its recording."""
+        if parameter.name in ("driver", "experiment_root"):
+            raise ParameterError(f"{parameter.name} is read at start; give it then")
+        root = self._root().resolve()
+        if parameter.name == "experiment" and parameter.value:
+            place = Path(parameter.value).expanduser().resolve()
+            if not (place.is_relative_to(root) and place.exists()):
+                raise ParameterError(f"experiment: got {place}, expected a recording inside {root}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

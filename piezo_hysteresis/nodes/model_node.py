@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -13,7 +14,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from ..errors import PiezoError, RecordError
+from ..errors import ModelError, PiezoError, RecordError
 from ..model import Model
 from ..model_file import load, loads
 from ..parameter import Parameter
@@ -108,7 +109,7 @@ class ModelNode(Node):
 
     def _load(self, path: str) -> None:
         try:
-            self._follow(load(path))
+            self._follow(_read(path))
         except PiezoError as error:
             self._diagnostics.refused(f"model_file: {error}")
 
@@ -133,7 +134,7 @@ class ModelNode(Node):
         try:
             for parameter in parameters:
                 if parameter.name == "model_file":
-                    load(parameter.value)
+                    _read(str(rows[parameter.name].check(parameter.value)))
                 elif parameter.name in rows:
                     raise RecordError(f"{parameter.name} is read at start; give it then")
         except PiezoError as error:
@@ -144,6 +145,14 @@ class ModelNode(Node):
         for parameter in parameters:
             if parameter.name == "model_file":
                 self._load(parameter.value)
+
+
+def _read(path: str) -> Model:
+    """The model of a file; a pipe or a device would keep the node waiting."""
+    place = Path(path).expanduser()
+    if place.exists() and not place.is_file():
+        raise ModelError(f"{path}: got no regular file, expected a model file")
+    return load(place)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
