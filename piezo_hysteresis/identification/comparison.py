@@ -14,8 +14,9 @@ import numpy as np
 from ..model import Model
 from ..record import Notice, Record
 from .content import excited_part
-from .dynamics import Dynamics, Signals, identify_arx
+from .dynamics import Dynamics, identify_arx
 from .linear_start import dynamics_behind
+from .regressors import Signals
 from .three_steps import voltage_signals
 
 LOW, HIGH = 20.0, 500.0

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..record import Record
+from ..record import Record, Samples
 
 SLOW = 30.0
 """Drives below this [Hz] show the dynamics of a stage as a lag only."""
@@ -16,6 +17,8 @@ MANY_MOMENTS = 12.0
 """Samples over which its changes must be spread: one step is not enough."""
 MARKED = 0.95
 """Share of the power of dv/dt by which bandwidth and lines are counted."""
+UNMEASURED = 5e-4
+"""Share of the range below which the highest frequencies of a drive are noise of its recorder, no excitation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +34,8 @@ class Content:
     lines : int
         Number of spectral lines that hold 95 % of it.
     moments : float
-        Over how many samples that power is spread, (Σ dv²)²/Σ dv⁴; 1 for a single step.
+        Over how many samples its changes are spread, (Σ x²)²/Σ x⁴ of dv or d²v, whichever is less: a jump in a slow
+        drive holds little of dv, but all of d²v.
     noise : float
         Standard deviation of the sensor noise [m].
     """
@@ -56,16 +60,34 @@ class Content:
 def content_of(record: Record) -> Content:
     """Judge a record by the spectrum of its dv/dt and the noise of its displacement."""
     span = float(np.ptp(np.append(record.voltage, record.settled_voltage)))
-    speed = np.diff(record.voltage)
-    power = np.abs(np.fft.rfft(speed)) ** 2 if speed.size else np.zeros(1)
+    spectrum = _excitation(np.diff(record.voltage), span)
+    power = np.abs(spectrum) ** 2
     total = float(power.sum())
     if total == 0.0:
         return Content(span, 0.0, 0, 0.0, noise_of(record))
+    speed = np.fft.irfft(spectrum, record.size - 1)
     frequency = np.arange(power.size) / (speed.size * record.sample_period)
     bandwidth = float(frequency[np.searchsorted(np.cumsum(power), MARKED * total)])
     lines = int(np.searchsorted(np.cumsum(np.sort(power)[::-1]), MARKED * total)) + 1
-    moments = float(np.sum(speed**2) ** 2 / np.sum(speed**4))
-    return Content(span, bandwidth, lines, moments, noise_of(record))
+    return Content(span, bandwidth, lines, min(_spread(speed), _spread(np.diff(speed))), noise_of(record))
+
+
+def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:
+    """Spectrum of dv, without the highest frequencies in which v moves no more than its recorder's noise would."""
+    if not speed.size:
+        return np.zeros(1, np.complex128)
+    spectrum = np.fft.rfft(speed)
+    angle = np.pi * np.arange(spectrum.size) / speed.size
+    position = np.abs(spectrum[1:]) ** 2 / np.sin(angle[1:]) ** 2 / (2.0 * speed.size**2)
+    beyond = np.cumsum(position[::-1])[::-1]  # power of v from each line on [V²]
+    spectrum[1:][beyond < (UNMEASURED * span) ** 2] = 0.0
+    return spectrum
+
+
+def _spread(values: Samples) -> float:
+    """Over how many samples the power of a signal is spread."""
+    fourth = float(np.sum(values**4))
+    return float(np.sum(values**2)) ** 2 / fourth if fourth > 0.0 else 0.0
 
 
 def noise_of(record: Record, fewest: int = 64) -> float:

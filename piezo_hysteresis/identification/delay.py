@@ -9,42 +9,13 @@ import numpy as np
 from scipy.stats import norm, t
 
 from ..errors import IdentificationError
-from ..record import Notice, Record, Samples
-from .edges import find_edges
+from ..record import Notice, Record
+from .step_response import StepResponse, step_response
 
-BEFORE = 64
-"""Most samples before an edge from which the base line is drawn."""
-LONGEST = 4096
-"""Most samples after an edge among which the onset is sought."""
 SURE = 5.0
 """Standard deviations beyond which a sample alone is response, not noise."""
 LIKELY = 2.0
 """Standard deviations that suffice where the samples behind it point to the same onset."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class StepResponse:
-    """Displacement after a step, per volt, averaged over all edges.
-
-    Parameters
-    ----------
-    sample_period : float
-        Sample period [s].
-    mean : (n,) array
-        Response per volt of step, sample 0 being the first at the new voltage [m/V].
-    deviation : (n,) array
-        Standard deviation of `mean` from the noise before the edges [m/V].
-    edges : int
-        Number of edges averaged.
-    freedom : int
-        Degrees of freedom of the noise estimate.
-    """
-
-    sample_period: float
-    mean: Samples
-    deviation: Samples
-    edges: int
-    freedom: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,56 +80,6 @@ class Delay:
         return (
             f"delay {self.samples} samples of {self.sample_period * 1e6:.4g} µs ({told}, {self.response.edges} edges)"
         )
-
-
-def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
-    """Average the response to every edge in the records, weighted by the height of the edge.
-
-    Parameters
-    ----------
-    records : iterable of Record
-        Records with steps, all at one sample period.
-    every : int
-        Use every so-many-th sample after each edge only, as if the stage had been sampled more slowly.
-
-    Returns
-    -------
-    StepResponse
-        Mean response per volt and its standard deviation.
-
-    Raises
-    ------
-    IdentificationError
-        If there is no edge with a quiet stretch before it.
-    """
-    edges = [(record, edge) for record in records for edge in find_edges(record.voltage, 8 * every, 4 * every)]
-    if not edges:
-        raise IdentificationError(
-            f"no step found: expected an edge with {8 * every} quiet samples before it and {4 * every} after it; "
-            "record a step phase"
-        )
-    period = edges[0][0].sample_period
-    after = min(LONGEST, min(edge.quiet_after for _, edge in edges) // every)
-    ahead = np.arange(after)
-    weighted, weight, variance = np.zeros(after), 0.0, np.zeros(after)
-    squares, freedom = 0.0, 0
-    for record, edge in edges:
-        before = min(BEFORE, edge.quiet_before // every)
-        behind = np.arange(-before, 0)
-        base = record.displacement[edge.start + every * behind]
-        level, slope = base.mean(), behind @ (base - base.mean()) / np.sum((behind - behind.mean()) ** 2)
-        away = ahead - behind.mean()
-        line = level + slope * away
-        squares += float(np.sum((base - level - slope * (behind - behind.mean())) ** 2))
-        freedom += before - 2
-        weighted += edge.height * (record.displacement[edge.start + every * ahead] - line)
-        weight += edge.height**2
-        variance += edge.height**2 * (1.0 + 1.0 / before + away**2 / np.sum((behind - behind.mean()) ** 2))
-    # Quantised or simulated data can be perfectly quiet; the resolution then limits what is seen.
-    changes = np.abs(np.concatenate([np.diff(r.displacement) for r in {id(r): r for r, _ in edges}.values()]))
-    resolution = float(np.min(changes[changes > 0], initial=np.inf)) if np.any(changes > 0) else 0.0
-    noise = max(squares / freedom, resolution**2 / 12.0)
-    return StepResponse(period * every, weighted / weight, np.sqrt(noise * variance) / weight, len(edges), freedom)
 
 
 def _onset(response: StepResponse) -> tuple[int, float, float, list[str]]:

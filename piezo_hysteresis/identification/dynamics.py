@@ -11,20 +11,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.linalg import lstsq, qr
+from scipy.linalg import lstsq
 from scipy.signal import lfilter
 
 from ..effects import Arx, Setting
 from ..errors import IdentificationError
 from ..record import Notice, Samples
+from .regressors import Signals, triangle
 
-Signals = Sequence[tuple[Samples, Samples]]
-"""Input and output of every record, at one sample period."""
-
-BLOCK = 1 << 15
-"""Rows of the regressor matrix held at a time."""
 _ALL = slice(None)
 LARGEST_POLE = 0.99999
 """Radius to which poles on or just outside the unit circle are drawn back."""
@@ -75,29 +70,6 @@ class Dynamics:
             f"G: {orders}, dc gain {self.arx.dc_gain:.5g}, lag {self.lag * 1e6:.4g} µs, "
             f"one-step error {self.one_step_error:.3g}, free-run error {self.free_run_error:.3g}"
         )
-
-
-def _triangle(signals: Signals, orders: tuple[int, int], delay: int) -> NDArray[np.float64]:
-    """R factor of [−y_(i−1) … −y_(i−na), u_(i−d) … u_(i−d−nb+1), y_i], every record freed of its own offset."""
-    na, nb = orders
-    first = max(na, delay + nb - 1)
-    r = np.zeros((0, na + nb + 1))
-    for u, y in signals:
-        rows = y.size - first
-        if rows < 1:
-            raise IdentificationError(
-                f"ARX: got a record of {y.size} samples, expected more than {first} for its orders"
-            )
-        # row i holds y_i, y_(i−1), …: the window reversed
-        past_y = sliding_window_view(y[first - na :], na + 1)[:, ::-1]
-        past_u = sliding_window_view(u[first - delay - nb + 1 : u.size - delay], nb)[:, ::-1]
-        means = np.concatenate((past_y.mean(axis=0), past_u.mean(axis=0)))
-        for start in range(0, rows, BLOCK):
-            part = slice(start, start + BLOCK)
-            block = np.hstack((past_y[part], past_u[part])) - means
-            block = np.hstack((-block[:, 1 : na + 1], block[:, na + 1 :], block[:, :1]))
-            r = qr(np.vstack((r, block)), mode="r", overwrite_a=True, check_finite=False)[0][: na + nb + 1]
-    return r
 
 
 def _solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> tuple[Samples, float]:
@@ -166,14 +138,14 @@ def identify_arx(
         raise IdentificationError(f"ARX: got na = {na}, nb = {nb}, d = {delay}, expected na >= 0, nb >= 1, d >= 1")
     if not any(np.ptp(u) > 0.0 for u, _ in signals):
         raise IdentificationError("ARX: the input does not move; expected a record with excitation, e.g. noise")
-    theta, left = _solve(_triangle(signals, orders, delay))
+    theta, left = _solve(triangle(signals, orders, delay))
     one_step = left / float(np.sqrt(sum(y.size for _, y in signals)))
     candidates: list[Dynamics] = []
     for iteration in range(iterations + 1):
         if iteration:
             whitener = np.concatenate(([1.0], candidates[-1].arx.array("a")))
             whitened = [(lfilter([1.0], whitener, u - u[0]), lfilter([1.0], whitener, y - y[0])) for u, y in signals]
-            theta, _ = _solve(_triangle(whitened, orders, delay))
+            theta, _ = _solve(triangle(whitened, orders, delay))
         a, b, mirrored = _reflected(theta[:na], theta[na:])
         told = (Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),)
         arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
@@ -196,9 +168,9 @@ def delay_of(signals: Signals, longest: int = 16, order: int = 8, sure: float = 
     sure : float
         Standard errors beyond which a coefficient counts.
     """
-    triangle = _triangle(signals, (order, longest + order), 1)
-    theta, left = _solve(triangle)
-    error = left / np.sqrt(sum(y.size for _, y in signals)) * np.linalg.norm(np.linalg.pinv(triangle[:, :-1]), axis=1)
+    regressors = triangle(signals, (order, longest + order), 1)
+    theta, left = _solve(regressors)
+    error = left / np.sqrt(sum(y.size for _, y in signals)) * np.linalg.norm(np.linalg.pinv(regressors[:, :-1]), axis=1)
     onset = np.flatnonzero(np.abs(theta[order:]) > sure * error[order:])
     return min(1 + int(onset[0]), longest) if onset.size else 1
 
@@ -233,10 +205,10 @@ def compare_orders(signals: Signals, delay: int, sample_period: float, highest: 
     """
     cuts = [2 * y.size // 3 for _, y in signals]
     early = [(u[:cut], y[:cut]) for (u, y), cut in zip(signals, cuts, strict=True)]
-    triangle = _triangle(early, (highest, highest), delay)
+    regressors = triangle(early, (highest, highest), delay)
     table = []
     for order in range(1, highest + 1):
-        theta, left = _solve(triangle, np.r_[:order, highest : highest + order])
+        theta, left = _solve(regressors, np.r_[:order, highest : highest + order])
         a, b, _ = _reflected(theta[:order], theta[order:])
         model = Dynamics(Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay), sample_period)
         late = [(y - model.simulate(u))[cut:] for (u, y), cut in zip(signals, cuts, strict=True)]

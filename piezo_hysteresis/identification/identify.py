@@ -17,12 +17,15 @@ from ..model import Model
 from ..provenance import provenance
 from ..record import Experiment, Notice
 from .comparison import Comparison, compare_inputs
+from .content import content_of
 from .delay import Delay, identify_delay
 from .dynamics import Dynamics, OrderError, choose_order, compare_orders, delay_of
 from .fit import Fit, Progress
 from .hysteresis import fit_hysteresis
 from .identification import Identification, PhaseError
 from .joint import fit_dynamics, fit_lag
+from .lag import lag_notices
+from .lead_in import known_from_within
 from .leading_step import Blocks, steps_apart
 from .linear_start import hysteresis_signals
 from .memory import choose_memory
@@ -80,6 +83,8 @@ def identify(
     ------
     IdentificationError
         If nothing in the experiment moves, or a fit cannot be started.
+    RecordError
+        If `held_out` names a phase that the experiment does not have.
 
     Notes
     -----
@@ -87,6 +92,7 @@ def identify(
     0.03 % of the range.
     """
     tell = progress or (lambda word, fraction: None)
+    experiment, led_in = known_from_within(experiment)
     records = experiment.records
     roles = roles_of(experiment, held_out)
     if not any(roles.contents[i].span > 0.0 for i in roles.fitted):
@@ -96,7 +102,7 @@ def identify(
     scale_y = displacement_scale or reach
     floors = [max(c.noise, ADEQUATE * reach) for c in roles.contents]
     period = experiment.fastest_period
-    notices: list[Notice] = list(experiment.notices)
+    notices: list[Notice] = [*experiment.notices, *led_in]
 
     tell("step 1: delay", 0.0)
     delay = _delay(experiment, roles, notices)
@@ -137,15 +143,14 @@ def identify(
         notices += told
     else:
         tell("joint fit", 0.3)
-        notices.append(
-            Notice("lag_only", "no broadband record: the dynamics are reported as a lag, dead time and at most a pole")
-        )
         blocks = steps_apart(records, floors, roles.fitted)
         joint = fit_lag(start, *blocks)
     if memory:
         tell("memory", 0.9)
         joint, told = choose_memory(joint, *blocks, roles.loops if roles.broadband else blocks[2])
         notices += told
+    if not roles.broadband:
+        notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted])
     tell("free run", 0.95)
     phases = _free_run(joint.model, experiment, roles, reach)
     zero = float(np.mean([e.mean() for e in residuals(joint.model, records)]))
@@ -166,9 +171,11 @@ def identify(
 
 def _delay(experiment: Experiment, roles: Roles, notices: list[Notice]) -> Delay | None:
     fast = [experiment[i] for i in roles.fitted if experiment[i].sample_period < 1.001 * experiment.fastest_period]
-    steps = [r for r in fast if r.phase.split("_")[0] == "step"] or fast
+    calm = [r for r in fast if not content_of(r).is_broadband]
+    kinds = (("step",), ("steps", "staircase"))
+    named = ([r for r in fast if r.phase.split("_")[0] in kind] for kind in kinds)
     try:
-        delay = identify_delay(steps)
+        delay = identify_delay(next((records for records in named if records), calm or fast))
     except IdentificationError as error:
         notices.append(Notice("no_step", str(error), "step"))
         return None

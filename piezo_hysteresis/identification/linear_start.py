@@ -15,7 +15,8 @@ from ..errors import IdentificationError
 from ..model import Model
 from ..record import Record
 from .carried import carried
-from .dynamics import Dynamics, Signals, identify_arx
+from .dynamics import Dynamics, identify_arx
+from .regressors import Signals
 
 ITERATIONS = 3
 """Steiglitz-McBride iterations of the start."""

@@ -86,12 +86,13 @@ def choose_memory(
     plays = with_plays(joint.model, records)
     state_error = left_out(blocks, sizes, lambda used: fit_hysteresis(joint.model, blocks, used).model)
     plays_error = left_out(blocks, sizes, lambda used: _fit_plays(plays, blocks, used))
-    told = (
-        f"on blocks left out plays reach {_rms(plays_error):.3g} times the floor, "
-        f"a Bouc-Wen state {_rms(state_error):.3g} times"
-    )
     # the mean of logarithms keeps one bad block from deciding
-    lead = float(np.mean(np.log(np.maximum(plays_error, 1.0) / np.maximum(state_error, 1.0))))
+    of_plays, of_state = (float(np.mean(np.log(np.maximum(e, 1.0)))) for e in (plays_error, state_error))
+    told = (
+        f"on blocks left out plays reach {np.exp(of_plays):.3g} times the floor, "
+        f"a Bouc-Wen state {np.exp(of_state):.3g} times (geometric means)"
+    )
+    lead = of_plays - of_state
     if lead > np.log(TIE):
         return joint, (Notice("memory", f"{told}: the state is kept"),)
     clear = lead < -np.log(TIE)
@@ -139,7 +140,3 @@ def _blocks(records: Sequence[Record], floors: Sequence[float]) -> tuple[list[Re
         blocks += [cuts[0], *(replace(c, initial_voltage=None) for c in cuts[1:])]
         sizes += [floor] * count
     return blocks, sizes
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

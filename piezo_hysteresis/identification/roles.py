@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from ..errors import RecordError
 from ..record import Experiment
 from .content import Content, content_of
 
@@ -50,7 +51,16 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
         Records of any kind.
     held_out : collection of str
         Names of phases that are not fitted.
+
+    Raises
+    ------
+    RecordError
+        If one of `held_out`, other than those of `HELD_OUT`, is no phase of the experiment, or nothing else is left.
     """
+    names = ", ".join(dict.fromkeys(r.phase for r in experiment))
+    for phase in held_out:
+        if phase not in HELD_OUT and not experiment.named(phase):
+            raise RecordError(f"held_out: got phase '{phase}', expected some of {names}")
     contents = tuple(content_of(r) for r in experiment)
     named = {phase: experiment.named(phase) for phase in (*held_out, *CARRYING)}
 
@@ -59,9 +69,12 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
 
     indices = range(len(experiment))
     out = tuple(i for i in indices if is_one_of(i, held_out))
-    fitted = tuple(i for i in indices if i not in out and not is_one_of(i, CARRYING) and not experiment[i].truncated)
-    if not fitted:
-        fitted = tuple(i for i in indices if i not in out) or tuple(indices)
+    if len(out) == len(experiment):
+        if not set(held_out) <= set(HELD_OUT):
+            raise RecordError(f"held_out: got every phase ({names}), expected at least one that is fitted")
+        out = ()
+    left = [i for i in indices if i not in out]
+    fitted = tuple(i for i in left if not is_one_of(i, CARRYING) and not experiment[i].truncated) or tuple(left)
     largest = max((contents[i].span for i in fitted), default=0.0)
     slow = [i for i in fitted if contents[i].is_slow and contents[i].span >= LARGE * largest > 0.0]
     triangles = [i for i in slow if experiment[i].phase.split("_")[0] == "triangle"]

@@ -17,9 +17,10 @@ from ..model import Model
 from ..record import Record
 from .content import excited_part
 from .delay import Delay, identify_delay
-from .dynamics import Dynamics, Signals, identify_arx
+from .dynamics import Dynamics, identify_arx
 from .fit import Fit
 from .hysteresis import fit_hysteresis
+from .regressors import Signals
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -88,6 +89,7 @@ def three_steps(
         If one of the three phases is missing, or does not determine its step.
     """
     step, noise, triangle = (named(records, phase) for phase in ("step", "noise", "triangle"))
+    step = step or named(records, "steps") or named(records, "staircase")
     for phase, found in (("step", step), ("noise", noise), ("triangle", triangle)):
         if not found:
             raise IdentificationError(f"three steps: got no {phase} phase, expected step, noise and triangle")

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..errors import IdentificationError
-from ..identification.delay import StepResponse, identify_delay, step_response
+from ..identification.delay import identify_delay
+from ..identification.step_response import StepResponse, step_response
 from .comparison import Comparison
 from .drawing import Drawing
 from .style import BLUE, GREEN, MEASURED, PREDICTED, canvas, styled

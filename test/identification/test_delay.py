@@ -93,3 +93,19 @@ def test_edges_are_found_with_their_heights():
 def test_percentages_of_noise_refer_to_the_full_stroke():
     rise = displacement(np.linspace(0.0, 10.0, 50_000))
     assert rise[-1] == pytest.approx(STROKE, rel=1e-3)
+
+
+def test_what_rings_before_the_edges_does_not_bring_the_onset_forward():
+    # 900 Hz, lightly damped: a twentieth of the ringing of each edge is left when the next one comes
+    period, delay = 2e-5, 8
+    time = period * np.arange(800)
+    ring = 1.0 - np.exp(-190.0 * time) * np.cos(2 * np.pi * 900.0 * time)
+    levels = np.tile([0.0, 5.0], 6)
+    voltage = np.repeat(levels, 800)
+    y = np.zeros(voltage.size)
+    for number, jump in enumerate(np.diff(levels), 1):
+        start = 800 * number + delay
+        y[start:] += jump * np.interp(period * np.arange(y.size - start), time, ring, right=1.0)
+    y = 1e-6 * y + 1e-9 * np.random.default_rng(0).standard_normal(y.size)
+    found = identify_delay([Record(voltage, y, period, "steps")])
+    assert abs(found.samples - delay) <= 2

@@ -1,0 +1,131 @@
+"""`StepResponse`: what follows a jump of the drive, averaged over all of them, and how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import IdentificationError
+from ..record import Record, Samples
+from .edges import Edge, find_edges
+
+BEFORE = (64, 32, 16)
+"""Most samples before an edge from which the base line is drawn; fewer where the stage still rings."""
+LONGEST = 4096
+"""Most samples after an edge among which the onset is sought."""
+SCATTER = 3.0
+"""Standard deviations by which the end of a base line may leave what its beginning foretells."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StepResponse:
+    """Displacement after a step, per volt, averaged over all edges.
+
+    Parameters
+    ----------
+    sample_period : float
+        Sample period [s].
+    mean : (n,) array
+        Response per volt of step, sample 0 being the first at the new voltage [m/V].
+    deviation : (n,) array
+        Standard deviation of `mean` from the noise before the edges [m/V].
+    edges : int
+        Number of edges averaged.
+    freedom : int
+        Degrees of freedom of the noise estimate.
+    """
+
+    sample_period: float
+    mean: Samples
+    deviation: Samples
+    edges: int
+    freedom: int
+
+
+def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
+    """Average the response to every edge in the records, weighted by the height of the edge.
+
+    Parameters
+    ----------
+    records : iterable of Record
+        Records with steps, all at one sample period.
+    every : int
+        Use every so-many-th sample after each edge only, as if the stage had been sampled more slowly.
+
+    Returns
+    -------
+    StepResponse
+        Mean response per volt and its standard deviation.
+
+    Raises
+    ------
+    IdentificationError
+        If there is no edge with a quiet stretch before it.
+    """
+    edges = [(record, edge) for record in records for edge in find_edges(record.voltage, 8 * every, 4 * every)]
+    if not edges:
+        raise IdentificationError(
+            f"no step found: expected an edge with {8 * every} quiet samples before it and {4 * every} after it; "
+            "record a step phase"
+        )
+    # A stage that still rings is not straight over a long base line; a short one is noisy.
+    for most in BEFORE:
+        response, ringing = _averaged(edges, every, most)
+        if ringing == 1.0:
+            break
+    return response
+
+
+def _averaged(edges: Sequence[tuple[Record, Edge]], every: int, most: int) -> tuple[StepResponse, float]:
+    """Mean response from base lines of at most so many samples, and the factor by which ringing spoils it."""
+    after = min(LONGEST, min(edge.quiet_after for _, edge in edges) // every)
+    ahead = np.arange(after)
+    weighted, weight, variance = np.zeros(after), 0.0, np.zeros(after)
+    squares, freedom = 0.0, 0
+    missed, expected = 0.0, 0.0
+    for record, edge in edges:
+        before = min(most, edge.quiet_before // every)
+        behind = np.arange(-before, 0)
+        base = record.displacement[edge.start + every * behind]
+        level, slope = base.mean(), behind @ (base - base.mean()) / np.sum((behind - behind.mean()) ** 2)
+        away = ahead - behind.mean()
+        line = level + slope * away
+        squares += float(np.sum((base - level - slope * (behind - behind.mean())) ** 2))
+        freedom += before - 2
+        weighted += edge.height * (record.displacement[edge.start + every * ahead] - line)
+        weight += edge.height**2
+        off, spread = _foretold(base)
+        missed, expected = missed + edge.height * off, expected + edge.height**2 * spread
+        variance += edge.height**2 * (1.0 + 1.0 / before + away**2 / np.sum((behind - behind.mean()) ** 2))
+    # Quantised or simulated data can be perfectly quiet; the resolution then limits what is seen.
+    changes = np.abs(np.concatenate([np.diff(r.displacement) for r in {id(r): r for r, _ in edges}.values()]))
+    resolution = float(np.min(changes[changes > 0], initial=np.inf)) if np.any(changes > 0) else 0.0
+    noise = max(squares / freedom, resolution**2 / 12.0)
+    # What rings before the edges goes on behind them, alike in all of them: no averaging removes it.
+    ringing = max(1.0, abs(missed) / max(SCATTER * float(np.sqrt(noise * expected)), 1e-300))
+    deviation = ringing * np.sqrt(noise * variance) / weight
+    period = every * edges[0][0].sample_period
+    return StepResponse(period, weighted / weight, deviation, len(edges), freedom), ringing
+
+
+def _foretold(base: Samples) -> tuple[float, float]:
+    """By how much a line through the first three quarters of a base line misses the mean of the last one.
+
+    Returns
+    -------
+    float
+        Measured minus foretold [m].
+    float
+        Its variance for white noise of variance 1.
+    """
+    split = 3 * base.size // 4
+    early, late = np.arange(split), np.arange(split, base.size)
+    centre, square = early.mean(), np.sum((early - early.mean()) ** 2)
+    slope = (early - centre) @ base[:split] / square
+    away = late.mean() - centre
+    return (
+        float(base[split:].mean() - base[:split].mean() - slope * away),
+        float(1.0 / late.size + 1.0 / split + away**2 / square),
+    )

@@ -1,0 +1,44 @@
+"""What a drive excites: neither a jump nor the noise of its recorder makes a slow drive a broadband one."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.identification.content import content_of
+from piezo_hysteresis.record import Record
+
+
+def content(voltage, period, **options):
+    return content_of(Record(voltage, 1e-6 * voltage, period, **options))
+
+
+@pytest.fixture
+def random():
+    return np.random.default_rng(0)
+
+
+def triangle(frequency, duration, period):
+    return 10.0 * np.abs(np.mod(frequency * period * np.arange(round(duration / period)) + 0.5, 1.0) * 2.0 - 1.0)
+
+
+@pytest.mark.parametrize("period", [1e-2, 5e-3, 1e-3, 2e-5])
+def test_a_jump_in_a_slow_drive_is_no_broadband_excitation(period):
+    time = period * np.arange(round(30.0 / period) if period > 1e-4 else 100_000)
+    voltage = 1.8 + 1.8 * np.sin(2 * np.pi * time)
+    voltage[0] = 0.0
+    assert not content(voltage, period).is_broadband
+
+
+@pytest.mark.parametrize("noise", [1e-5, 1e-4, 3e-4])
+def test_a_measured_drive_keeps_its_bandwidth(random, noise):
+    clean = triangle(1.0, 4.0, 2e-5)
+    measured = clean + noise * 10.0 * random.standard_normal(clean.size)
+    assert not content(measured, 2e-5).is_broadband
+    assert content(measured, 2e-5).bandwidth == pytest.approx(content(clean, 2e-5).bandwidth, abs=2.0)
+
+
+def test_noise_chirps_and_many_steps_are_broadband(random):
+    time = 1e-4 * np.arange(20_000)
+    chirp = np.sin(2 * np.pi * 1.0 * np.expm1(np.log(500.0) / 2.0 * time) / np.log(500.0) * 2.0)
+    steps = np.repeat(np.tile([0.0, 1.0], 10), 1000)
+    for voltage in (random.standard_normal(20_000), 5.0 + 0.01 * random.standard_normal(20_000), chirp, steps):
+        assert content(voltage, 1e-4).is_broadband
