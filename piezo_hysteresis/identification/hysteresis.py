@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
 from scipy.optimize import least_squares
 
 from ..effects import Arx, BoucWen, PublishedBoucWen, Setting
@@ -28,6 +29,10 @@ LOSSES = np.geomspace(0.3, 100.0, 14)
 """Grid of β for v on its range."""
 RATIOS = np.linspace(-0.9, 0.9, 7)
 """Grid of γ·sgn(A)/β; |γ| ≤ β keeps the loop bounded."""
+VALLEYS = 3
+"""Places of the grid from which the search goes downhill, at most."""
+DEEP = 10.0
+"""Cost, relative to that of the best place, up to which another one is tried."""
 LOOP = ("A", "beta", "gamma", "p1", "p2")
 """Numbers of the modified Bouc-Wen operator."""
 POINTS = 6000
@@ -161,19 +166,30 @@ def start_hysteresis(loops: Sequence[Loop]) -> BoucWen:
             "expected at least one with loops, e.g. a triangle of several amplitudes"
         )
     search = _Search([replace(loop, v=loop.v / span, start=loop.start / span) for loop in loops])
-    grid = [(beta, ratio) for beta in LOSSES for ratio in RATIOS]
-    beta, ratio = min(grid, key=lambda at: float(np.sum(search.solve(*at)[1] ** 2)))
-    found = least_squares(
-        lambda x: search.solve(np.exp(x[0]), x[1])[1],
-        [np.log(beta), ratio],
-        bounds=([np.log(LOSSES[0] / 10.0), -1.0], [np.log(LOSSES[-1] * 10.0), 1.0]),
-        x_scale=[1.0, 0.3],
-    )
+    costs = np.array([[float(np.sum(search.solve(beta, ratio)[1] ** 2)) for ratio in RATIOS] for beta in LOSSES])
+    polished = [
+        least_squares(
+            lambda x: search.solve(np.exp(x[0]), x[1])[1],
+            [np.log(LOSSES[i]), RATIOS[j]],
+            bounds=([np.log(LOSSES[0] / 10.0), -1.0], [np.log(LOSSES[-1] * 10.0), 1.0]),
+            x_scale=[1.0, 0.3],
+        )
+        for i, j in _valleys(costs)
+    ]
+    found = min(polished, key=lambda outcome: float(outcome.cost))
     beta, ratio = float(np.exp(found.x[0])), float(found.x[1])
     p1, p2, a = (float(c) for c in search.solve(beta, ratio)[0])
     return BoucWen(
         A=a / span, beta=beta / span, gamma=beta * ratio * np.copysign(1.0, a) / span, p1=p1 / span**3, p2=p2 / span
     )
+
+
+def _valleys(costs: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Places on the grid lower than their neighbours, the lowest first: loops of one amplitude have several."""
+    lowest = minimum_filter(costs, size=3, mode="nearest")
+    places = np.argwhere((costs == lowest) & (costs <= DEEP * costs.min()))
+    order = np.argsort([costs[i, j] for i, j in places])
+    return [(int(i), int(j)) for i, j in places[order][:VALLEYS]]
 
 
 def fit_hysteresis(model: Model, records: Sequence[Record], loops: Collection[int]) -> Fit:

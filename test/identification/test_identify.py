@@ -1,10 +1,12 @@
 """Any mix of records gives a model that predicts data it has not seen, and says what it could not know."""
 
+import re
+
 import numpy as np
 import pytest
 
 from piezo_hysteresis.effects import Arx, BoucWen
-from piezo_hysteresis.errors import IdentificationError
+from piezo_hysteresis.errors import IdentificationError, RecordError
 from piezo_hysteresis.identification import DriveLimits, excitation, identify
 from piezo_hysteresis.identification.normal_equations import Nuisance, residuals
 from piezo_hysteresis.model import Model
@@ -153,3 +155,35 @@ def test_phases_stored_slowly_join_fast_ones():
 def test_without_motion_the_error_says_what_is_missing(voltage):
     with pytest.raises(IdentificationError, match="does not move"):
         identify(Experiment((Record(voltage, np.zeros(1000), 1e-3),)))
+
+
+def test_a_record_that_begins_in_the_middle_counts_from_its_first_full_loop():
+    time = 1e-3 * np.arange(6000)
+    slow = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=2.0)), 1e-3, 10.0, 1e-5)
+    voltage = 5.0 + 4.5 * np.sin(2 * np.pi * time + 1.0)
+    measured = slow.simulate(Record(voltage, time, 1e-3, initial_voltage=0.0))[0]
+    measured += NOISE * np.random.default_rng(0).standard_normal(time.size)
+    cut = Record(voltage[2300:], measured[2300:], 1e-3, "sine_1hz", truncated=True)
+    found = identify(Experiment((cut,)))
+    assert any(n.kind == "lead_in" for n in found.notices)
+    assert found.free_run_error == pytest.approx(NOISE, rel=0.1)
+
+
+def test_one_frequency_is_told_with_the_lag_that_was_found():
+    time = 1e-3 * np.arange(4000)
+    slow = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=4.0)), 1e-3, 10.0, 1e-5)
+    voltage = 5.0 - 5.0 * np.cos(2 * np.pi * 2.0 * time)
+    measured = slow.simulate(Record(voltage, time, 1e-3))[0] + NOISE * np.random.default_rng(0).standard_normal(4000)
+    found = identify(Experiment((Record(voltage, measured, 1e-3, "sine_2hz"),)))
+    told = {n.kind: n.message for n in found.notices}
+    assert "one_frequency" in told
+    value, error = (float(x) for x in re.findall(r"([\d.]+) ms", told["lag_only"]))
+    assert value == pytest.approx(4.0, abs=3 * error)
+
+
+def test_phases_that_are_held_out_must_be_there():
+    experiment = Experiment(tuple(play(triangle())))
+    with pytest.raises(RecordError, match="got phase 'sine', expected some of triangle"):
+        identify(experiment, held_out=("sine",))
+    with pytest.raises(RecordError, match="every phase"):
+        identify(experiment, held_out=("triangle",))
