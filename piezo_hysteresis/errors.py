@@ -9,6 +9,7 @@
     ├── IdentificationError   (RuntimeError)     data that do not determine what was asked
     ├── DivergenceError       (ArithmeticError)  a simulation that ran away
     ├── StageError            (OSError)          a stage or its limits, link, state
+    │   └── DeviceError                          the device itself failed
     └── RecordingError        (OSError)          a file that cannot be read or written
 """
 
@@ -37,6 +38,10 @@ class IdentificationError(PiezoError, RuntimeError):
 
 class StageError(PiezoError, OSError):
     """A stage refused, failed, or was asked to leave its limits."""
+
+
+class DeviceError(StageError):
+    """The device refused, answered nonsense, or its link failed: a fault of the device, not of its user."""
 
 
 class RecordingError(PiezoError, OSError):

@@ -6,10 +6,11 @@ import argparse
 import signal
 import threading
 
-from ..stage.daqmx.emulator.card import FAULTS, Card
+from ..stage.daqmx.emulator.card import Card
+from ..stage.daqmx.emulator.faults import FAULTS as NI_FAULTS
 from ..stage.daqmx.emulator.server import Server as NiServer
 from ..stage.gcs2.emulator.controller import Controller
-from ..stage.gcs2.emulator.faults import LASTING, ONCE, Fault
+from ..stage.gcs2.emulator.faults import FAULTS as GCS2_FAULTS
 from ..stage.gcs2.emulator.server import Server as Gcs2Server
 from ..stage.simulated import SimulatedStage
 from .plant_option import add_plant_arguments, plant
@@ -20,12 +21,11 @@ _PORT = {"gcs2": 50000, "nidaqmx": 31763}
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
-    gcs2_faults = {**{kind: what for kind, (_, what) in ONCE.items()}, **LASTING}
     listed = "\n".join(
-        f"{name}:\n" + "\n".join(f"  {kind:18s}{what}" for kind, what in faults.items())
+        f"{name}:\n" + "\n".join(f"  {kind:18s}{what}" for kind, what in faults.meaning.items())
         for name, faults in (
-            ("faults of gcs2, as KIND, KIND@COMMAND or KIND@COMMAND:OCCURRENCE=VALUE", gcs2_faults),
-            ("faults of nidaqmx", FAULTS),
+            ("faults of gcs2, as KIND, KIND@COMMAND or KIND@COMMAND:OCCURRENCE=VALUE", GCS2_FAULTS),
+            ("faults of nidaqmx; COMMAND is a call of NI's gRPC interface", NI_FAULTS),
         )
     )
     parser = subparsers.add_parser(
@@ -61,11 +61,11 @@ def run(args: argparse.Namespace) -> int:
     stage = SimulatedStage(parameters, seed=args.seed, sample_period=period)
     server: Gcs2Server | NiServer
     if args.device == "gcs2":
-        faults = [Fault.parse(text) for text in args.fault]
+        faults = [GCS2_FAULTS.parse(text) for text in args.fault]
         controller = Controller(stage, serial=str(args.seed), command_per_volt=args.command_per_volt, faults=faults)
         server = Gcs2Server(controller, args.host, port)
     else:
-        server = NiServer(Card(stage, faults=args.fault), args.host, port)
+        server = NiServer(Card(stage, faults=[NI_FAULTS.parse(text) for text in args.fault]), args.host, port)
     ended = threading.Event()
     for ending in (signal.SIGINT, signal.SIGTERM):  # also where a shell has told it to ignore them
         signal.signal(ending, lambda *_: ended.set())

@@ -52,7 +52,7 @@ def to_cloud(
         fields.append(PointField(name=name, offset=offset, datatype=_CODES[word], count=1))
         offset += int(word[1])
     data = array.array("B")
-    data.frombytes(points.view(np.uint8))
+    data.frombytes(points.view(np.uint8).data)
     return PointCloud2(
         header=Header(stamp=stamp, frame_id=frame_id),
         height=1,

@@ -61,8 +61,13 @@ NIDAQMX: tuple[Row, ...] = (
     ),
     Parameter("monitor_gain", "", "V/V", _DAQMX.monitor_gain, -1e3, 1e3, "monitor voltage over piezo voltage", "rig"),
     Parameter("sensor_gain", "", "m/V", _DAQMX.sensor_gain, -1.0, 1.0, "displacement over sensor voltage", "rig"),
+    Parameter("voltage_tolerance", "", "V", 1.0, 1e-3, 1e3, "largest steady error of the piezo voltage", "rig"),
+    Parameter("settling_time", "", "s", 0.01, 0.0, 10.0, "time the amplifier needs to follow a step", "rig"),
     Parameter("sensor_range", "", "V", _DAQMX.sensor_range, 1e-3, 10.0, "the inputs span ± this voltage", "the card"),
     Parameter("io_delay", "", "s", 0.0, 0.0, 1.0, "delay of the card itself, from a loop-back", "loop_back_delay"),
+    Parameter(
+        "timeout", "", "s", _DAQMX.timeout, 0.01, 600.0, "longest wait for samples, silence of a server", "network"
+    ),
 )
 """Of a stage on a National Instruments card."""
 

@@ -42,13 +42,17 @@ class DaqmxSetup:
         Voltage at `voltage_input` over piezo voltage [V/V].
     sensor_gain : float
         Displacement over sensor voltage [m/V].
+    voltage_tolerance : float
+        Largest steady difference between piezo voltage given and measured [V].
+    settling_time : float
+        Time that the amplifier needs to follow a step [s].
     sensor_range : float
         The sensor's output and the inputs span ± this voltage [V].
     io_delay : float
         Delay of the card from output to input, measured by `loop_back_delay` [s]. Its whole samples are taken off, so
         that the rest belongs to the stage; irrelevant where the drive is measured.
     timeout : float
-        Longest wait for samples beyond their own time [s].
+        Longest wait for samples beyond their own time, and longest silence of a server [s].
 
     Raises
     ------
@@ -71,6 +75,8 @@ class DaqmxSetup:
     amplifier_gain: float = 20.0
     monitor_gain: float = 0.1
     sensor_gain: float = 6e-6
+    voltage_tolerance: float = 1.0
+    settling_time: float = 0.01
     sensor_range: float = 10.0
     io_delay: float = 0.0
     timeout: float = 5.0
@@ -79,7 +85,15 @@ class DaqmxSetup:
         for name in ("device", "output", "displacement_input"):
             if not getattr(self, name):
                 raise StageError(f"daqmx.{name}: got no name, expected one as NI MAX shows it")
-        for name in ("sample_period", "sample_period_min", "lead", "max_slew_rate", "sensor_range", "timeout"):
+        for name in (
+            "sample_period",
+            "sample_period_min",
+            "lead",
+            "max_slew_rate",
+            "sensor_range",
+            "timeout",
+            "voltage_tolerance",
+        ):
             if not getattr(self, name) > 0:
                 raise StageError(f"daqmx.{name}: got {getattr(self, name)!r}, expected more than 0")
         for name in ("amplifier_gain", "monitor_gain", "sensor_gain"):

@@ -5,15 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
-from ...errors import StageError
+from ...errors import DeviceError, StageError
+from ..agreement import Agreement
 from ..stage import Acquired, Description, Samples
 from .setup import DaqmxSetup
 from .tasks import DaqmxError, Tasks
 
 _RAMP_STEP = 0.01
+_CLIPPED = 0.998
+"""Share of the range of the sensor from which on it counts as clipped."""
 
 
 class DaqmxStage:
@@ -33,7 +37,7 @@ class DaqmxStage:
     """
 
     def __init__(self, setup: DaqmxSetup) -> None:
-        self._setup, self._tasks, self._closed = setup, Tasks(setup), False
+        self._setup, self._tasks, self._closed, self._is_lost = setup, Tasks(setup), False, False
         s = setup
         scale = abs(s.sensor_gain) * s.sensor_range
         self._description = Description(
@@ -54,8 +58,10 @@ class DaqmxStage:
         self._sample_period = self._description.check_sample_period(s.sample_period)
         self._voltage = self._description.safe_voltage
         self._waiting: Samples = np.empty(0)
+        self._readings: Samples = np.empty(0)
+        self._agreement = self._new_agreement()
         try:
-            self._tasks.read_once()  # the card is there; nothing moves
+            self._voltage = self._found(self._tasks.read_once())
         except StageError:
             self._tasks.close()
             raise
@@ -72,7 +78,7 @@ class DaqmxStage:
 
     @property
     def voltage(self) -> float:
-        """Drive voltage given last [V]; on opening the safe one, since an output cannot be asked."""
+        """Drive voltage given last [V]; on opening the one measured, or the safe one where there is no monitor."""
         return self._voltage
 
     def configure(self, sample_period: float) -> None:
@@ -105,6 +111,14 @@ class DaqmxStage:
             self._drain()
             return float(self._tasks.read_once()[0]) * self._setup.sensor_gain
 
+    def read_voltage(self) -> float:
+        """One reading of the drive voltage at the monitor [V], else the one given last; ends a stream."""
+        self._require_open()
+        with self._guarded():
+            self._drain()
+            readings = self._tasks.read_once()
+            return self._measured(readings) if self._setup.voltage_input else self._voltage
+
     def safe(self) -> None:
         """Let what is in the buffer play to its end, go to the safe voltage, and end the stream."""
         if self._closed:
@@ -132,14 +146,39 @@ class DaqmxStage:
             delayed = self._lead + round(self._setup.io_delay / self._sample_period)
             self._waiting = np.full(delayed, self._voltage)
             self._tasks.start(self._sample_period, np.full(self._lead, self._voltage))
+            self._agreement, self._readings = self._new_agreement(), np.empty(0)
         self._tasks.write(drive)
         self._voltage = float(drive[-1])
         self._waiting = np.concatenate((self._waiting, drive))
         applied, self._waiting = self._waiting[: drive.size], self._waiting[drive.size :]
-        readings = self._tasks.read(drive.size)
-        if self._setup.voltage_input:
-            applied = readings[1] / (self._setup.monitor_gain * self._setup.amplifier_gain)
-        return Acquired(applied, readings[0] * self._setup.sensor_gain)
+        readings, before = self._tasks.read(drive.size), self._readings
+        if np.array_equal(readings, before) and np.ptp(readings[0]) > 0:
+            raise DaqmxError(f"{self._description.name}: got the same {drive.size} samples twice; samples were lost")
+        self._readings = readings
+        measured = self._measured(readings) if self._setup.voltage_input else applied
+        displacement = readings[0] * self._setup.sensor_gain
+        self._agreement.check(applied, measured, displacement)
+        return Acquired(measured, displacement)
+
+    def _measured(self, readings: Samples) -> Any:
+        """Drive voltage from the monitor [V]."""
+        return readings[1] / (self._setup.monitor_gain * self._setup.amplifier_gain)
+
+    def _found(self, readings: Samples) -> float:
+        """Drive voltage at which the card stands before anything was given [V]."""
+        safe = self._description.safe_voltage
+        if not self._setup.voltage_input:
+            return safe
+        measured = float(self._measured(readings))
+        if abs(measured - safe) * abs(self._setup.amplifier_gain) <= self._setup.voltage_tolerance:
+            return safe
+        return min(max(measured, self._description.voltage_min), self._description.voltage_max)
+
+    def _new_agreement(self) -> Agreement:
+        s, d = self._setup, self._description
+        settling = int(np.ceil(s.settling_time / self._sample_period))
+        inside = _CLIPPED * d.displacement_max
+        return Agreement(s.voltage_tolerance / abs(s.amplifier_gain), settling, -inside, inside)
 
     def _drain(self) -> None:
         """End the stream when its last voltage is out."""
@@ -152,7 +191,7 @@ class DaqmxStage:
         """Go to the safe voltage when the card fails, and say in the error whether it was reached."""
         try:
             yield
-        except DaqmxError as error:
+        except DeviceError as error:
             try:
                 self._abort()
                 end = f"the output was set to its safe voltage, {self._voltage:g} V"
@@ -161,20 +200,26 @@ class DaqmxStage:
             raise StageError(f"{error}; {end}") from None
 
     def _retreat(self) -> None:
-        if self._tasks.is_running:
+        if self._is_lost:
+            self._abort()
+        elif self._tasks.is_running:
             try:
                 goal, step = self._description.safe_voltage, self._setup.max_slew_rate * self._sample_period
                 count = max(int(np.ceil(abs(goal - self._voltage) / step)), 1)
                 self._stream(np.linspace(self._voltage, goal, count + 1)[1:])
                 self._drain()
-            except DaqmxError:
+            except DeviceError:
                 self._abort()
         elif self._voltage != self._description.safe_voltage:
             self._ramp()
 
     def _abort(self) -> None:
-        """The stream has failed: end it and set the safe voltage from wherever the output stands."""
-        self._tasks.stop()
+        """End a stream that has failed, and go to the safe voltage from where the output stands, if that is known."""
+        self._tasks.abandon()
+        if self._setup.voltage_input:
+            self._voltage = self._found(self._tasks.read_once())
+        elif self._waiting.size:
+            self._voltage = float(self._waiting[0])
         self._ramp()
 
     def _ramp(self) -> None:
@@ -186,9 +231,10 @@ class DaqmxStage:
 
     def _move(self, drive: float) -> None:
         self._tasks.write_once(drive)
-        self._voltage = drive
+        self._voltage, self._is_lost = drive, False
 
     def _unknown(self) -> str:
+        self._is_lost = True
         return (
             f"the voltage of the stage is unknown, last given {self._voltage:g} V; switch the amplifier off "
             "by hand: the card holds its output"

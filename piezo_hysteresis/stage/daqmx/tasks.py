@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
 
-from ...errors import StageError
+from ...errors import DeviceError, StageError
 from ..description import Samples
 from .setup import DaqmxSetup
 
+_RATE_TOLERANCE = 1e-4
 
-class DaqmxError(StageError):
-    """NI-DAQmx reports a fault."""
+_OPTIONS = (
+    ("grpc.max_receive_message_length", -1),
+    ("grpc.max_send_message_length", -1),
+    ("grpc.use_local_subchannel_pool", 1),  # a new channel is a new link, not one that waits to be tried again
+)
+
+
+class DaqmxError(DeviceError):
+    """NI-DAQmx reports a fault, or the card does what it should not."""
 
 
 class Tasks:
@@ -41,15 +49,12 @@ class Tasks:
             ) from None
         self._setup, self._nidaqmx = setup, nidaqmx
         self._channel: Any = None
+        self._calls: Any = None
         self._output: Any = None
         self._input: Any = None
         self._writer: Any = None
         self._reader: Any = None
-        if setup.server:
-            import grpc
-
-            unlimited = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
-            self._channel = grpc.insecure_channel(setup.server, options=unlimited)
+        self._connect()
 
     @property
     def is_running(self) -> bool:
@@ -65,6 +70,7 @@ class Tasks:
             try:
                 self._output, self._input = self._output_task(), self._input_task()
                 self._output.timing.cfg_samp_clk_timing(1 / sample_period, sample_mode=continuous, samps_per_chan=size)
+                self._require_rate(1 / sample_period)
                 self._output.out_stream.regen_mode = constants.RegenerationMode.DONT_ALLOW_REGENERATION
                 self._input.timing.cfg_samp_clk_timing(
                     1 / sample_period, f"/{s.device}/ao/SampleClock", sample_mode=continuous, samps_per_chan=size
@@ -76,7 +82,7 @@ class Tasks:
                 self._input.start()  # waits for the clock of the output
                 self._output.start()
             except BaseException:
-                self.stop()
+                self.abandon()
                 raise
 
     def write(self, drive: Samples) -> None:
@@ -90,16 +96,29 @@ class Tasks:
         with self._faults("reading input"):
             got = self._reader.read_many_sample(samples, count, self._setup.timeout + self._setup.lead)
         if got != count:
-            raise DaqmxError(f"NI-DAQmx: got {got} samples, expected {count}")
-        return samples
+            raise DaqmxError(f"NI-DAQmx, {self._setup.device}: got {got} samples, expected {count}")
+        return self._finite(samples)
 
     def stop(self) -> None:
         """End both tasks; the output holds its last voltage."""
+        fault: DaqmxError | None = None
         tasks, self._output, self._input = (self._output, self._input), None, None
         for task in tasks:
             if task is not None:
-                with self._faults("closing a task"):
-                    task.close()
+                try:
+                    with self._faults("closing a task"):
+                        task.close()
+                except DaqmxError as error:
+                    fault = error
+        if fault is not None:
+            raise fault
+
+    def abandon(self) -> None:
+        """End both tasks as far as they can still be ended; the next call goes over a new link."""
+        with suppress(DaqmxError):
+            self.stop()
+        self.close()
+        self._connect()
 
     def write_once(self, drive: float) -> None:
         """Put out one voltage [V] without a clock."""
@@ -109,17 +128,44 @@ class Tasks:
     def read_once(self) -> Samples:
         """One reading of every input [V], without a clock."""
         with self._faults("reading one sample"), self._input_task() as task:
-            return np.atleast_1d(np.asarray(task.read(), dtype=np.float64))
+            return self._finite(np.atleast_1d(np.asarray(task.read(), dtype=np.float64)))
 
     def close(self) -> None:
         """Release the link to a server."""
         if self._channel is not None:
             self._channel.close()
 
+    def _connect(self) -> None:
+        if self._setup.server:
+            import grpc
+
+            from .deadline import Deadline
+
+            self._channel = grpc.insecure_channel(self._setup.server, options=_OPTIONS)
+            self._calls = grpc.intercept_channel(self._channel, Deadline(self._setup.timeout))
+
+    def _require_rate(self, asked: float) -> None:
+        """A card divides its timebase by whole numbers, and takes the nearest rate without a word."""
+        rate = float(self._output.timing.samp_clk_rate)
+        if not abs(rate / asked - 1) <= _RATE_TOLERANCE:
+            raise DaqmxError(
+                f"NI-DAQmx, {self._setup.device}: samples every {1 / rate:.9g} s, expected {1 / asked:.9g} s; "
+                "ask for a sample period that the card has"
+            )
+
+    def _finite(self, samples: Samples) -> Samples:
+        if not np.isfinite(samples).all():
+            at = np.argwhere(~np.isfinite(samples))[0]
+            raise DaqmxError(
+                f"NI-DAQmx, {self._setup.device}: sample {at[-1]} of input {at[0]} is {samples[tuple(at)]}, "
+                "expected finite numbers"
+            )
+        return samples
+
     def _task(self) -> Any:
         if self._channel is None:
             return self._nidaqmx.Task()
-        return self._nidaqmx.Task(grpc_options=self._nidaqmx.GrpcSessionOptions(self._channel, ""))
+        return self._nidaqmx.Task(grpc_options=self._nidaqmx.GrpcSessionOptions(self._calls, ""))
 
     def _output_task(self) -> Any:
         s, task = self._setup, self._task()
@@ -139,6 +185,10 @@ class Tasks:
         errors = self._nidaqmx.errors
         try:
             yield
+        except DaqmxError:
+            raise
         except (errors.Error, OSError, ValueError) as error:
             words = " ".join(str(error).split())
+            if "DEADLINE_EXCEEDED" in str(getattr(error, "rpc_code", "")):
+                words = f"no answer within {self._setup.timeout:g} s from {self._setup.server}"
             raise DaqmxError(f"NI-DAQmx, {self._setup.device}: {doing} failed: {words[:300]}") from None

@@ -1,6 +1,6 @@
 """Stages on controllers that speak PI's General Command Set 2.0 over TCP.
 
 ``stage`` is the back end, ``setup`` its wiring and scales; ``axis`` asks and tells one axis, ``client`` knows the
-syntax and the error queue, ``connection`` the link, ``array`` the tables of numbers, ``agreement`` what a record must
-agree with. ``emulator`` is a controller without hardware.
+syntax and the error queue, ``connection`` the link, ``array`` the tables of numbers. ``emulator`` is a controller
+without hardware.
 """

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import socket
 
-from ...errors import StageError
+from ...errors import DeviceError
 
 _CODE_PAGE = "cp1252"
 _LONGEST_ANSWER = 1 << 26
 
 
-class Gcs2Error(StageError):
-    """The controller refused or answered nonsense, or the link failed: a fault of the device, not of its user."""
+class Gcs2Error(DeviceError):
+    """The controller refused or answered nonsense, or the link failed."""
 
 
 class NoAnswerError(Gcs2Error):

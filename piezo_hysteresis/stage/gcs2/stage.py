@@ -9,11 +9,10 @@ from typing import cast
 
 import numpy as np
 
-from ...errors import StageError
+from ...errors import DeviceError, StageError
+from ..agreement import Agreement
 from ..stage import Acquired, Description, Samples
-from .agreement import check_agreement
 from .axis import Axis
-from .connection import Gcs2Error
 from .setup import Gcs2Setup
 
 _POLL = 5e-3
@@ -160,7 +159,7 @@ class Gcs2Stage:
         self._forget()
         try:
             self._retreat()
-        except Gcs2Error as error:
+        except DeviceError as error:
             raise StageError(f"{error}; {self._unknown()}") from None
 
     def close(self) -> None:
@@ -180,7 +179,7 @@ class Gcs2Stage:
         self._axis.require_servo_off("after the run")
         tolerance = self._setup.voltage_tolerance / abs(self._setup.amplifier_gain)
         settling = int(np.ceil(self._setup.settling_time / self._sample_period))
-        check_agreement(waveform, voltage, displacement, tolerance, settling)
+        Agreement(tolerance, settling).check(waveform, voltage, displacement)
         self._axis.require_voltage(self._voltage)
         return Acquired(voltage, displacement)
 
@@ -189,12 +188,12 @@ class Gcs2Stage:
         """Go to the safe voltage when the device fails, and say in the error whether it was reached."""
         try:
             yield
-        except Gcs2Error as error:
+        except DeviceError as error:
             self._forget()
             try:
                 self._retreat()
                 end = f"the stage was brought to its safe voltage, {self._voltage:g} V"
-            except Gcs2Error:
+            except DeviceError:
                 end = self._unknown()
             raise StageError(f"{error}; {end}") from None
 

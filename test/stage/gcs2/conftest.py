@@ -10,7 +10,7 @@ import pytest
 from piezo_hysteresis.stage.gcs2.client import Client
 from piezo_hysteresis.stage.gcs2.connection import Connection
 from piezo_hysteresis.stage.gcs2.emulator.controller import Controller
-from piezo_hysteresis.stage.gcs2.emulator.faults import Fault
+from piezo_hysteresis.stage.gcs2.emulator.faults import FAULTS
 from piezo_hysteresis.stage.gcs2.emulator.server import Server
 from piezo_hysteresis.stage.gcs2.setup import Gcs2Setup
 from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
@@ -65,7 +65,7 @@ def bench():
 
     def make(*faults: str, plant=None, seed=3, speed=math.inf, opened=True, controller=None, **changes) -> Bench:
         simulated = SimulatedStage(plant, seed=seed, sample_period=SERVO_TIME)
-        options = {"faults": [Fault.parse(f) for f in faults], "speed": speed, **(controller or {})}
+        options = {"faults": [FAULTS.parse(f) for f in faults], "speed": speed, **(controller or {})}
         bench = Bench(heard := Listening(simulated, **options), Server(heard))
         made.append(bench)
         bench.server.__enter__()

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.stage.gcs2.emulator.faults import LASTING, ONCE, Fault
+from piezo_hysteresis.stage.fault import Fault
+from piezo_hysteresis.stage.gcs2.emulator.faults import FAULTS
 from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
 
 WAVE = 4.0 - 4.0 * np.cos(2 * np.pi * np.arange(1200) / 600)
@@ -97,9 +98,9 @@ def test_nobody_there(bench):
 
 
 def test_every_fault_can_be_named_and_nothing_else():
-    for kind in (*ONCE, *LASTING):
-        assert Fault.parse(kind).kind == kind
-    assert Fault.parse("error@sva:3=79") == Fault("error", "SVA", 3, 79.0)
+    for kind in FAULTS.meaning:
+        assert FAULTS.parse(kind).kind == kind
+    assert FAULTS.parse("error@sva:3=79") == Fault("error", "SVA", 3, 79.0)
     for wrong in ("earthquake", "slow@POS?:x", "slow=fast"):
         with pytest.raises(StageError, match="expected"):
-            Fault.parse(wrong)
+            FAULTS.parse(wrong)

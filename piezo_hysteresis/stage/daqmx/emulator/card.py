@@ -4,27 +4,21 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ....errors import StageError
 from ...description import Samples
+from ...fault import Fault, Faults
 from ...simulated import SimulatedStage
 
-UNDERFLOW, TIMEOUT, OUT_OF_RANGE, NOT_RUNNING, RESOURCE_LOST = -200290, -200284, -200077, -200278, -200324
+UNDERFLOW, OUT_OF_RANGE, NOT_RUNNING = -200290, -200077, -200278
 """Error numbers of NI-DAQmx."""
 
-FAULTS = {
-    "link_lost": "the server stops answering in the midst of a stream",
-    "device_lost": "the card is unplugged in the midst of a stream",
-    "underflow": "the output buffer runs empty",
-    "slow": "samples come later than the time-out",
-    "short_read": "fewer samples come than were asked for",
-}
-"""What can be made to go wrong, once, at the third read of a stream."""
+INPUTS = ("ai0", "ai1", "ai2")
 
-_STRIKES_AT = 3
+_TIMEBASE = 100e6
+"""Clock that sample clocks are divided from [Hz]."""
 _LOOP_BACK_DELAY = 2
 
 
@@ -49,8 +43,7 @@ class Card:
         Monitor voltage over piezo voltage [V/V].
     speed : float
         Seconds of the card per second; infinite to play what is in the output buffer as soon as it is asked for.
-    faults : collection of str
-        Keys of `FAULTS`.
+    faults : iterable of Fault
     """
 
     def __init__(
@@ -60,17 +53,15 @@ class Card:
         sensor_gain: float = 6e-6,
         monitor_gain: float = 0.1,
         speed: float = 1.0,
-        faults: Collection[str] = (),
+        faults: Iterable[Fault] = (),
     ) -> None:
-        unknown = sorted(set(faults) - set(FAULTS))
-        if unknown:
-            raise StageError(f"fault: got '{unknown[0]}', expected one of {', '.join(FAULTS)}")
-        self._stage, self._speed, self._faults = stage, speed, set(faults)
+        self._stage, self._speed, self.faults = stage, speed, Faults(faults)
         self._sensor_gain, self._monitor_gain = sensor_gain, monitor_gain
-        self._begin, self._played, self._reads = 0.0, 0, 0
+        self._begin, self._played, self._is_finite = 0.0, 0, False
         self._buffer: Samples = np.empty(0)
-        self._acquired: dict[str, Samples] = {}
+        self._acquired: Samples = np.empty((len(INPUTS), 0))
         self._echo: Samples = np.zeros(_LOOP_BACK_DELAY)
+        self._position = 0.0
         self.is_running = False
 
     @property
@@ -78,25 +69,40 @@ class Card:
         """Voltage at the output [V]."""
         return self._stage.voltage
 
-    def start(self, rate: float) -> None:
-        """Run the clock at `rate` [Hz]."""
+    @property
+    def available(self) -> int:
+        """Samples of every input that wait to be read."""
+        self._advance()
+        return int(self._acquired.shape[1])
+
+    @property
+    def left(self) -> float:
+        """Time until the output buffer has been played [s]."""
+        self._advance()
+        return self._buffer.size * self._stage.sample_period / self._speed if self.is_running else 0.0
+
+    def coerced(self, rate: float) -> float:
+        """The rate that the clock can have when one is asked for [Hz]."""
+        possible = _TIMEBASE / max(round(_TIMEBASE / rate), 1)
+        return possible / 2 if self.faults.lasts("wrong_clock") else possible
+
+    def start(self, rate: float, is_finite: bool) -> None:
+        """Run the clock at `rate` [Hz]; a finite run ends with the buffer, any other one must never find it empty."""
         self._stage.configure(1 / rate)
-        self._acquired, self._played, self._reads = {}, 0, 0
-        self._begin, self.is_running = time.monotonic(), True
+        self._acquired, self._played = np.empty((len(INPUTS), 0)), 0
+        self._begin, self.is_running, self._is_finite = time.monotonic(), True, is_finite
 
     def stop(self) -> None:
         """Stop the clock; the output holds what it has."""
-        if self.is_running:
-            self._advance()
+        self._advance()
         self.is_running, self._buffer = False, np.empty(0)
 
     def write(self, voltage: Samples) -> None:
         """Append to the output buffer [V]."""
         d = self._stage.description
-        if voltage.min() < d.voltage_min or voltage.max() > d.voltage_max:
+        if not ((voltage >= d.voltage_min) & (voltage <= d.voltage_max)).all():
             raise CardError(OUT_OF_RANGE, "Requested value is not a supported value for this property.")
-        if self.is_running:
-            self._advance()
+        self._advance()
         self._buffer = np.concatenate((self._buffer, voltage))
 
     def set(self, voltage: float) -> None:
@@ -105,52 +111,36 @@ class Card:
         self._run(self._buffer[-1:])
         self._buffer = np.empty(0)
 
-    def look(self, channels: list[str]) -> Samples:
-        """One reading of each channel [V], without a clock."""
-        return np.array([values[-1] for values in self._run(np.full(1, self.voltage), channels).values()])
+    def look(self, channels: Sequence[str]) -> Samples:
+        """One reading of each channel [V], without a clock; shape (channels, 1)."""
+        return self._chosen(self._run(np.full(1, self.voltage)), channels)
 
-    def read(self, channels: list[str], count: int, timeout: float) -> Samples:
-        """The next samples of each channel [V], shape (channels, count); waits for them."""
-        self._reads += 1
-        if self._reads == _STRIKES_AT:
-            count = self._strike(count)
-        if not self.is_running:
+    def lacking(self, count: int) -> float:
+        """Time until `count` samples can be read [s]; infinite where they never can."""
+        if not self.is_running and not self._is_finite:
             raise CardError(NOT_RUNNING, "The specified task is not running.")
-        due = time.monotonic() + timeout
-        self._advance()
-        while self._available < count:
-            lacking = (count - self._available) * self._stage.sample_period / self._speed
-            if time.monotonic() + lacking > due:
-                raise CardError(TIMEOUT, "Some or all of the samples requested have not yet been acquired.")
-            time.sleep(lacking)
-            self._advance()
-        taken = np.stack([self._acquired[channel][:count] for channel in channels])
-        self._acquired = {channel: values[count:] for channel, values in self._acquired.items()}
-        return taken
+        missing = count - self.available
+        if missing > self._buffer.size and self._is_finite:
+            return math.inf
+        return max(missing, 0) * self._stage.sample_period / self._speed if missing > 0 else 0.0
 
-    @property
-    def _available(self) -> int:
-        return min((values.size for values in self._acquired.values()), default=0)
+    def read(self, channels: Sequence[str], count: int) -> Samples:
+        """The next samples of each channel [V], shape (channels, count)."""
+        taken, self._acquired = self._acquired[:, :count], self._acquired[:, count:]
+        return self._chosen(taken, channels)
 
-    def _strike(self, count: int) -> int:
-        if "device_lost" in self._faults:
-            raise CardError(RESOURCE_LOST, "Device not available for routing. It is possible that it was removed.")
-        if "slow" in self._faults:
-            self._faults.discard("slow")
-            raise CardError(TIMEOUT, "Some or all of the samples requested have not yet been acquired.")
-        if "link_lost" in self._faults:
-            raise ConnectionError
-        if "underflow" in self._faults:
-            self._underflow()
-        return count - 1 if "short_read" in self._faults else count
-
-    def _underflow(self) -> None:
-        self._faults.discard("underflow")
+    def underflow(self) -> None:
+        """End the run as a card does whose output buffer has run empty; CardError."""
         self.is_running = False
         raise CardError(UNDERFLOW, "The generation has stopped to prevent the regeneration of old samples.")
 
+    def _chosen(self, inputs: Samples, channels: Sequence[str]) -> Samples:
+        return inputs[[INPUTS.index(channel) for channel in channels]]
+
     def _advance(self) -> None:
         """Play what is due."""
+        if not self.is_running:
+            return
         if math.isinf(self._speed):
             due = self._buffer.size
         else:
@@ -159,20 +149,25 @@ class Card:
         late = due > self._buffer.size
         block, self._buffer = self._buffer[:due], self._buffer[due:]
         if block.size:
-            for channel, values in self._run(block, ["ai0", "ai1", "ai2"]).items():
-                self._acquired[channel] = np.concatenate((self._acquired.get(channel, np.empty(0)), values))
+            self._acquired = np.concatenate((self._acquired, self._run(block)), axis=1)
             self._played += block.size
-        if late:
-            self._underflow()
+        if late and not self._is_finite:
+            self.underflow()
 
-    def _run(self, voltage: Samples, channels: list[str] | None = None) -> dict[str, Samples]:
-        gain = self._stage.description.amplifier_gain
-        got = self._stage.exchange(np.ascontiguousarray(voltage))
+    def _run(self, voltage: Samples) -> Samples:
+        """Inputs while so many voltages are put out [V], shape (3, n)."""
+        lasts, d = self.faults.lasts, self._stage.description
+        drive = np.ascontiguousarray(voltage)
+        if lasts("saturated"):
+            drive = np.minimum(drive, d.safe_voltage + 0.5 * (d.voltage_max - d.safe_voltage))
+        got = self._stage.exchange(drive)
+        displacement = np.full(drive.size, self._position) if lasts("stale") else got.displacement
+        if lasts("skewed"):
+            displacement = np.concatenate(([self._position], displacement[:-1]))
+        self._position = float(displacement[-1] if lasts("stale") else got.displacement[-1])
         echo = np.concatenate((self._echo, got.voltage))
         self._echo = echo[-_LOOP_BACK_DELAY:]
-        wired = {
-            "ai0": got.displacement / self._sensor_gain,
-            "ai1": got.voltage * gain * self._monitor_gain,
-            "ai2": echo[: voltage.size],
-        }
-        return {channel: wired[channel] for channel in channels or ()}
+        sensor = displacement / self._sensor_gain
+        monitor = got.voltage * d.amplifier_gain * self._monitor_gain
+        both = (monitor, sensor) if lasts("swapped") else (sensor, monitor)
+        return np.stack((*both, echo[: drive.size]))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ....errors import StageError
 from ...description import Samples
+from ...fault import Fault, Faults
 from ...simulated import SimulatedStage
 from ..error_number import (
     GENERATOR_ACTIVE,
@@ -22,7 +23,6 @@ from ..error_number import (
 )
 from .answer import items
 from .arguments import AXIS, Command, axes, groups, of_axis, of_channel
-from .faults import Fault, Faults
 from .motion import Motion
 from .recorder import Recorder
 from .recorder_commands import RecorderCommands

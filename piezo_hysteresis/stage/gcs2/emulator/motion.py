@@ -8,9 +8,9 @@ import time
 import numpy as np
 
 from ...description import Samples
+from ...fault import Faults
 from ...simulated import SimulatedStage
 from ...stage import Acquired
-from .faults import Faults
 from .recorder import Recorder
 
 _LONGEST_REST = 0.2

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...description import Samples
+from ...fault import Faults
 from ..error_number import NO_RECORD_OPTION, NO_RECORDER_TABLE, OUT_OF_RANGE, TOO_FEW_RECORDED
-from .faults import Faults
 from .refusal import Refusal
 
 OPTIONS = {0: "Nothing", 1: "Commanded Value", 2: "Actual Position of Axis", 7: "Voltage of Output Chan"}

@@ -1,0 +1,87 @@
+"""`Agreement`: does what was measured agree with the drive asked for? What lags passes; what stays apart does not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..errors import DeviceError
+from .description import Samples
+
+
+class Agreement:
+    """Follows drive and measurement block by block.
+
+    A difference of one sign that lasts longer than the settling time is no lag of the amplifier: saturation, exchanged
+    channels, another sample period, a repeated block and a servo that is on all show so. A displacement that stays
+    exactly the same while the drive moves is no measurement.
+
+    Parameters
+    ----------
+    tolerance : float
+        Largest steady difference of the voltages [V].
+    settling_samples : int
+        Samples within which the voltage follows a step.
+    displacement_min, displacement_max : float
+        Range of the sensor [m]: on its ends it may stand still, which readers of a recording tell as clipped.
+    """
+
+    def __init__(
+        self,
+        tolerance: float,
+        settling_samples: int,
+        displacement_min: float = -math.inf,
+        displacement_max: float = math.inf,
+    ) -> None:
+        self._tolerance, self._settling = tolerance, settling_samples
+        self._range = displacement_min, displacement_max
+        self._seen = 0
+        self._side, self._apart = 0.0, 0
+        self._value, self._low, self._high = math.nan, math.inf, -math.inf
+
+    def check(self, asked: Samples, voltage: Samples, displacement: Samples) -> None:
+        """Take the next block.
+
+        Parameters
+        ----------
+        asked, voltage : (n,) ndarray
+            Drive asked for and measured [V].
+        displacement : (n,) ndarray
+            Measured displacement [m].
+
+        Raises
+        ------
+        DeviceError
+            Naming the first sample of the difference.
+        """
+        self._follows(asked, voltage)
+        self._moves(voltage, displacement)
+        self._seen += voltage.size
+
+    def _follows(self, asked: Samples, voltage: Samples) -> None:
+        difference = voltage - asked
+        side = np.where(np.abs(difference) > self._tolerance, np.sign(difference), 0.0)
+        edges = np.flatnonzero(np.diff(side, prepend=np.nan, append=np.nan))
+        for first, end in zip(edges[:-1], edges[1:], strict=True):
+            before = self._apart if first == 0 and side[0] == self._side else 0
+            if side[first] and before + end - first > self._settling:
+                worst = first + int(np.argmax(np.abs(difference[first:end])))
+                raise DeviceError(
+                    f"measured a drive of {voltage[worst]:g} V at sample {self._seen + worst}, expected "
+                    f"{asked[worst]:g} V within {self._tolerance:g} V (since sample {self._seen + first - before}): "
+                    "saturated, channels exchanged, or not the record of this waveform"
+                )
+            self._side, self._apart = float(side[first]), before + int(end - first)
+
+    def _moves(self, voltage: Samples, displacement: Samples) -> None:
+        last = int(np.flatnonzero(np.diff(displacement, prepend=self._value)).max(initial=-1))
+        if last >= 0:
+            self._value, self._low, self._high = float(displacement[last]), math.inf, -math.inf
+        still = voltage[max(last, 0) :]
+        self._low, self._high = min(self._low, float(still.min())), max(self._high, float(still.max()))
+        if self._range[0] < self._value < self._range[1] and self._high - self._low > self._tolerance:
+            raise DeviceError(
+                f"the displacement stayed at exactly {self._value:g} m while the drive moved by "
+                f"{self._high - self._low:g} V, expected a sensor that moves; stale readings, or no sensor connected"
+            )

@@ -1,0 +1,25 @@
+"""`Deadline`: no call to a device server waits for ever, not even where a cable was pulled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import grpc
+
+
+class Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc]  # grpc has no types
+    """Gives every call a deadline; NI's client sets none.
+
+    Parameters
+    ----------
+    seconds : float
+        Longest silence of the server, beyond the time that a call itself may wait for samples [s].
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+
+    def intercept_unary_unary(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
+        """Pass the call on with its deadline."""
+        allowed = self._seconds + max(getattr(request, "timeout", 0.0), 0.0)
+        return continuation(client_call_details._replace(timeout=allowed), request)

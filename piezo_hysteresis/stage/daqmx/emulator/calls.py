@@ -1,0 +1,211 @@
+"""`Calls`: the calls of NI's gRPC device server that clocked analogue output and input need, by their names there."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .card import INPUTS, Card, CardError
+
+_ANALOG_INPUT, _ANALOG_OUTPUT, _VOLTAGE = 10100, 10102, 10322
+_KIND_OF_CHANNEL = 0x187F
+_GROUP_BY_CHANNEL = 0
+_FINITE, _WITHOUT_REGENERATION = 10178, 10158
+_REGENERATION, _SAMPLE_CLOCK_RATE = 0x1453, 0x1344
+_VERSION = {0x1272: 26, 0x1923: 0, 0x2F22: 0}
+_NAME_OF_TASK, _CHANNELS_OF_TASK = 0x1276, 0x1273
+_TIMEOUT = (-200284, "Some or all of the samples requested have not yet been acquired.")
+_NOT_DONE = (-200560, "Wait Until Done did not indicate that the task was done within the specified timeout.")
+_NO_REGENERATION = (-200077, "Regeneration is not emulated; set out_stream.regen_mode to DONT_ALLOW_REGENERATION.")
+
+
+@dataclass(slots=True)
+class Task:
+    """What was told to a task."""
+
+    kind: int = 0
+    channels: list[str] = field(default_factory=list)
+    rate: float = 0.0
+    samples: int = 0
+    is_finite: bool = False
+    regenerates: bool = True
+
+
+class Calls:
+    """Carries out calls on a card; every public name beginning with a capital is a call.
+
+    Parameters
+    ----------
+    card : Card
+        Used by one thread at a time.
+    """
+
+    def __init__(self, card: Card) -> None:
+        self._card, self._turn, self._ended = card, threading.Lock(), threading.Event()
+        self._tasks: dict[str, Task] = {}
+
+    def names(self) -> list[str]:
+        """Names of the calls."""
+        return [name for name in dir(self) if name[0].isupper()]
+
+    def strike(self, name: str) -> dict[str, float]:
+        """Note a call; the faults that strike once at it, with their values."""
+        with self._turn:
+            return self._card.faults.count(name)
+
+    def underflow(self) -> None:
+        """End the run of the card; CardError."""
+        with self._turn:
+            self._card.underflow()
+
+    def end(self) -> None:
+        """Keep nobody waiting any more."""
+        self._ended.set()
+
+    def sleep(self, seconds: float) -> None:
+        """Wait, until the server ends."""
+        self._ended.wait(seconds)
+
+    def CreateTask(self, request: Any) -> dict[str, Any]:
+        with self._turn:
+            name = f"task{len(self._tasks) + 1}"
+            self._tasks[name] = Task()
+        return {"task": {"name": name}, "new_session_initialized": True}
+
+    def ClearTask(self, request: Any) -> dict[str, Any]:
+        task = self._tasks.get(request.task.name, Task())
+        with self._turn:
+            if task.kind == _ANALOG_OUTPUT and task.rate:
+                self._card.stop()
+        task.kind, task.rate = 0, 0.0
+        return {}
+
+    def CreateAOVoltageChan(self, request: Any) -> dict[str, Any]:
+        return self._add(request, _ANALOG_OUTPUT)
+
+    def CreateAIVoltageChan(self, request: Any) -> dict[str, Any]:
+        return self._add(request, _ANALOG_INPUT)
+
+    def CfgSampClkTiming(self, request: Any) -> dict[str, Any]:
+        task = self._task(request)
+        task.rate, task.samples = self._card.coerced(request.rate), request.samps_per_chan
+        task.is_finite = request.sample_mode_raw == _FINITE
+        return {}
+
+    def GetTimingAttributeDouble(self, request: Any) -> dict[str, Any]:
+        return {"value": self._task(request).rate if request.attribute_raw == _SAMPLE_CLOCK_RATE else 0.0}
+
+    def SetWriteAttributeInt32(self, request: Any) -> dict[str, Any]:
+        if request.attribute_raw == _REGENERATION:
+            self._task(request).regenerates = request.value_raw != _WITHOUT_REGENERATION
+        return {}
+
+    def StartTask(self, request: Any) -> dict[str, Any]:
+        task = self._task(request)
+        if task.kind == _ANALOG_OUTPUT:
+            if task.regenerates and not task.is_finite:
+                raise CardError(*_NO_REGENERATION)
+            with self._turn:
+                self._card.start(task.rate, task.is_finite)
+        return {}
+
+    def StopTask(self, request: Any) -> dict[str, Any]:
+        if self._task(request).kind == _ANALOG_OUTPUT:
+            with self._turn:
+                self._card.stop()
+        return {}
+
+    def IsTaskDone(self, request: Any) -> dict[str, Any]:
+        with self._turn:
+            return {"is_task_done": self._card.left <= 0}
+
+    def WaitUntilTaskDone(self, request: Any) -> dict[str, Any]:
+        self._wait(lambda: self._card.left, request.time_to_wait, _NOT_DONE)
+        return {}
+
+    def WriteAnalogF64(self, request: Any) -> dict[str, Any]:
+        values = np.array(request.write_array)
+        with self._turn:
+            if self._task(request).rate:
+                self._card.write(values)
+            else:
+                self._card.set(float(values[-1]))
+        return {"samps_per_chan_written": request.num_samps_per_chan}
+
+    def WriteAnalogScalarF64(self, request: Any) -> dict[str, Any]:
+        with self._turn:
+            self._card.set(request.value)
+        return {}
+
+    def ReadAnalogF64(self, request: Any) -> dict[str, Any]:
+        task = self._task(request)
+        wanted = request.num_samps_per_chan
+        if task.rate and wanted < 0 and not task.is_finite:
+            wanted = self._card.available
+        elif wanted < 0:
+            wanted = task.samples
+        if task.rate:
+            self._wait(lambda: self._card.lacking(wanted), request.timeout, _TIMEOUT)
+        with self._turn:
+            values = self._card.read(task.channels, wanted) if task.rate else self._card.look(task.channels)
+        count = values.shape[1]
+        if request.fill_mode_raw != _GROUP_BY_CHANNEL:
+            values = values.T
+        padded = np.zeros(max(request.array_size_in_samps, values.size))
+        padded[: values.size] = values.ravel()
+        return {"read_array": padded, "samps_per_chan_read": count}
+
+    def ReadAnalogScalarF64(self, request: Any) -> dict[str, Any]:
+        with self._turn:
+            return {"value": float(self._card.look(self._task(request).channels)[0, 0])}
+
+    def GetSystemInfoAttributeUInt32(self, request: Any) -> dict[str, Any]:
+        return {"value": _VERSION.get(request.attribute_raw, 0)}
+
+    def GetTaskAttributeString(self, request: Any) -> dict[str, Any]:
+        told = {_NAME_OF_TASK: request.task.name, _CHANNELS_OF_TASK: self._listed(request)}
+        return {"value": told.get(request.attribute_raw, "")}
+
+    def GetTaskAttributeUInt32(self, request: Any) -> dict[str, Any]:
+        return {"value": len(self._task(request).channels)}
+
+    def GetReadAttributeString(self, request: Any) -> dict[str, Any]:
+        return {"value": self._listed(request)}
+
+    def GetReadAttributeUInt32(self, request: Any) -> dict[str, Any]:
+        return {"value": len(self._task(request).channels)}
+
+    def GetChanAttributeInt32(self, request: Any) -> dict[str, Any]:
+        return {"value_raw": self._task(request).kind if request.attribute_raw == _KIND_OF_CHANNEL else _VOLTAGE}
+
+    def _task(self, request: Any) -> Task:
+        return self._tasks[request.task.name]
+
+    def _listed(self, request: Any) -> str:
+        return ", ".join(self._task(request).channels)
+
+    def _add(self, request: Any, kind: int) -> dict[str, Any]:
+        channel = request.physical_channel.partition("/")[2]
+        if channel not in ("ao0", *INPUTS):
+            raise CardError(-200170, f"Physical channel specified does not exist on this device: {channel}")
+        task = self._task(request)
+        task.kind = kind
+        task.channels.append(channel)
+        return {}
+
+    def _wait(self, lacking: Callable[[], float], timeout: float, error: tuple[int, str]) -> None:
+        """Wait until nothing lacks, without keeping other calls waiting."""
+        due = time.monotonic() + timeout if timeout >= 0 else float("inf")
+        while True:
+            with self._turn:
+                left = lacking()
+            if left <= 0:
+                return
+            if time.monotonic() + left > due:
+                raise CardError(*error)
+            self._ended.wait(left)

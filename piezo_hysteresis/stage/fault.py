@@ -1,0 +1,107 @@
+"""`Fault`: one way in which an emulated device or its stage misbehaves, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from ..errors import StageError
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A fault and its trigger.
+
+    Parameters
+    ----------
+    kind : str
+        Key of a `FaultCatalogue`.
+    command : str
+        Command or call at which it strikes, in capitals; empty for a lasting fault that is there from the start.
+    occurrence : int
+        Strikes when the command comes for the so-manieth time.
+    value : float
+        What the kind needs: seconds, an error number.
+    lasts : bool
+        False where it strikes once, True where it is there from then on.
+    """
+
+    kind: str
+    command: str = ""
+    occurrence: int = 1
+    value: float = 0.0
+    lasts: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FaultCatalogue:
+    """What can be made to go wrong in one kind of device.
+
+    Parameters
+    ----------
+    once : mapping of str to (str, str)
+        Faults that strike once: word -> (``COMMAND[:occurrence]`` they strike at unless told otherwise, what happens).
+    lasting : mapping of str to str
+        Faults that last, from the start or from a command on: word -> what happens.
+    values : mapping of str to float
+        Values where none is given.
+    """
+
+    once: Mapping[str, tuple[str, str]]
+    lasting: Mapping[str, str]
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def meaning(self) -> dict[str, str]:
+        """What happens, by the word of the fault."""
+        return {**{kind: what for kind, (_, what) in self.once.items()}, **self.lasting}
+
+    def parse(self, text: str) -> Fault:
+        """Read ``kind[@COMMAND[:occurrence]][=value]``.
+
+        Raises
+        ------
+        StageError
+            If the text is not of that form.
+
+        Examples
+        --------
+        >>> FaultCatalogue({"slow": ("POS?", "the answer comes late")}, {}).parse("slow@VOL?:2=0.5")
+        Fault(kind='slow', command='VOL?', occurrence=2, value=0.5, lasts=False)
+        """
+        front, _, value = text.partition("=")
+        kind, _, trigger = front.partition("@")
+        if kind not in self.meaning:
+            raise StageError(f"fault: got '{kind}', expected one of {', '.join(self.meaning)}")
+        command, _, occurrence = (trigger or self.once.get(kind, ("",))[0]).partition(":")
+        try:
+            at, number = int(occurrence or 1), float(value) if value else self.values.get(kind, 0.0)
+        except ValueError:
+            raise StageError(f"fault: got '{text}', expected kind@COMMAND:occurrence=value") from None
+        return Fault(kind, command.upper(), at, number, kind in self.lasting)
+
+
+class Faults:
+    """Faults in motion: counts commands and tells what strikes.
+
+    Parameters
+    ----------
+    faults : iterable of Fault
+    """
+
+    def __init__(self, faults: Iterable[Fault] = ()) -> None:
+        self._faults = tuple(faults)
+        self._counts: dict[str, int] = {}
+        self._active = {f.kind for f in self._faults if not f.command}
+
+    def count(self, command: str) -> dict[str, float]:
+        """Note a command; the kinds of the faults that strike once at it, with their values."""
+        name = command.upper()
+        count = self._counts[name] = self._counts.get(name, 0) + 1
+        struck = [f for f in self._faults if f.command == name and f.occurrence == count]
+        self._active |= {f.kind for f in struck if f.lasts}
+        return {f.kind: f.value for f in struck if not f.lasts}
+
+    def lasts(self, kind: str) -> bool:
+        """True while a lasting fault is there."""
+        return kind in self._active

@@ -1,0 +1,67 @@
+"""An emulated card behind NI's gRPC interface on a real port, and the back end connected to it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
+pytest.importorskip("grpc")
+
+from piezo_hysteresis.stage.daqmx.emulator.card import Card
+from piezo_hysteresis.stage.daqmx.emulator.faults import FAULTS
+from piezo_hysteresis.stage.daqmx.emulator.server import Server
+from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
+from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+PERIOD = 20e-6
+LEAD = 500
+
+
+@dataclass
+class Rig:
+    """A card, its server, and the back end."""
+
+    card: Card
+    server: Server
+    stage: DaqmxStage | None = None
+
+    def setup(self, **changes) -> DaqmxSetup:
+        wiring = {"voltage_input": "ai1", "lead": LEAD * PERIOD, "server": f"127.0.0.1:{self.server.port}"}
+        return DaqmxSetup("Dev1", **wiring | changes)
+
+
+@pytest.fixture
+def rig():
+    """Make rigs: emulated card with faults, back end opened with changes of the setup."""
+    made = []
+
+    def make(*faults: str, plant=None, seed=3, speed=math.inf, opened=True, **changes) -> Rig:
+        card = Card(SimulatedStage(plant, seed=seed), speed=speed, faults=[FAULTS.parse(f) for f in faults])
+        rig = Rig(card, Server(card))
+        made.append(rig)
+        rig.server.__enter__()
+        if opened:
+            rig.stage = DaqmxStage(rig.setup(**changes))
+        return rig
+
+    yield make
+    for rig in made:
+        rig.server.close()
+        if rig.stage is not None:
+            rig.stage._tasks.close()
+
+
+@pytest.fixture
+def streamed():
+    """Exchange a drive in blocks; the voltage and the displacement that come back."""
+
+    def run(stage, drive, *cuts):
+        parts = [stage.exchange(block) for block in np.split(drive, cuts)]
+        return tuple(np.concatenate([getattr(p, name) for p in parts]) for name in ("voltage", "displacement"))
+
+    return run

@@ -1,0 +1,143 @@
+"""Whatever fails: one clear error, the safe voltage where the link allows, and what is not known is said."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.daqmx.emulator.card import Card
+from piezo_hysteresis.stage.daqmx.emulator.faults import FAULTS
+from piezo_hysteresis.stage.daqmx.emulator.server import Server
+from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
+from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+WAVE = 4.0 - 4.0 * np.cos(2 * np.pi * np.arange(4000) / 2000)
+BLOCKS = range(400, 4000, 400)
+STEPS = (
+    "CreateTask:2 CreateAOVoltageChan:1 CreateAIVoltageChan:3 CfgSampClkTiming:1 CfgSampClkTiming:2 "
+    "GetTimingAttributeDouble:1 SetWriteAttributeInt32:1 WriteAnalogF64:1 WriteAnalogF64:4 StartTask:1 StartTask:2 "
+    "ReadAnalogF64:2 ReadAnalogF64:4 ClearTask:2 ClearTask:3"
+)
+"""Every kind of call between the first block and the last sample."""
+
+
+def work(stage, streamed):
+    record = streamed(stage, WAVE, *BLOCKS)
+    stage.set_voltage(3.0)
+    stage.read_displacement()
+    return record
+
+
+@pytest.mark.parametrize("step", STEPS.split())
+def test_a_link_lost_at_any_step_ends_at_the_safe_voltage(rig, streamed, step):
+    r = rig(f"link_lost@{step}", max_slew_rate=1e6)
+    with pytest.raises(StageError, match=r"Failed to connect to server; .*safe voltage, 0 V"):
+        work(r.stage, streamed)
+    assert r.card.voltage == r.stage.voltage == 0.0
+    work(r.stage, streamed)  # reconnected
+    r.stage.close()
+
+
+@pytest.mark.parametrize("step", ["CreateTask", "CreateAIVoltageChan", "ReadAnalogF64", "ClearTask"])
+def test_a_link_lost_while_opening_is_told_and_moves_nothing(rig, step):
+    r = rig(f"link_lost@{step}", opened=False)
+    r.card.set(4.0)
+    with pytest.raises(StageError, match="Failed to connect to server"):
+        DaqmxStage(r.setup())
+    assert r.card.voltage == pytest.approx(4.0, abs=1e-3)
+    DaqmxStage(r.setup()).close()
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ("slow=5", r"no answer within 0.3 s from 127.0.0.1:\d+"),
+        ("slow@WriteAnalogF64:3=5", r"writing output failed: no answer within 0.3 s"),
+        ("error", "Error Code: -50103|-50103"),
+        ("error@StartTask=-200077", "starting output and input failed"),
+        ("device_lost", "Device not available"),
+        ("underflow", "generation has stopped"),
+        ("late", "not yet been acquired"),
+        ("short_read", r"got \d+ samples, expected 400"),
+        ("garbled", r"sample \d+ of input \d is nan, expected finite numbers"),
+        ("duplicated", "the same 400 samples twice"),
+        ("wrong_clock", "samples every 4e-05 s, expected 2e-05 s"),
+        ("saturated", r"measured a drive of 5\S* V at sample \d+, expected .* V .*saturated"),
+        ("stale@StartTask", "displacement stayed at exactly"),
+        ("swapped", "channels exchanged"),
+    ],
+)
+def test_every_failure_is_told_clearly_and_ends_safe(rig, streamed, fault, message):
+    r = rig(fault, timeout=0.3 if "slow" in fault else 5.0)
+    with pytest.raises(StageError, match=rf"{message}.*safe voltage, 0 V") as told:
+        work(r.stage, streamed)
+    assert "\n" not in str(told.value)
+    assert r.card.voltage == 0.0
+    r.stage.close()
+
+
+@pytest.mark.parametrize("step", ["StartTask:1", "ReadAnalogF64:3", "WriteAnalogF64:5"])
+def test_a_link_that_does_not_come_back_leaves_the_voltage_unknown_and_says_so(rig, streamed, step):
+    r = rig(f"gone@{step}")
+    with pytest.raises(StageError, match=r"voltage of the stage is unknown, last given .* by hand: the card holds"):
+        work(r.stage, streamed)
+    with pytest.raises(StageError, match="unknown"):
+        r.stage.close()
+    r.stage.close()
+
+
+def test_a_server_that_went_away_and_came_back_is_found_again(rig, streamed, ideal):
+    r = rig(plant=ideal())
+    streamed(r.stage, WAVE[:800], 400)
+    port = r.server.port
+    r.server.close()
+    with pytest.raises(StageError, match="voltage of the stage is unknown"):
+        r.stage.exchange(WAVE[800:1200])
+    stands = r.card.voltage
+    assert stands > 1.0, "the card holds its output"
+    r.card.stop()
+    with Server(r.card, port=port):
+        r.stage.safe()
+        assert r.card.voltage == r.stage.voltage == 0.0
+        voltage, _ = streamed(r.stage, WAVE, *BLOCKS)
+        np.testing.assert_allclose(voltage[500:], WAVE[:-500], atol=1e-9)
+        r.stage.close()
+
+
+def test_without_a_monitor_a_saturated_amplifier_cannot_be_seen(rig, streamed, ideal):
+    r = rig("saturated", plant=ideal(), voltage_input="")
+    voltage, displacement = streamed(r.stage, WAVE, *BLOCKS)
+    assert voltage.max() == 8.0
+    assert displacement.max() < SimulatedStage(ideal()).parameters.stroke(0.0, 6.0)
+    r.stage.close()
+
+
+def test_inputs_apart_by_one_sample_cannot_be_seen_and_are_a_delay(rig, streamed, ideal):
+    straight, late = (streamed(rig(*faults, plant=ideal()).stage, WAVE, *BLOCKS)[1] for faults in ((), ("skewed",)))
+    np.testing.assert_allclose(late[1:], straight[:-1], atol=1e-15)
+
+
+def test_an_output_left_high_by_another_program_is_seen_where_there_is_a_monitor(rig):
+    r = rig(opened=False)
+    r.card.set(4.0)
+    stage = DaqmxStage(r.setup(max_slew_rate=100.0))
+    assert stage.voltage == pytest.approx(4.0, abs=1e-3)
+    assert stage.read_voltage() == pytest.approx(4.0, abs=1e-3)
+    with pytest.raises(StageError, match="steps by"):
+        stage.exchange(np.zeros(10))
+    stage.close()
+    assert r.card.voltage == 0.0
+
+
+def test_nobody_there_or_no_driver_on_this_machine():
+    with pytest.raises(StageError, match=r"Failed to connect to server|no answer"):
+        DaqmxStage(DaqmxSetup("Dev1", server="127.0.0.1:9", timeout=2.0))
+    with pytest.raises(StageError, match=r"reading one sample failed: .*NI-DAQmx"):
+        DaqmxStage(DaqmxSetup("Dev1"))
+
+
+def test_every_fault_can_be_named_and_nothing_else():
+    for kind in FAULTS.meaning:
+        assert FAULTS.parse(kind).kind == kind
+    with pytest.raises(StageError, match="expected one of"):
+        Card(SimulatedStage(), faults=[FAULTS.parse("earthquake")])
