@@ -26,6 +26,9 @@ from .held_out import Score, held_out
 
 Array = NDArray[np.float64]
 
+TOLERANCE = 1e-3
+"""Relative decrease of the cost at which a refit has converged."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Evidence:
@@ -91,6 +94,14 @@ class Candidate:
     def name(self) -> str:
         """Identifier of the effect."""
         return self.effect.name
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fitted:
+    """A fitted model and its score."""
+
+    model: Model
+    score: Score
 
 
 def free_numbers(model: Model, nuisance: Nuisance) -> list[str]:
@@ -204,18 +215,29 @@ def _screen_moves(model: Model, evidence: Evidence, base: list[str], moves: list
     ]
 
 
-def refit(model: Model, candidate: Candidate, max_iterations: int = 8, tolerance: float = 1e-3) -> Candidate | None:
+def refit(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
     """Fit the model with the candidate jointly, from its start; None where that diverges."""
-    evidence = candidate.evidence
+    return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
+
+
+def proceed(candidate: Candidate, max_iterations: int) -> Candidate:
+    """The refit carried on from where it stopped; itself where it had converged."""
+    assert candidate.fit is not None
+    if candidate.fit.converged:
+        return candidate
+    return _refitted(candidate.fit.model, candidate, max_iterations) or candidate
+
+
+def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
     try:
-        result = _joint(model.with_effect(candidate.effect), evidence, max_iterations, tolerance)
-        score = score_model(result.model, evidence)
+        result = _joint(model, candidate.evidence, max_iterations)
+        score = score_model(result.model, candidate.evidence)
     except (DivergenceError, ParameterError, ModelError, IdentificationError):
         return None
     return replace(candidate, effect=result.model[candidate.name], score=score, fit=result)
 
 
-def restart(candidate: Candidate, max_iterations: int = 8, tolerance: float = 1e-3) -> Candidate:
+def restart(candidate: Candidate, max_iterations: int) -> Candidate:
     """The refit once more behind dynamics found anew; itself where that is no better.
 
     The dynamics of the model before were bent by the effect it lacked; from there a joint fit has a long way to go.
@@ -228,16 +250,32 @@ def restart(candidate: Candidate, max_iterations: int = 8, tolerance: float = 1e
     orders = (arx.array("a").size, arx.array("b").size)
     try:
         found = dynamics_behind(fitted.model, evidence.records, broadband, round(arx["delay"]), orders)
-        result = _joint(with_dynamics(fitted.model, found.arx), evidence, max_iterations, tolerance)
-        score = score_model(result.model, evidence)
+        anew = _refitted(with_dynamics(fitted.model, found.arx), candidate, max_iterations)
     except (DivergenceError, ParameterError, ModelError, IdentificationError):
         return candidate
-    if result.cost >= fitted.cost:
+    if anew is None or anew.fit is None or anew.fit.cost >= fitted.cost:
         return candidate
-    return replace(candidate, effect=result.model[candidate.name], score=score, fit=result)
+    return anew
 
 
-def _joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: float) -> Fit:
+def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
+    """The candidate's model without its effect, all else fitted on; None where that diverges.
+
+    What this has gained over the model before belongs to dynamics and hysteresis, and to no effect.
+    """
+    assert candidate.fit is not None
+    model = candidate.fit.model.without(candidate.name)
+    evidence = candidate.evidence
+    if candidate.name == MainsHum.name:
+        evidence = replace(evidence, nuisance=replace(evidence.nuisance, hum_frequency=None))
+    try:
+        fitted = _joint(model, evidence, max_iterations)
+        return Fitted(fitted.model, score_model(fitted.model, evidence))
+    except (DivergenceError, ParameterError, ModelError, IdentificationError):
+        return None
+
+
+def _joint(model: Model, evidence: Evidence, max_iterations: int) -> Fit:
     return fit(
         model,
         evidence.records,
@@ -245,7 +283,7 @@ def _joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: flo
         floors=evidence.floors.tolist(),
         nuisance=evidence.nuisance,
         max_iterations=max_iterations,
-        tolerance=tolerance,
+        tolerance=TOLERANCE,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +12,13 @@ from ..effects import CATALOGUE, Effect, Offset, PublishedBoucWen
 from ..effects.bouc_wen import BoucWen
 from ..effects.extent import Extent
 from ..errors import IdentificationError, ModelError
+from ..identification.carried import select as select_records
 from ..identification.fit import Fit, fit
-from ..identification.identify import identify
 from ..identification.normal_equations import Nuisance, residuals
 from ..identification.roles import CARRYING
 from ..model import Model
 from ..record import Experiment, Notice, Record
+from .baseline import start_model
 from .candidates import Evidence, free_numbers, score_model
 from .diagnosis import Diagnosis, Verdict
 from .few_records import diagnose_few
@@ -24,6 +26,7 @@ from .gap import measure_gap
 from .localise import localise
 from .next_experiment import NextExperiment, propose
 from .noise_floor import floors, noise_floors, stroke
+from .sampling import at_period, common_period, shortened, slowed
 from .selection import ADEQUATE, NAMED, Selection, select
 from .split import reporting
 
@@ -32,6 +35,8 @@ Progress = Callable[[str, float], None]
 
 FEWEST = 4
 """Records below which none can be held out and no name is given."""
+SEARCHED, FITTED = 6_000, 100_000
+"""Samples of a fast record that take part in the search, and in the last fit."""
 MOVES = 30.0
 """Power over noise from which the spectrum of the displacement counts as motion."""
 IDLE = ("idle", "hold", *CARRYING)
@@ -71,7 +76,7 @@ def diagnose(
         If the records are faster than the model.
     """
     tell = progress or (lambda word, fraction: None)
-    records = experiment.records
+    records = tuple(slowed(r) for r in experiment.records)
     severe = [n for n in experiment.notices if n.severe]
     usable = [i for i, r in enumerate(records) if r.phase not in IDLE and not r.truncated]
     moving = [i for i, r in enumerate(records) if np.ptp(np.append(r.voltage, r.settled_voltage)) > 0.0]
@@ -87,17 +92,12 @@ def diagnose(
     spared = reporting(records, usable)
     fitted = [i for i in usable if i not in spared]
     noise, least, span = noise_floors(records), floors(records), stroke(records)
-    weights = np.array([least[i] if i in fitted else np.inf for i in range(len(records))])
-    start = (
-        model
-        or identify(
-            Experiment(records[: max(fitted) + 1], experiment.source),
-            held_out=("validation",),
-            progress=lambda word, part: tell(word, 0.25 * part),
-        ).model
-    )
+    period = model.sample_period if model is not None else common_period(records)
+    records = tuple(at_period(r, period) for r in records)
+    start = model or start_model(records, fitted)
     start = _exact(start)
-    evidence = Evidence(records, weights, Nuisance(), extent_of([records[i] for i in usable], start))
+    kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
+    evidence = Evidence(tuple(kept), np.array(sizes), Nuisance(), extent_of([records[i] for i in usable], start))
     tell("baseline, jointly", 0.25)
     baseline = _joint(start, evidence)
     score = score_model(baseline.model, evidence)
@@ -117,7 +117,8 @@ def diagnose(
     tell("gap", 0.85)
     named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED
     final_evidence = selection.accepted[-1].best.evidence if named else evidence
-    final = _joint(selection.model, final_evidence) if named else baseline
+    whole = tuple(select_records(shortened(records, FITTED), least.tolist(), fitted)[0])
+    final = _joint(selection.model if named else baseline.model, replace(final_evidence, records=whole))
     chosen = spared or tuple(fitted)
     gap = measure_gap(
         (baseline.model, final.model),

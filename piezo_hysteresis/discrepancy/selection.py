@@ -12,7 +12,7 @@ import numpy as np
 
 from ..effects import CATALOGUE, Effect
 from ..model import Model
-from .candidates import Candidate, Evidence, alikeness, refit, restart, screen
+from .candidates import Candidate, Evidence, Fitted, alikeness, proceed, refit, restart, screen, without
 from .held_out import Score
 
 Progress = Callable[[str, float], None]
@@ -27,13 +27,19 @@ NAMED = 0.6
 """Explained fraction of the gap from which a family is named."""
 REFITS = 6
 """Candidates that are refitted jointly."""
+HOPELESS = 0.02
+"""Linearised gain below which an effect that is not among the first two is not refitted."""
 AGAIN = 3
 """Refits that begin once more behind dynamics found anew."""
 RESTARTS = 4
 WORTHWHILE = 0.8
 """Share of the cost above which beginning anew once more is not worth it."""
+FIRST, LATER = 3, 9
+"""Linearisations of a refit before the field is thinned out, and after."""
 MOST = 3
 """Effects at most."""
+MOST_TURNS = 5
+"""Turns at most."""
 CLOSE = 0.3
 """Share of the best gain by which a rival may lie behind."""
 ALIKE = 0.97
@@ -64,6 +70,8 @@ class Step:
         Refits that records left out cannot tell from the best.
     rejected : tuple of Rejection
         All others.
+    renewed : Fitted or None
+        The model without the effect, better than before only by what the search found on its way.
     """
 
     before: Score
@@ -71,6 +79,7 @@ class Step:
     accepted: bool
     rivals: tuple[Candidate, ...]
     rejected: tuple[Rejection, ...]
+    renewed: Fitted | None = None
 
     @property
     def confusable_with(self) -> tuple[str, ...]:
@@ -151,16 +160,20 @@ def select(
     progress : callable, optional
         Called with a word and the fraction done.
     """
-    baseline, steps = model, list[Step]()
-    while score.excess > ADEQUATE and len(steps) < MOST:
-        step = _turn(model, evidence, score, effects, KEEPS[min(len(steps), 1)], progress)
+    baseline, steps, accepted = model, list[Step](), 0
+    while score.excess > ADEQUATE and len(steps) < MOST_TURNS and accepted < MOST:
+        step = _turn(model, evidence, score, effects, KEEPS[min(accepted, 1)], progress)
         if step is None:
             break
         steps.append(step)
-        if not step.accepted:
+        if step.accepted:
+            assert step.best.fit is not None
+            model, score, evidence = step.best.fit.model, step.best.score, step.best.evidence
+            accepted += 1
+        elif step.renewed is not None:
+            model, score = step.renewed.model, step.renewed.score
+        else:
             break
-        assert step.best.fit is not None
-        model, score, evidence = step.best.fit.model, step.best.score, step.best.evidence
     model, score = _pruned(model, score, steps)
     return Selection(baseline, model, score, tuple(steps), null)
 
@@ -170,10 +183,12 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
     accepted = [k for k, step in enumerate(steps) if step.accepted]
     for k in accepted[:-1]:
         name, last = steps[k].best.name, steps[accepted[-1]].best
-        lean = refit(model.without(name), replace(last, effect=model[last.name]))
+        lean = refit(model.without(name), replace(last, effect=model[last.name]), FIRST)
         if lean is None:
             continue
-        lean = _settled(lean)
+        lean = restart(lean, FIRST)
+        if lean.score.cost - score.cost < 2.0 * LEAST_GAIN + 0.5:
+            lean = _settled(lean, steps[0].before)
         if lean.score.cost - score.cost < LEAST_GAIN and lean.fit is not None:
             told = Rejection(name, f"superfluous once {last.name} is there")
             steps[k] = replace(steps[k], accepted=False, rejected=(told, *steps[k].rejected))
@@ -196,13 +211,25 @@ def _turn(
     tell("score test of the catalogue", 0.0)
     present = {e.public_name() for e in model.effects}
     screened = screen(model, evidence, [e for e in effects if e.public_name() not in present])
-    refits = _refitted(model, screened[:REFITS], before, tell)
+    likely = [c for k, c in enumerate(screened[:REFITS]) if k < 2 or before.cost - c.score.cost > HOPELESS]
+    refits = _refitted(model, likely, before, tell)
     if not refits:
         return None
     best = _simplest(refits)
     rivals, rejected = [], []
     gain = before.cost - best.score.cost
     accepted = gain >= LEAST_GAIN and best.score.excess <= keeps * before.excess
+    renewed = None
+    alone = without(best, LATER) if accepted else None
+    if alone is not None:
+        owed = alone.score.cost - best.score.cost
+        accepted = owed >= LEAST_GAIN and best.score.excess <= keeps * alone.score.excess
+        if not accepted:
+            rejected.append(Rejection(best.name, f"gains {owed:.2f} over the model fitted anew without it"))
+            renewed = alone if before.cost - alone.score.cost > 0.5 * LEAST_GAIN else None
+    if accepted and _may_be_off(best):
+        accepted = False
+        rejected.append(Rejection(best.name, "all its numbers could as well be off"))
     for candidate in refits:
         if candidate is best:
             continue
@@ -214,44 +241,58 @@ def _turn(
             rejected.append(Rejection(candidate.name, f"held-out score {lead:.2f} ± {error:.2f} behind {best.name}"))
     rejected += [
         Rejection(c.name, f"score test: at most {max(0.0, before.cost - c.score.cost):.2f} of held-out gain")
-        for c in screened[REFITS:]
+        for c in screened
+        if c.name not in {r.name for r in likely}
     ]
-    if not accepted:
+    if gain < LEAST_GAIN or best.score.excess > keeps * before.excess:
         left = best.score.excess / before.excess
         reason = f"closest, but a held-out gain of {gain:.2f} and {left:.2f} of V left do not suffice"
         rejected.insert(0, Rejection(best.name, reason))
-    return Step(before, best, accepted, tuple(rivals), tuple(rejected))
+    return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
+
+
+def _may_be_off(candidate: Candidate) -> bool:
+    """Whether every number of the effect could as well have its off value."""
+    fitted = candidate.fit
+    assert fitted is not None
+    own = [n for n in fitted.names if n.startswith(f"{candidate.name}.") and fitted.model.row(n).off is not None]
+    return bool(own) and all(
+        abs(fitted.values[n] - (fitted.model.row(n).off or 0.0)) < 1.96 * fitted.standard_errors[n] for n in own
+    )
 
 
 def _refitted(model: Model, candidates: Sequence[Candidate], before: Score, tell: Progress) -> list[Candidate]:
-    """Joint refits, best first; the leading ones begun anew, but not those far behind a best at the floor."""
+    """Joint refits, best first: a few linearisations of all, dynamics anew for the leaders, the best to the end."""
     refits = []
     for k, candidate in enumerate(candidates):
-        tell(f"refit with {candidate.name}", (k + 1) / (len(candidates) + 1))
-        result = refit(model, candidate)
+        tell(f"refit with {candidate.name}", (k + 1) / (len(candidates) + 2))
+        result = refit(model, candidate, FIRST)
         if result is not None:
             refits.append(result)
     if not refits:
         return []
+    tell("dynamics anew", 0.8)
     refits.sort(key=lambda c: c.score.cost)
-    tell("dynamics anew", 0.9)
-    best = _settled(refits[0])
-    reach = np.inf
-    if best.score.excess <= ADEQUATE:
-        reach = best.score.cost + CLOSE * (before.cost - best.score.cost)
-    again = [_settled(c) if c.score.cost < reach else c for c in refits[1:AGAIN]]
-    return sorted([best, *again, *refits[AGAIN:]], key=lambda c: c.score.cost)
+    field = sorted([*(restart(c, FIRST) for c in refits[:AGAIN]), *refits[AGAIN:]], key=lambda c: c.score.cost)
+    tell(f"refit with {field[0].name}", 0.9)
+    best = _settled(field[0], before)
+    reach = best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
+    rest = [_settled(c, before) if c.score.cost < reach and k < AGAIN else c for k, c in enumerate(field[1:], 1)]
+    return sorted([best, *rest], key=lambda c: c.score.cost)
 
 
-def _settled(candidate: Candidate) -> Candidate:
-    """The refit begun anew while that still closes much of what is left."""
+def _settled(candidate: Candidate, before: Score) -> Candidate:
+    """The refit to its end, and begun anew while that closes much of what is left."""
+    candidate = proceed(candidate, LATER)
     for _ in range(RESTARTS):
-        if candidate.score.excess <= ADEQUATE:
+        gain = before.cost - candidate.score.cost
+        if candidate.score.excess <= ADEQUATE or gain < 0.5 * LEAST_GAIN:
             break
-        before, candidate = candidate, restart(candidate)
-        assert before.fit is not None and candidate.fit is not None
-        if candidate.fit.cost > WORTHWHILE * before.fit.cost:
+        anew = restart(candidate, FIRST)
+        assert anew.fit is not None and candidate.fit is not None
+        if anew.fit.cost > WORTHWHILE * candidate.fit.cost:
             break
+        candidate = proceed(anew, LATER)
     return candidate
 
 

@@ -1,0 +1,53 @@
+"""The baseline: the published model with all its numbers fitted jointly, as well as its form allows.
+
+What is missing may only be judged from a baseline that misses nothing it could have had: with dynamics of too low an
+order any linear effect would be a gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from ..effects import Arx, BoucWen
+from ..errors import IdentificationError
+from ..identification.delay import identify_delay
+from ..identification.dynamics import delay_of
+from ..identification.hysteresis import fit_hysteresis
+from ..identification.identify import identify
+from ..identification.linear_start import dynamics_behind, hysteresis_signals, with_dynamics
+from ..identification.roles import roles_of
+from ..model import Model
+from ..record import Experiment, Record
+
+ORDERS = (8, 8)
+"""na and nb, as in the paper; the joint fit leaves at zero what the data do not ask for."""
+
+
+def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
+    """Hysteresis from the slow loops, delay from the steps, dynamics from the broadband records.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The experiment, in order.
+    fitted : collection of int
+        Indices of the records that may be used.
+    """
+    experiment = Experiment(tuple(records))
+    roles = roles_of(experiment)
+    loops = [i for i in roles.loops if i in fitted]
+    broadband = [i for i in roles.broadband if i in fitted]
+    if not loops or not broadband:
+        return identify(Experiment(experiment.records[: max(fitted) + 1]), held_out=("validation",)).model
+    period = experiment.fastest_period
+    fast = [records[i] for i in fitted if records[i].sample_period < 1.001 * period]
+    try:
+        delay = identify_delay([r for r in fast if r.phase.split("_")[0] == "step"] or fast).samples
+    except IdentificationError:
+        delay = 0
+    voltage = max(float(max(r.voltage.max(), -r.voltage.min())) for r in records)
+    reach = max(float(r.displacement.max() - r.displacement.min()) for r in records)
+    frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=max(1, delay))), period, voltage, reach)
+    start = fit_hysteresis(frame, records, loops).model
+    delay = delay or delay_of(hysteresis_signals(start, records, broadband))
+    return with_dynamics(start, dynamics_behind(start, records, broadband, delay, ORDERS).arx)
