@@ -34,7 +34,8 @@ class Csv:
         """The table as phases: labelled ones, or else what the drive looks like."""
         with naming(path, "a text table"):
             dialect = Dialect.sniff(path)
-            places = resolve(dialect.header, dialect.width, layout)
+            found = resolve(dialect.header, dialect.width, layout)
+            places = found.columns
             numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
             words = {name: at for name, (at, _) in places.items() if name in LABELS}
             stop = layout.rows[1] if layout.rows else None
@@ -43,6 +44,7 @@ class Csv:
             )
             channels = {name: layout.in_si(name, values, places[name][1]) for name, values in columns.items()}
             records, notices = table_records(channels, marks, layout)
+            notices += found.notices
             if bad:
                 notices.append(Notice("not_a_number", f"{bad} cells are empty or no number"))
             return Experiment(tuple(records), str(path), tuple(notices))

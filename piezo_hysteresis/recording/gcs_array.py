@@ -39,7 +39,7 @@ class GcsArray:
                 raise RecordingError(f"got DIM = {width}, expected two to 1000 columns")
             guessed = {"voltage": _first(titles, "volt"), "displacement": _first(titles, "position|displacement")}
             columns = {c: at for c, at in guessed.items() if at} | dict(layout.columns)
-            places = resolve(titles, width, Layout(columns=columns))
+            places = resolve(titles, width, Layout(columns=columns, sample_period=1.0)).columns
             separator = int(header.get("SEPARATOR", "32"))
             dialect = Dialect(None if separator in (9, 32) else chr(separator), False, skipped, (), width)
             numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}

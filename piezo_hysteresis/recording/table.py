@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ..errors import RecordingError
 from ..record import Notice, Record, Samples
 from .finite import finite_records
+from .guess import guess_notice, guessed, unit_in
 from .layout import LABELS, Layout
 from .phases import labelled
 from .time_base import TimeBase
@@ -33,8 +34,24 @@ def named_column(title: str) -> tuple[str, str | None]:
     return name.lower(), None
 
 
-def resolve(titles: Sequence[str], width: int, layout: Layout) -> dict[str, tuple[int, str | None]]:
-    """Position, counted from 0, and unit of every channel and label of a table.
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where the channels of a table are.
+
+    Parameters
+    ----------
+    columns : dict of str to (int, str or None)
+        Channel or label to its column, counted from 0, and the unit that its title names.
+    notices : tuple of Notice
+        What was guessed from titles of other software.
+    """
+
+    columns: dict[str, tuple[int, str | None]]
+    notices: tuple[Notice, ...]
+
+
+def resolve(titles: Sequence[str], width: int, layout: Layout) -> Places:
+    """Find every channel and label of a table.
 
     Parameters
     ----------
@@ -63,11 +80,17 @@ def resolve(titles: Sequence[str], width: int, layout: Layout) -> dict[str, tupl
             at = matches[0] if matches else width
         if at >= width:
             raise RecordingError(f"columns: got {column!r} for {channel}, expected {_listed(titles, width)}")
-        places[channel] = (at, parsed[at][1] if parsed and parsed[at][0] == channel else None)
+        places[channel] = (at, unit_in(titles[at], channel) if titles else None)
+    open_ = [c for c in ("time", "voltage", "displacement") if c not in places]
+    if "time" in open_ and layout.sample_period is not None:
+        open_.remove("time")
+    found = guessed(titles, (at for at, _ in places.values()), open_)
+    places |= {channel: (at, unit_in(titles[at], channel)) for channel, at in found.items()}
     for channel in ("voltage", "displacement"):
         if channel not in places:
             raise RecordingError(f"got {_listed(titles, width)}, expected a column for {channel}; name it by columns")
-    return places
+    names = {channel: titles[at].strip() for channel, at in found.items()}
+    return Places(places, guess_notice(names, {channel: places[channel][1] for channel in found}))
 
 
 def _listed(titles: Sequence[str], width: int) -> str:

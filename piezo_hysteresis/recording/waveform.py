@@ -15,6 +15,7 @@ _REGULAR = 0.1
 _STRAIGHT = 0.03
 _OTHER_POWER = 0.005
 _PERIODIC = 0.9
+_STILL = 0.01
 
 
 def phase_name(voltage: Samples, sample_period: float) -> str:
@@ -66,9 +67,19 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     if straight < _STRAIGHT:
         return "triangle" if regular else "minor_loops"
     period = float(np.mean(like)) if like.size else usual
-    if regular and _is_sine(voltage[turns[0] if turns.size <= 3 else turns[1] :], period):
-        return f"sine_{1 / (period * sample_period):.3g}hz"
+    body = voltage[turns[0] if turns.size <= 3 else turns[1] :]
+    if regular and _is_sine(body, period):
+        return sine_name(_frequency(body, 1 / period) / sample_period)
     return "multisine" if _repeats(wave) else "noise"
+
+
+def sine_name(frequency: float) -> str:
+    """Phase name of a sine, its frequency [Hz] to three digits.
+
+    >>> sine_name(0.99996), sine_name(12345.0)
+    ('sine_1hz', 'sine_12300hz')
+    """
+    return f"sine_{np.format_float_positional(float(f'{frequency:.3g}'), trim='-')}hz"
 
 
 def turning_points(voltage: Samples, least_swing: float) -> NDArray[np.int64]:
@@ -104,7 +115,9 @@ def _transition(voltage: Samples) -> str:
 
 
 def _has_levels(voltage: Samples) -> bool:
-    """True where the drive is nearly always at one of a few voltages."""
+    """True where the drive stays at one of a few voltages; a sine of few samples per period visits as few."""
+    if voltage.size < 3 or np.median(np.abs(np.diff(voltage))) > _STILL * float(np.ptp(voltage)):
+        return False
     place = (voltage - voltage.min()) / (float(np.ptp(voltage)) or 1.0)
     counts = np.sort(np.bincount((200 * place).astype(np.intp), minlength=201))
     return bool(counts[-8:].sum() > 0.7 * voltage.size and counts[-1] < 0.8 * voltage.size)
@@ -136,6 +149,20 @@ def _is_sine(voltage: Samples, period: float) -> bool:
         left = part - basis @ (basis.T @ part)
         shares.append(float(left @ left) / (float(part @ part) or 1.0))
     return float(np.median(shares)) < _OTHER_POWER
+
+
+def _frequency(voltage: Samples, start: float) -> float:
+    """Frequency of a sine [1/sample], from the turn of its phase between two halves of the record."""
+    half = voltage.size // 2
+    if half * start < 1.0:
+        return start
+    frequency = start
+    for _ in range(2):
+        window = np.hanning(half) * np.exp(-2j * np.pi * frequency * np.arange(half))
+        first, second = ((part - part.mean()) @ window for part in (voltage[:half], voltage[half : 2 * half]))
+        turn = np.angle(second * np.conj(first) * np.exp(-2j * np.pi * frequency * half))
+        frequency += float(turn) / (2.0 * np.pi * half)
+    return frequency if abs(frequency / start - 1.0) < _REGULAR else start
 
 
 def _is_chirp(voltage: Samples) -> bool:

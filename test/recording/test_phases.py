@@ -134,3 +134,16 @@ def test_names_given_go_before_proposals():
         labelled([record], [(0.5, "a"), (0.5, "b")])
     with pytest.raises(RecordingError, match="before"):
         labelled([record], [(7.0, "a")])
+
+
+@pytest.mark.parametrize("samples", [8, 10, 16, 20, 25, 40])
+@pytest.mark.parametrize("faded", [False, True])
+def test_a_sine_of_few_samples_per_period_has_no_levels(samples, faded):
+    t = np.arange(40 * samples)
+    fade = np.minimum(1.0, np.minimum(t, t[::-1]) / samples) if faded else 1.0
+    name = phase_name(5 + fade * np.sin(2 * np.pi * t / samples), PERIOD)
+    assert float(name.removeprefix("sine_").removesuffix("hz")) == pytest.approx(1 / samples / PERIOD, rel=0.005)
+
+
+def test_the_name_of_a_fast_sine_is_a_plain_number():
+    assert phase_name(np.sin(2 * np.pi * 1.25e4 * np.arange(4000) * 2e-6), 2e-6) == "sine_12500hz"

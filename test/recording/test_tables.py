@@ -45,6 +45,32 @@ def test_titles_tell_channels_and_units(tmp_path, content):
     assert record.sample_period == 5e-3
 
 
+@pytest.mark.parametrize(
+    ("titles", "units"),
+    [
+        ("Zeit [s];Spannung [mV];Weg [nm]", (1e-3, 1e-9)),
+        ("t_s;Piezo Voltage;Sensor (um)", (1.0, 1e-6)),
+        ("Time (s);u;y_um", (1.0, 1e-6)),
+        ("elapsed time;Drive/V;Position/um", (1.0, 1e-6)),
+    ],
+)
+def test_titles_of_other_software_are_understood_where_they_leave_no_doubt(tmp_path, titles, units):
+    (tmp_path / "t.csv").write_text(text(";", f"{titles}\n"), encoding="utf-8")
+    (record,) = experiment = read(tmp_path / "t.csv", phases="sine_1hz")
+    np.testing.assert_allclose(record.voltage, VOLTAGE * units[0], rtol=1e-8)
+    np.testing.assert_allclose(record.displacement, MICRONS * units[1], rtol=1e-8)
+    (notice,) = (n for n in experiment.notices if n.kind == "columns")
+    assert all(title in notice.message for title in titles.split(";")[1:])
+
+
+def test_titles_that_leave_a_doubt_are_not_guessed(tmp_path):
+    (tmp_path / "t.csv").write_text(text(";", "t [s];Sensor A [um];Sensor B [um]\n"))
+    with pytest.raises(RecordingError, match="expected a column for voltage"):
+        read(tmp_path / "t.csv")
+    (record,) = read(tmp_path / "t.csv", columns={"voltage": 2, "displacement": "Sensor B [um]"}, phases="x")
+    np.testing.assert_allclose(record.displacement, MICRONS * 1e-6, rtol=1e-8)
+
+
 def test_latin_1_of_old_instruments(tmp_path):
     (tmp_path / "t.txt").write_bytes(text("\t", "time [s]\tvoltage [V]\tdisplacement [µm]\n").encode("latin-1"))
     np.testing.assert_allclose(read(tmp_path / "t.txt")[0].displacement, MICRONS * 1e-6, rtol=1e-8)
