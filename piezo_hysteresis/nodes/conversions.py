@@ -39,6 +39,9 @@ _PERIOD_TOLERANCE = 0.01
 _END_OF_TIME = 2**31
 """Messages count seconds in 32 bits."""
 
+_LARGEST = {"voltage": 1e4, "displacement": 1.0}
+"""What no piezo stage is driven with [V], and no piezo stage moves [m]."""
+
 _PHASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 
@@ -99,13 +102,19 @@ def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
     Raises
     ------
     RecordError
-        On missing or wrong fields, wrong sizes, non-finite values, or samples that do not follow one another evenly.
+        On missing or wrong fields, wrong sizes, values that are not finite or that no stage has, or samples that do not
+        follow one another evenly.
     """
     arrays = from_cloud(cloud, SAMPLES)
     block = SampleBlock(
         from_stamp(cloud.header.stamp), **arrays, stage=cloud.header.frame_id, follows_gap=not cloud.is_dense
     )
     _require_consecutive(block)
+    for name, largest in _LARGEST.items():
+        values = getattr(block, name)
+        if values.max() > largest or values.min() < -largest:
+            worst = float(values[np.abs(values).argmax()])
+            raise RecordError(f"samples: got a {name} of {worst:g}, expected at most {largest:g}")
     return block
 
 

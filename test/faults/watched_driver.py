@@ -1,0 +1,43 @@
+"""A driver whose stage notes every voltage it is given, sample by sample, before it does anything with it.
+
+    python watched_driver.py LOG --ros-args …
+
+A start of the process is a NaN in the log; a driver that is killed can leave no sample out, since the samples of a
+block are with the operating system before the stage sees them.
+"""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from piezo_hysteresis.nodes import back_ends, driver_node
+
+SIMULATED = back_ends.BACK_ENDS["simulated"]
+
+
+class Watched:
+    """A simulated stage with a log."""
+
+    def __init__(self, stage, log):
+        self._stage, self._log = stage, log
+
+    def __getattr__(self, name):
+        return getattr(self._stage, name)
+
+    def exchange(self, voltage):
+        self._log.write(np.ascontiguousarray(voltage).tobytes())
+        return self._stage.exchange(voltage)
+
+    def safe(self):
+        self._stage.safe()
+        self._log.write(np.array([self._stage.voltage]).tobytes())
+
+
+if __name__ == "__main__":
+    with Path(sys.argv[1]).open("ab", buffering=0) as log:
+        log.write(np.array([np.nan]).tobytes())
+        watched = replace(SIMULATED, open=lambda *values: Watched(SIMULATED.open(*values), log))
+        back_ends.BACK_ENDS["simulated"] = watched
+        sys.exit(driver_node.main(sys.argv[2:]))
