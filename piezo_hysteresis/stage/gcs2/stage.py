@@ -130,13 +130,12 @@ class Gcs2Stage:
                 raise StageError(f"{self._description.name}: nothing to wait for, expected start() first")
             return
         end = time.monotonic() + max(timeout, 0.0)
-        time.sleep(max(min(self._due, end) - time.monotonic(), 0.0))
         with self._guarded():
             while self._axis.is_playing():
-                left = end - time.monotonic()
-                if left <= 0:
+                now = time.monotonic()
+                if now >= end:
                     break
-                time.sleep(min(left, _POLL))
+                time.sleep(min(end - now, max(self._due - now, _POLL)))
             else:
                 self._playing, self._played = False, True
                 return
