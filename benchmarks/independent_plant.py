@@ -2,7 +2,7 @@
 
 Hysteresis by the midpoint rule on a finely cut drive (or plays by direct superposition), creep as many Kelvin-Voigt
 elements (five per decade, or a power law), linear dynamics as continuous modes. Slow phases run on a finer grid with
-quasi-static dynamics and are block-averaged.
+quasi-static dynamics and are block-averaged; a `thorough` plant runs them at the fastest period, dynamics and all.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ class Plant:
     noise: float = 5e-4
     zero: float = 2e-6
     hidden: Mapping[str, Any] = field(default_factory=dict)
+    thorough: bool = False
 
     @classmethod
     def random(cls, rng: np.random.Generator, **fixed: Any) -> Plant:
@@ -82,6 +83,10 @@ class Plant:
     ) -> Record:
         """Record of a phase that begins settled at its first voltage; `averaged` samples become one."""
         u = np.asarray(drive, float)
+        if self.thorough and period > 1.01 * NATIVE:
+            finer = round(period / NATIVE)
+            u = np.interp(np.arange(u.size * finer) / finer, np.arange(u.size), u)
+            period, averaged = NATIVE, averaged * finer
         t = start_time + period * np.arange(u.size)
         slow = period > 1.01 * NATIVE
         v, lag = self._amplifier(u, period, slow)

@@ -38,7 +38,7 @@ class Case:
     noise : float
         Of the stroke, rms per sample.
     plant : str
-        ``independent`` or ``packaged``.
+        ``independent``, ``thorough`` (the same with full dynamics in slow phases) or ``packaged``.
     layout : Layout
         Of the experiment.
     without : tuple of str
@@ -91,6 +91,7 @@ class Case:
                 plays=plays,
                 volt=float(rng.choice([1.0, 10.0, 125.0])),
                 hidden={**hidden, **self.extra},
+                thorough=self.plant == "thorough",
             )
         return poor(player, seed) if self.group == "poor" else rich(player, seed, self.layout)
 
@@ -115,7 +116,7 @@ LAYOUTS = (Layout(), Layout(shift=-4.0), Layout(slowest=0.1), Layout(hold=10.0, 
 
 def _effect_free(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
     for k in range(60 * seeds):
-        plant = "packaged" if k % 4 == 3 else "independent"
+        plant = ("independent", "thorough", "independent", "packaged")[k % 4]
         layout = LAYOUTS[0] if plant == "packaged" else LAYOUTS[(k // len(noises)) % 4]
         yield Case("effect_free", (), k, noises[k % len(noises)], plant, layout)
 
@@ -124,7 +125,7 @@ def _effects(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
     for seed in range(seeds):
         for k, name in enumerate(EFFECTS):
             for j, noise in enumerate(noises):
-                plant = "packaged" if (seed + k + j) % 3 == 2 else "independent"
+                plant = ("independent", "thorough", "packaged")[(seed + k + j) % 3]
                 yield Case("effects", (name,), seed, noise, plant)
 
 

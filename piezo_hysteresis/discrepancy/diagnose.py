@@ -22,7 +22,7 @@ from .baseline import start_model
 from .candidates import Evidence, free_numbers, score_model
 from .diagnosis import Diagnosis, Verdict
 from .few_records import diagnose_few
-from .gap import measure_gap
+from .gap import Gap, measure_gap
 from .localise import localise
 from .next_experiment import NextExperiment, propose
 from .noise_floor import floors, noise_floors, stroke
@@ -37,6 +37,8 @@ FEWEST = 4
 """Records below which none can be held out and no name is given."""
 SEARCHED, FITTED = 6_000, 100_000
 """Samples of a fast record that take part in the search, and in the last fit."""
+FALLS = 0.95
+"""Share of the gap on records set aside that may remain after an effect is named."""
 MOVES = 30.0
 """Power over noise from which the spectrum of the displacement counts as motion."""
 IDLE = ("idle", "hold", *CARRYING)
@@ -116,26 +118,27 @@ def diagnose(
     )
     tell("gap", 0.85)
     named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED
-    final_evidence = selection.accepted[-1].best.evidence if named else evidence
     whole = tuple(select_records(shortened(records, FITTED), least.tolist(), fitted)[0])
-    final = _joint(selection.model if named else baseline.model, replace(final_evidence, records=whole))
+    first = _joint(baseline.model, replace(evidence, records=whole))
+    final_evidence = selection.accepted[-1].best.evidence if named else evidence
+    final = _joint(selection.model, replace(final_evidence, records=whole)) if named else first
     chosen = spared or tuple(fitted)
-    gap = measure_gap(
-        (baseline.model, final.model),
-        records,
-        chosen,
-        least.tolist(),
-        span,
-        (evidence.nuisance, final_evidence.nuisance),
-        bool(spared),
-    )
+
+    def gap_of(last: Fit, nuisance: Nuisance) -> Gap:
+        models, nuisances = (first.model, last.model), (evidence.nuisance, nuisance)
+        return measure_gap(models, records, chosen, least.tolist(), span, nuisances, bool(spared))
+
+    gap = gap_of(final, final_evidence.nuisance)
+    falls = gap.after < FALLS * gap.before
+    if named and not falls:
+        named, final, gap = False, first, gap_of(first, evidence.nuisance)
     tell("next experiment", 0.95)
-    verdict, reason = _verdict(selection, named)
+    verdict, reason = _verdict(selection, named, falls)
     return Diagnosis(
         verdict=verdict,
         reason=reason,
         model=final.model,
-        baseline=baseline.model,
+        baseline=first.model,
         selection=selection,
         fit=final,
         where=where,
@@ -210,7 +213,7 @@ def _exact(model: Model) -> Model:
     return model if Offset.name in model else model.with_effect(Offset())
 
 
-def _verdict(selection: Selection, named: bool) -> tuple[Verdict, str]:
+def _verdict(selection: Selection, named: bool, falls: bool) -> tuple[Verdict, str]:
     if named:
         names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
         closed = selection.explained(selection.score)
@@ -222,6 +225,9 @@ def _verdict(selection: Selection, named: bool) -> tuple[Verdict, str]:
         return Verdict.NAMED, f"The model misses {names}: {100 * closed:.0f} % of the gap is explained; {rest}."
     if selection.score.excess <= ADEQUATE and not selection.accepted:
         return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
+    if selection.accepted and not falls:
+        names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
+        return Verdict.UNKNOWN, f"No name: {names} helps on the records that chose it, not on those set aside."
     closest = selection.steps[0].best if selection.steps else None
     told = ""
     if closest is not None:

@@ -24,6 +24,12 @@ MAINS = (50.0, 60.0)
 """Mains frequencies [Hz]."""
 ALIKE, UNLIKE = 1e-6, 0.1
 """Share of the power of the drive by which it may differ from itself one period later, and differs in between."""
+GAUSSIAN = 1.4826
+"""Standard deviation over median absolute value."""
+FASTEST = 3
+"""Periodic records, the fastest, from which jitter is taken: the one in which least else differs between periods."""
+UNUSUAL = 2.0
+"""How far the scatter of a record may lie above what the others let expect before it counts as a stage not settled."""
 TOP_BAND = 0.7
 """Share of the Nyquist frequency above which a record holds noise alone."""
 
@@ -44,7 +50,9 @@ def white_noise(record: Record) -> float:
     response = (2.0 * np.sin(frequency / 2.0)) ** 4
     top = slice(int(TOP_BAND * density.size), -1)
     # a periodogram is exponentially distributed: its median is ln 2 of its mean
-    return float(np.sqrt(np.median(density[top] / response[top]) / np.log(2.0) / 2.0))
+    at_top = float(np.sqrt(np.median(density[top] / response[top]) / np.log(2.0) / 2.0))
+    # jumps fill all of the spectrum, but few of the samples; fast motion is in all samples, but not at the top
+    return min(at_top, float(np.median(np.abs(np.diff(record.displacement, 3)))) * GAUSSIAN / np.sqrt(20.0))
 
 
 def period_scatter(record: Record) -> float | None:
@@ -56,12 +64,18 @@ def period_scatter(record: Record) -> float | None:
     period = drive_period(record.voltage)
     if period is None or record.size < 3 * period:
         return None
-    y = record.displacement[period:]
+    first = period if record.size < 7 * period else period * ((record.size // period - 1) // 2)
+    return min(_scatter(record, period, period), _scatter(record, period, first))
+
+
+def _scatter(record: Record, period: int, first: int) -> float:
+    """Scatter from the sample `first` on: a stage may still ring when its drive has long been periodic."""
+    y = record.displacement[first:]
     steps = y[period:] - y[:-period]
     # a period that is no whole number of samples leaves a little of the drive; the other axis need not repeat
-    rest = record.voltage[2 * period :] - record.voltage[period:-period]
+    rest = record.voltage[first + period :] - record.voltage[first:-period]
     other = record.other_displacement
-    seen = [] if other is None else [other[2 * period :] - other[period:-period]]
+    seen = [] if other is None else [other[first + period :] - other[first:-period]]
     t = record.sample_period * np.arange(steps.size)
     lines = [f for base in MAINS for f in (base, 2 * base, 3 * base) if f * record.sample_period < 0.45]
     hum = [wave(2 * np.pi * f * t) for f in lines for wave in (np.cos, np.sin)]
@@ -120,13 +134,29 @@ def drive_period(voltage: Array) -> int | None:
 def noise_floors(records: Sequence[Record]) -> Array:
     """Noise of every record at its own sample period [m], shape (r,), without the adequacy floor.
 
-    Records without periods take the excess of scatter over white noise that the periodic ones show.
+    Scatter between periods is white noise, slower noise in proportion to it, and jitter of the clock, which adds in
+    proportion to the speed. Records without periods take what the periodic ones show.
     """
     white = np.array([max(white_noise(r), quantum(r) / np.sqrt(12.0)) for r in records])
-    scatter = [period_scatter(r) for r in records]
-    excess = [s / w for s, w in zip(scatter, white, strict=True) if s is not None and w > 0]
-    typical = max(1.0, float(np.median(excess))) if excess else 1.0
-    return np.array([w * typical if s is None else max(s, w) for s, w in zip(scatter, white, strict=True)])
+    speed = np.array([_speed(r, w) for r, w in zip(records, white, strict=True)])
+    scatter = np.array([np.nan if (s := period_scatter(r)) is None else s for r in records])
+    (periodic,) = np.nonzero(np.isfinite(scatter) & (white > 0.0))
+    if not periodic.size:
+        return white
+    beyond = np.sqrt(np.maximum(scatter**2 - white**2, 0.0))
+    fastest = [i for i in periodic[np.argsort(-speed[periodic])][:FASTEST] if speed[i] > 0.0]
+    jitter = min((beyond[i] / speed[i] for i in fastest), default=0.0)
+    excess = [np.sqrt(max(1.0, (scatter[i] ** 2 - (jitter * speed[i]) ** 2) / white[i] ** 2)) for i in periodic]
+    expected = np.hypot(white * float(np.median(excess)), jitter * speed)
+    return np.where(np.isfinite(scatter), np.clip(scatter, white, UNUSUAL * expected), expected)
+
+
+def _speed(record: Record, noise: float) -> float:
+    """RMS speed of the stage [m/s], the sensor's noise taken out."""
+    if record.size < 3:
+        return 0.0
+    steps = np.diff(record.displacement)
+    return float(np.sqrt(max(0.0, float(np.mean(steps**2)) - 2.0 * noise**2))) / record.sample_period
 
 
 def floors(records: Sequence[Record]) -> Array:

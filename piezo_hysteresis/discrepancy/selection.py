@@ -36,6 +36,8 @@ WORTHWHILE = 0.8
 """Share of the cost above which beginning anew once more is not worth it."""
 FIRST, LATER = 3, 9
 """Linearisations of a refit before the field is thinned out, and after."""
+FINER = 0.05
+"""Gain from which the finer form of an effect is taken."""
 MOST = 3
 """Effects at most."""
 MOST_TURNS = 5
@@ -215,7 +217,7 @@ def _turn(
     refits = _refitted(model, likely, before, tell)
     if not refits:
         return None
-    best = _simplest(refits)
+    best = _finest(_simplest(refits), before)
     rivals, rejected = [], []
     gain = before.cost - best.score.cost
     accepted = gain >= LEAST_GAIN and best.score.excess <= keeps * before.excess
@@ -231,7 +233,7 @@ def _turn(
         accepted = False
         rejected.append(Rejection(best.name, "all its numbers could as well be off"))
     for candidate in refits:
-        if candidate is best:
+        if candidate.name == best.name:
             continue
         lead, error = best.score.better_than(candidate.score)
         close = lead < CLOSE * gain
@@ -294,6 +296,18 @@ def _settled(candidate: Candidate, before: Score) -> Candidate:
             break
         candidate = proceed(anew, LATER)
     return candidate
+
+
+def _finest(candidate: Candidate, before: Score) -> Candidate:
+    """The candidate in its finer form where that is asked for, and better."""
+    finer = candidate.effect.refined()
+    gain = before.cost - candidate.score.cost
+    if finer is None or candidate.fit is None or candidate.score.excess <= ADEQUATE or gain < LEAST_GAIN:
+        return candidate
+    refined = refit(candidate.fit.model, replace(candidate, effect=finer), LATER)
+    if refined is None or refined.score.cost > candidate.score.cost - FINER:
+        return candidate
+    return _settled(refined, before)
 
 
 def _simplest(refits: list[Candidate]) -> Candidate:

@@ -164,6 +164,10 @@ class Effect(ABC):
         """
         return (cls(),)
 
+    def refined(self) -> Self | None:
+        """The same effect, unchanged in what it does, with more numbers to fit; None where it has no finer form."""
+        return None
+
     @abstractmethod
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         """Coefficients and kernels for one sample period.

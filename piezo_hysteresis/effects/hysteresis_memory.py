@@ -27,10 +27,12 @@ class HysteresisMemory(Effect):
         passive actuator returns no more work than it was given.
     reach : float
         Half width of the widest play [normalised, 1]; half the range of the drive uses them all.
+    virgin : float
+        How a stage came to rest [1]: at 0 every play is centred, at 1 each is where the way from 0 V has left it.
 
     Notes
     -----
-    The half widths are a geometric grid from ``reach``/32 to ``reach``. At rest every play is centred.
+    The half widths are a geometric grid from ``reach``/32 to ``reach``.
     """
 
     name = "hysteresis_memory"
@@ -42,11 +44,21 @@ class HysteresisMemory(Effect):
     parameters = (
         Parameter("c", "c_j", "1", (0.0,) * 8, 0.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
         Parameter("reach", "r_max", "1", 0.5, 1e-3, 10.0, "half width of the widest play", "Gu 2016", fixed=True),
+        Parameter("virgin", "f_0", "1", 0.0, 0.0, 1.0, "at rest: 0 relaxed, 1 as come from 0 V", "Gu 2016", fixed=True),
     )
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        return (cls(reach=extent.span / (2.0 * extent.voltage_scale)),)
+        half = extent.span / (2.0 * extent.voltage_scale)
+        farthest = max(abs(extent.voltage_min), abs(extent.voltage_max)) / extent.voltage_scale
+        return cls(reach=half), cls(reach=max(half, farthest), virgin=1.0)
+
+    def refined(self) -> Self:
+        """With a play between every two, of no weight yet."""
+        c = self.array("c")
+        finer = np.zeros(2 * c.size - 1)
+        finer[::2] = c
+        return self.with_values(c=tuple(finer.tolist()))
 
     def check(self) -> None:
         if self.array("c").size < 2:
@@ -59,7 +71,7 @@ class HysteresisMemory(Effect):
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         names = tuple(f"hysteresis_memory.c[{j}]" for j in range(self.array("c").size))
-        return HysteresisMemoryBlock(names, self.array("c"), self.radii)
+        return HysteresisMemoryBlock(names, self.array("c"), self.radii, self["virgin"])
 
 
 @kernel
@@ -102,17 +114,20 @@ class HysteresisMemoryBlock(Block):
 
     keeps_state = True
 
-    def __init__(self, names: tuple[str, ...], c: Array, radii: Array) -> None:
-        self.names, self.c, self.radii = names, c, radii
+    def __init__(self, names: tuple[str, ...], c: Array, radii: Array, virgin: float) -> None:
+        self.names, self.c, self.radii, self.virgin = names, c, radii, virgin
 
     def static(self, x0: float) -> float:
-        return float(self.c.sum() * x0)
+        return float(self.c @ self.rest(x0, 0.0))
 
     def static_slopes(self, x0: float) -> tuple[float, Array]:
-        return float(self.c.sum()), np.full(self.c.size, x0)
+        return float(self.c @ self._rest_slopes(x0)), self.rest(x0, 0.0)
 
     def rest(self, x0: float, time: float) -> State:
-        return np.full(self.c.size, x0)
+        return x0 - self.virgin * np.clip(x0, -self.radii, self.radii)
+
+    def _rest_slopes(self, x0: float) -> Array:
+        return 1.0 - self.virgin * (abs(x0) < self.radii)
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         y, state = np.empty_like(x), state.copy()
@@ -120,7 +135,7 @@ class HysteresisMemoryBlock(Block):
         return y, state
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.repeat(dx0[:, None], self.c.size, axis=1)
+        return np.outer(dx0, self._rest_slopes(x0))
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()

@@ -96,6 +96,8 @@ def _headline(answer: Mapping[str, Any]) -> str:
         )
     if answer["verdict"] == "nothing_missing":
         return "Nothing is missing beyond the noise"
+    if str(answer.get("reason", "")).startswith(("No verdict", "No name")):
+        return "The data do not allow a verdict"
     return "Something is missing, but it cannot be named"
 
 
