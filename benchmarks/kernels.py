@@ -21,7 +21,7 @@ from benchmarks.figures import Cell, Figures, alone, seconds
 from benchmarks.simulation import ARX, PERIOD, measure, record
 from piezo_hysteresis.chain import BLOCK
 from piezo_hysteresis.effects import BoucWen, Effect, PublishedBoucWen
-from piezo_hysteresis.effects.arx_block import ArxBlock, arx_filter
+from piezo_hysteresis.effects.arx_block import ArxBlock, arx_row
 from piezo_hysteresis.effects.published_bouc_wen import run_published
 from piezo_hysteresis.model import Model
 
@@ -88,9 +88,9 @@ def own_kernels(u: np.ndarray) -> Work:
         for start in range(0, v.size, BLOCK):
             part = v[start : start + BLOCK]
             run_published(part, p, state, w)
-            deviation = w[None, : part.size] - w0
-            arx_filter(deviation, arx.taps, arx.offset, arx.feedback, z, y[None, start : start + BLOCK])
-        return SCALES[1] * (arx.gain * w0 + y)
+            near, out = w[: part.size], y[start : start + BLOCK]
+            arx_row(near, w0, arx.gain * w0, arx.taps, arx.offset, arx.feedback, z[0], out)
+        return SCALES[1] * y
 
     return work
 

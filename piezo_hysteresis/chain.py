@@ -215,10 +215,12 @@ class Chain:
                 s = (channels or {}).get(block.channel)
             before = len(dx)
             x, dx, s, t = block.linearise(x, dx, s, t)
-            keep = [n in wanted for n in block.names]
-            if not all(keep):
-                dx = np.vstack((dx[:before], dx[before:][keep]))
-            rows += [n for n, k in zip(block.names, keep, strict=True) if k]
+            kept = [k for k, n in enumerate(block.names) if n in wanted]
+            if kept == list(range(len(kept))):
+                dx = dx[: before + len(kept)]
+            else:
+                dx = np.vstack((dx[:before], dx[before:][kept]))
+            rows += [block.names[k] for k in kept]
             states.append(s)
             tangents.append(t)
         time = state.time + u.size * self.setting.sample_period

@@ -99,30 +99,37 @@ def arx_row(x, x0, y0, taps, offset, a, z, y):
 
 
 @kernel
-def arx_filter(x, taps, offset, a, z, y):
-    """Rows of x (r, n) through `arx_row` at rest at zero; z (r, inputs + a.size) is updated, y (r, n) filled."""
+def arx_filter(x, x0, y0, taps, offset, a, z, y):
+    """`arx_row` for rows of x (r, n), rest values x0 (r,) and y0 (r,), states z (r, inputs + a.size), y (r, n)."""
     for r in range(x.shape[0]):
-        arx_row(x[r], 0.0, 0.0, taps, offset, a, z[r], y[r])
+        arx_row(x[r], x0[r], y0[r], taps, offset, a, z[r], y[r])
 
 
 @kernel
-def arx_slopes(by_x, by_y, na, taps_slope, interpolation, rows):
-    """Rows ∂y/∂a, ∂y/∂b, ∂y/∂d (na + nb + 1, n) from x/A and y/A with their histories at the front.
+def arx_slopes(x, y, at_rest, taps_slope, first, a, interpolation, na, poles, before_x, before_y, rows):
+    """Rows ∂y/∂a, ∂y/∂b, ∂y/∂d (na + nb + 1, n) of deviations x and y (n,), to which `at_rest` is added.
 
-    by_x holds x/A from `taps_slope.size` − 1 samples before the newest tap on, by_y holds y/A from na samples before.
+    They are x/A and y/A at many delays. poles (2, a.size) are the states of these, before_x (first + taps_slope.size −
+    1,) and before_y (na,) what came out before; all are updated.
     """
-    n, last = rows.shape[1], taps_slope.size - 1
+    n, past_x, nb = x.size, before_x.size, rows.shape[0] - na - 1
+    by_x, by_y = np.empty(past_x + n), np.empty(na + n)
+    by_x[:past_x], by_x[past_x:] = before_x, x
+    by_y[:na], by_y[na:] = before_y, y
+    if a.size:
+        recur(a, poles[0], by_x[past_x:])
+        recur(a, poles[1], by_y[na:])
     for j in range(na):
-        past = by_y[na - 1 - j :]
+        past, rest = by_y[na - 1 - j :], at_rest[j]
         for i in range(n):
-            rows[j, i] = -past[i]
-    for j in range(rows.shape[0] - na - 1):
-        past = by_x[last - 3 - j :]
-        row = rows[na + j]
+            rows[j, i] = rest - past[i]
+    for j in range(nb):
+        past, row, rest = by_x[taps_slope.size - 4 - j :], rows[na + j], at_rest[na + j]
+        i0, i1, i2, i3 = interpolation[0], interpolation[1], interpolation[2], interpolation[3]
         for i in range(n):
-            near = interpolation[0] * past[i + 3] + interpolation[1] * past[i + 2]
-            row[i] = near + (interpolation[2] * past[i + 1] + interpolation[3] * past[i])
-    weigh(by_x, taps_slope, rows[rows.shape[0] - 1])
+            row[i] = rest + ((i0 * past[i + 3] + i1 * past[i + 2]) + (i2 * past[i + 1] + i3 * past[i]))
+    weigh(by_x[: by_x.size - first], taps_slope, rows[na + nb])
+    before_x[:], before_y[:] = by_x[n:], by_y[n:]
 
 
 class ArxBlock(LinearBlock):
@@ -150,9 +157,17 @@ class ArxBlock(LinearBlock):
         return y, (x0, z)
 
     def filter(self, x: Array, z: Array, y: Array) -> Array:
-        z = z.copy()
-        arx_filter(x, self.taps, self.offset, self.feedback, z, y)
+        z, rest = z.copy(), np.zeros(len(x))
+        arx_filter(x, rest, rest, self.taps, self.offset, self.feedback, z, y)
         return z
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        x0, (dx0, dz, own), m = state[0], tangent, len(dx)
+        rows, dz = np.empty((m + len(self.names), x.size)), dz.copy()
+        y, after = self.run(x, state)
+        arx_filter(dx, dx0, self.gain * dx0, self.taps, self.offset, self.feedback, dz, rows[:m])
+        own = self._slopes(x - x0, y - self.gain * x0, self.gain_slopes() * x0, own, rows[m:])
+        return y, rows, after, (dx0, dz, own)
 
     def gain_slopes(self) -> Array:
         at_a = 1.0 + self.a.sum()
@@ -163,12 +178,10 @@ class ArxBlock(LinearBlock):
         return np.zeros((2, self.feedback.size)), np.zeros(before), np.zeros(self.a.size)
 
     def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
-        poles, before_x, before_y = own
-        poles, n = poles.copy(), x.size
-        by_x, by_y = np.concatenate((before_x, x)), np.concatenate((before_y, y))
-        if self.a.size:
-            recur(self.feedback, poles[0], by_x[before_x.size :])
-            recur(self.feedback, poles[1], by_y[before_y.size :])
-        seen = by_x[: by_x.size - self.first]
-        arx_slopes(seen, by_y, self.a.size, self.taps_slope, self.interpolation, rows)
-        return poles, by_x[n:].copy(), by_y[n:].copy()
+        return self._slopes(x, y, np.zeros(len(rows)), own, rows)
+
+    def _slopes(self, x: Array, y: Array, at_rest: Array, own: State, rows: Array) -> State:
+        poles, before_x, before_y = (part.copy() for part in own)
+        taps, a = (self.taps_slope, self.first), (self.feedback, self.interpolation, self.a.size)
+        arx_slopes(x, y, at_rest, *taps, *a, poles, before_x, before_y, rows)
+        return poles, before_x, before_y

@@ -35,7 +35,9 @@ class PublishedBoucWen(Effect):
     source = "paper, Eq. (6), (7); exponent of Eq. (2)"
     parameters = (
         *MODIFIED_BOUC_WEN,
-        Parameter("n", "n", "1", 1.0, 1.0, 4.0, "exponent of the loop; 1 for piezo stages", "paper, Eq. (2)"),
+        Parameter(
+            "n", "n", "1", 1.0, 1.0, 4.0, "exponent of the loop; 1 for piezo stages", "paper, Eq. (2)", fixed=True
+        ),
     )
 
     def check(self) -> None:
@@ -70,23 +72,23 @@ def run_published(v, p, state, w):
 
 @kernel
 def linearise_published(v, dv_in, p, state, tangent, last_in, w, dw):
-    """`run_published` with rows dw (m + 6, n): m incoming, then p; tangent (m + 4,) and last_in (m,) are updated."""
+    """`run_published` with rows dw (m + 5, n): m incoming, then A, β, γ, p1, p2; tangent (m + 3,), last_in (m,) follow.
+
+    The exponent n is chosen, not fitted: it has no row.
+    """
     a, beta, gamma, n, p1, p2 = p[0], p[1], p[2], p[3], p[4], p[5]
     m = dv_in.shape[0]
     h, last = state[0], state[1]
+    by_a, by_beta, by_gamma = tangent[m], tangent[m + 1], tangent[m + 2]
     for i in range(v.size):
         x = v[i]
         dv = x - last
         last = x
         damp, turn = beta * abs(dv), gamma * dv
-        factor = damp + turn if h >= 0.0 else damp - turn
-        loss, size, power, by_n = factor * h, abs(h), 1.0, 0.0
+        size, power = abs(h), 1.0
         if n != 1.0:
             power = size ** (n - 1.0)
-            loss *= power
-        if size > 0.0:
-            by_n = -loss * np.log(size)
-        keep = 1.0 - n * power * factor
+        keep = 1.0 - n * power * (damp + turn if h >= 0.0 else damp - turn)
         by_v = 3.0 * p1 * x * x + p2
         for j in range(m):
             move = dv_in[j, i] - last_in[j]
@@ -94,24 +96,22 @@ def linearise_published(v, dv_in, p, state, tangent, last_in, w, dw):
             tangent[j] = keep * tangent[j] + (a - power * (beta * direction * h + gamma * size)) * move
             last_in[j] = dv_in[j, i]
             dw[j, i] = tangent[j] + by_v * dv_in[j, i]
-        tangent[m] = keep * tangent[m] + dv
-        tangent[m + 1] = keep * tangent[m + 1] - power * abs(dv) * h
-        tangent[m + 2] = keep * tangent[m + 2] - power * dv * size
-        tangent[m + 3] = keep * tangent[m + 3] + by_n
-        for j in range(m, m + 4):
-            dw[j, i] = tangent[j]
-        dw[m + 4, i] = x * x * x
-        dw[m + 5, i] = x
+        by_a = keep * by_a + dv
+        by_beta = keep * by_beta - power * abs(dv) * h
+        by_gamma = keep * by_gamma - power * dv * size
+        dw[m, i], dw[m + 1, i], dw[m + 2, i] = by_a, by_beta, by_gamma
+        dw[m + 3, i], dw[m + 4, i] = x * x * x, x
         h = step(h, a * dv, damp, turn, n)
         w[i] = p1 * x * x * x + p2 * x + h
     state[0], state[1] = h, last
+    tangent[m], tangent[m + 1], tangent[m + 2] = by_a, by_beta, by_gamma
 
 
 class PublishedBlock(Block):
     """State [h, v_last]."""
 
     keeps_state = True
-    names = tuple(f"published_bouc_wen.{n}" for n in ("A", "beta", "gamma", "n", "p1", "p2"))
+    names = tuple(f"published_bouc_wen.{n}" for n in ("A", "beta", "gamma", "p1", "p2"))
 
     def __init__(self, effect: PublishedBoucWen) -> None:
         self.p = np.array([effect[n] for n in ("A", "beta", "gamma", "n", "p1", "p2")])
@@ -120,7 +120,7 @@ class PublishedBlock(Block):
         return float(self.p[4] * x0 * x0 * x0 + self.p[5] * x0)
 
     def static_slopes(self, x0: float) -> tuple[float, Array]:
-        return float(3.0 * self.p[4] * x0 * x0 + self.p[5]), np.array([0.0, 0.0, 0.0, 0.0, x0**3, x0])
+        return float(3.0 * self.p[4] * x0 * x0 + self.p[5]), np.array([0.0, 0.0, 0.0, x0**3, x0])
 
     def rest(self, x0: float, time: float) -> State:
         return np.array([0.0, x0])
@@ -131,11 +131,11 @@ class PublishedBlock(Block):
         return w, state
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.zeros(len(dx0) + 4), np.array(dx0)
+        return np.zeros(len(dx0) + 3), np.array(dx0)
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         w, state = np.empty_like(x), state.copy()
         slopes, last = tangent[0].copy(), tangent[1].copy()
-        rows = np.empty((len(dx) + 6, x.size))
+        rows = np.empty((len(dx) + 5, x.size))
         linearise_published(x, dx, self.p, state, slopes, last, w, rows)
         return w, rows, state, (slopes, last)

@@ -86,8 +86,9 @@ def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:
 
 def _spread(values: Samples) -> float:
     """Over how many samples the power of a signal is spread."""
-    fourth = float(np.sum(values**4))
-    return float(np.sum(values**2)) ** 2 / fourth if fourth > 0.0 else 0.0
+    squares = values * values
+    fourth = float(squares @ squares)
+    return float(squares.sum()) ** 2 / fourth if fourth > 0.0 else 0.0
 
 
 def noise_of(record: Record, fewest: int = 64) -> float:

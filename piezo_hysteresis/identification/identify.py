@@ -17,7 +17,6 @@ from ..model import Model
 from ..provenance import provenance
 from ..record import Experiment, Notice
 from .comparison import Comparison, compare_inputs
-from .content import content_of
 from .delay import Delay, identify_delay
 from .dynamics import Dynamics, OrderError, choose_order, compare_orders, delay_of
 from .fit import Fit, Progress
@@ -106,7 +105,7 @@ def identify(
 
     tell("step 1: delay", 0.0)
     delay = _delay(experiment, roles, notices)
-    published = _published(experiment, scale_v, scale_y, orders or (8, 8), hysteresis, notices)
+    published = _published(experiment, scale_v, scale_y, orders or (8, 8), hysteresis, delay, notices)
 
     tell("step 3: hysteresis", 0.1)
     dead = 1.0 if delay is None else max(1.0, delay.time / period)
@@ -170,8 +169,9 @@ def identify(
 
 
 def _delay(experiment: Experiment, roles: Roles, notices: list[Notice]) -> Delay | None:
-    fast = [experiment[i] for i in roles.fitted if experiment[i].sample_period < 1.001 * experiment.fastest_period]
-    calm = [r for r in fast if not content_of(r).is_broadband]
+    at_full_rate = [i for i in roles.fitted if experiment[i].sample_period < 1.001 * experiment.fastest_period]
+    fast = [experiment[i] for i in at_full_rate]
+    calm = [experiment[i] for i in at_full_rate if not roles.contents[i].is_broadband]
     kinds = (("step",), ("steps", "staircase"))
     named = ([r for r in fast if r.phase.split("_")[0] in kind] for kind in kinds)
     try:
@@ -189,6 +189,7 @@ def _published(
     displacement_scale: float,
     orders: tuple[int, int],
     hysteresis: type[Effect],
+    delay: Delay | None,
     notices: list[Notice],
 ) -> ThreeSteps | None:
     try:
@@ -198,6 +199,7 @@ def _published(
             displacement_scale=displacement_scale,
             orders=orders,
             hysteresis=hysteresis,
+            delay=delay,
         )
     except IdentificationError as error:
         notices.append(Notice("no_three_steps", str(error)))

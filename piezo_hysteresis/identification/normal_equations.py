@@ -107,11 +107,19 @@ def grams(
     nuisance = nuisance or Nuisance()
     q = len(wanted) + (len(extra[0]) if extra else 0)
     sums: list[Array] = []
+    room = np.empty((0, 0))  # one for all blocks: fresh memory for each would cost more than the products
     for index, part, y, slopes in model.linearise(records, wanted):
         record = records[index]
         residual = record.displacement[part] - y
-        more = extra[index][:, part] if extra else np.empty((0, y.size))
-        rows = np.vstack((*(slopes[n] for n in wanted), more, residual, nuisance.rows(record, part)))
+        free = nuisance.rows(record, part)
+        if room.shape[0] != q + 1 + len(free) or room.shape[1] < y.size:
+            room = np.empty((q + 1 + len(free), y.size))
+        rows = room[:, : y.size]
+        for k, name in enumerate(wanted):
+            rows[k] = slopes[name]
+        if extra:
+            rows[len(wanted) : q] = extra[index][:, part]
+        rows[q], rows[q + 1 :] = residual, free
         product = rows @ rows.T
         if not np.abs(product).max() < RUNAWAY:
             raise DivergenceError(model.effects[-1].name, part.start, part.start * record.sample_period)

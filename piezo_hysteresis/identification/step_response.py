@@ -70,15 +70,25 @@ def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
             f"no step found: expected an edge with {8 * every} quiet samples before it and {4 * every} after it; "
             "record a step phase"
         )
+    resolution = _resolution({id(r): r for r, _ in edges}.values())
     # A stage that still rings is not straight over a long base line; a short one is noisy.
     for most in BEFORE:
-        response, ringing = _averaged(edges, every, most)
+        response, ringing = _averaged(edges, every, most, resolution)
         if ringing == 1.0:
             break
     return response
 
 
-def _averaged(edges: Sequence[tuple[Record, Edge]], every: int, most: int) -> tuple[StepResponse, float]:
+def _resolution(records: Iterable[Record]) -> float:
+    """Smallest change of the displacement [m]; quantised or simulated data can be perfectly quiet."""
+    changes = (np.abs(np.diff(r.displacement)) for r in records)
+    finest = min(float(np.min(c, where=c > 0.0, initial=np.inf)) for c in changes)
+    return finest if finest < np.inf else 0.0
+
+
+def _averaged(
+    edges: Sequence[tuple[Record, Edge]], every: int, most: int, resolution: float
+) -> tuple[StepResponse, float]:
     """Mean response from base lines of at most so many samples, and the factor by which ringing spoils it."""
     after = min(LONGEST, min(edge.quiet_after for _, edge in edges) // every)
     ahead = np.arange(after)
@@ -99,9 +109,6 @@ def _averaged(edges: Sequence[tuple[Record, Edge]], every: int, most: int) -> tu
         off, spread = _foretold(base)
         missed, expected = missed + edge.height * off, expected + edge.height**2 * spread
         variance += edge.height**2 * (1.0 + 1.0 / before + away**2 / np.sum((behind - behind.mean()) ** 2))
-    # Quantised or simulated data can be perfectly quiet; the resolution then limits what is seen.
-    changes = np.abs(np.concatenate([np.diff(r.displacement) for r in {id(r): r for r, _ in edges}.values()]))
-    resolution = float(np.min(changes[changes > 0], initial=np.inf)) if np.any(changes > 0) else 0.0
     noise = max(squares / freedom, resolution**2 / 12.0)
     # What rings before the edges goes on behind them, alike in all of them: no averaging removes it.
     ringing = max(1.0, abs(missed) / max(SCATTER * float(np.sqrt(noise * expected)), 1e-300))

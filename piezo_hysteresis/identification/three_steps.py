@@ -69,6 +69,7 @@ def three_steps(
     displacement_scale: float,
     orders: tuple[int, int] = (8, 8),
     hysteresis: type[Effect] = BoucWen,
+    delay: Delay | None = None,
 ) -> ThreeSteps:
     """Run the published identification on the phases `step`, `noise` and `triangle` of an experiment.
 
@@ -82,6 +83,8 @@ def three_steps(
         na and nb.
     hysteresis : type of Effect
         `BoucWen`, or `PublishedBoucWen` for data that Eq. (7) made.
+    delay : Delay, optional
+        Outcome of step 1, where it is known.
 
     Raises
     ------
@@ -94,7 +97,8 @@ def three_steps(
         if not found:
             raise IdentificationError(f"three steps: got no {phase} phase, expected step, noise and triangle")
     period = min(records[i].sample_period for i in noise)
-    delay = identify_delay([records[i] for i in step])
+    if delay is None:
+        delay = identify_delay([records[i] for i in step])
     dynamics = identify_arx(
         voltage_signals(
             [records[i] for i in noise if records[i].sample_period < 1.001 * period], voltage_scale, displacement_scale
