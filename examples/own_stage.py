@@ -98,6 +98,11 @@ class OwnStage:
         self._require_open()
         self._move(float(self._description.check_voltage(np.array([voltage]), self._voltage, self._sample_period)[0]))
 
+    def read_voltage(self) -> float:
+        """The voltage in force [V]: nothing measures it here."""
+        self._require_open()
+        return self._voltage
+
     def read_displacement(self) -> float:
         """One reading [m]."""
         self._require_open()

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import PiezoError, StageError
 from ..stage.stage import Acquired, Samples, Stage, StreamingStage
 from .conversions import SampleBlock
+from .device_clock import DeviceClock
 from .drive import Drive, Event, Phase
 from .late_drive import LateDrive
 from .playback import Playback
@@ -53,6 +54,7 @@ class Tally:
     latest: float = 0.0
     postponed: float = 0.0
     clock_jumps: float = 0.0
+    clock_drift: float = 0.0
 
 
 class Acquisition:
@@ -97,6 +99,7 @@ class Acquisition:
         self._time_base, self._node_clock = time_base, node_clock
         self._deliver, self._fail, self._ready = deliver, fail, ready
         self._late = LateDrive(round(stage.description.latency / time_base.sample_period), playback.phase.number)
+        self._device_clock = DeviceClock(time_base) if stage.description.latency else None
         self._access = threading.Lock()
         self._halting = threading.Event()
         self._safe = threading.Event()
@@ -177,16 +180,33 @@ class Acquisition:
 
     def _step(self) -> None:
         stage = cast(StreamingStage, self.stage)
+        if self._device_clock is None and not self._keep_pace():
+            return
+        with self._access:
+            drive = self.playback.take(self.block_size)
+        acquired = stage.exchange(drive.voltage)
+        if self._device_clock is not None:
+            self._follow(self._device_clock)
+        self._tell(self.index, self._late.follow(drive), acquired)
+
+    def _keep_pace(self) -> bool:
+        """Wait until the next block is due; False where the thread has to end first."""
         due = self._time_base.due(self.index + self.block_size)
         if not self._wait_until(due):
-            return
+            return False
         now = time.monotonic()
         self.tally.latest = max(self.tally.latest, now - due)
         if now - due > self.patience:
             self.tally.postponed += self._time_base.postpone(self.index + self.block_size, now)
-        with self._access:
-            drive = self.playback.take(self.block_size)
-        self._tell(self.index, self._late.follow(drive), stage.exchange(drive.voltage))
+        return True
+
+    def _follow(self, clock: DeviceClock) -> None:
+        """A device with a clock of its own has given a block when it was ready."""
+        end, now = self.index + self.block_size, time.monotonic()
+        if self.index == 0:  # opening its stream took as long as it took
+            self._time_base.postpone(end, now)
+        self.tally.latest = max(self.tally.latest, now - self._time_base.due(end))
+        self.tally.clock_drift += clock.follow(end, now)
 
     def _wait_until(self, steady: float) -> bool:
         """False where the thread has to end first."""

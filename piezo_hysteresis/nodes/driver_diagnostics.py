@@ -68,6 +68,7 @@ class DriverDiagnostics:
                 "latency_max": tally.latest,
                 "postponed": tally.postponed,
                 "clock_jumps": tally.clock_jumps,
+                "clock_drift": tally.clock_drift,
                 "voltage": acquisition.playback.voltage,
                 "phase": str(acquisition.playback.phase),
             }

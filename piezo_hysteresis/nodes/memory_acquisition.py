@@ -51,7 +51,7 @@ class MemoryAcquisition(Acquisition):
 
     def _look(self, playback: Playback) -> None:
         """One sample on the slow path."""
-        voltage, displacement = self.stage.voltage, self.stage.read_displacement()
+        voltage, displacement = self.stage.read_voltage(), self.stage.read_displacement()
         first = max(self._time_base.index_at(time.monotonic()), self.index)
         with self._access:
             if playback.pending:

@@ -84,7 +84,7 @@ class TimeBase:
         return jump / _NANO
 
     def postpone(self, index: int, steady: float) -> float:
-        """Let sample `index` be due at `steady` [s], later than it was.
+        """Let sample `index` be due at `steady` [s], later than it was, or earlier where a device's clock is faster.
 
         Stamps move along in real time; where the stage runs at another rate they stay without a gap.
 

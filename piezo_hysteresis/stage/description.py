@@ -45,7 +45,8 @@ class Description:
         True where the voltage returned is measured, False where it is the one commanded.
     latency : float
         Streaming stages: time by which an answer is late [s]; sample i of what is returned was applied and measured
-        that long before sample i of the drive given is. 0 where they belong together.
+        that long before sample i of the drive given is. 0 where they belong together. A stage with latency has a clock
+        of its own, which sets the pace: `exchange` returns when the samples are there.
     ignores_drive : bool
         True for a replayed recording: what is asked for is not played.
 

@@ -121,6 +121,11 @@ class ReplayStage:
         """Ignored: a recording cannot be driven."""
         self._require_open()
 
+    def read_voltage(self) -> float:
+        """Recorded voltage of the sample played last [V]."""
+        self._require_open()
+        return self.voltage
+
     def read_displacement(self) -> float:
         """Recorded displacement of the sample played last [m]."""
         self._require_open()

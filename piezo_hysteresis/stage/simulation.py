@@ -90,6 +90,11 @@ class Simulation:
         """Apply one voltage [V] and hold it; takes one sample period of simulated time."""
         self._run(np.array([voltage], dtype=np.float64))
 
+    def read_voltage(self) -> float:
+        """The drive voltage that the converter applies [V]."""
+        self._require_ready()
+        return self.voltage
+
     def read_displacement(self) -> float:
         """One reading [m] while the voltage is held; takes one sample period of simulated time."""
         return float(self._run(np.array([self.voltage])).displacement[0])

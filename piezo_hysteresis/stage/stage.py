@@ -64,6 +64,10 @@ class Stage(Protocol):
         """Slow path: apply one voltage [V] at once and hold it; StageError outside the limits."""
         ...
 
+    def read_voltage(self) -> float:
+        """Slow path: the drive voltage measured now [V]; the one in force where nothing measures it."""
+        ...
+
     def read_displacement(self) -> float:
         """Slow path: one reading of the sensor [m]."""
         ...

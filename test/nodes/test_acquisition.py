@@ -2,10 +2,12 @@
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.nodes.acquisition import Acquisition
 from piezo_hysteresis.nodes.drive import Happening
 from piezo_hysteresis.nodes.memory_acquisition import MemoryAcquisition
@@ -129,6 +131,35 @@ def test_a_stall_is_caught_up_with_by_count():
     stamps = np.array([d.block.stamp for d in listener.deliveries])
     assert np.abs(np.diff(stamps) - round(100 * PERIOD * 1e9)).max() <= 1
     assert np.array_equal(listener.joined("index"), np.arange(100 * len(listener.deliveries)))
+
+
+class OwnClock(Witness):
+    """A witness with a clock of its own and an output buffer that must not run empty."""
+
+    def __init__(self, speed, lead):
+        super().__init__(PERIOD, RAMP_RATE)
+        self.description = replace(self.description, latency=lead)
+        self._period, self._lead, self._begin, self._given = PERIOD / speed, round(lead / PERIOD), None, 0
+
+    def exchange(self, voltage):
+        self._begin = self._begin or time.monotonic()
+        if time.monotonic() > self._begin + (self._given + self._lead) * self._period:
+            raise StageError("witness: the output buffer ran empty")
+        self._given += voltage.size
+        time.sleep(max(self._begin + self._given * self._period - time.monotonic(), 0.0))
+        return super().exchange(voltage)
+
+
+def test_a_device_with_a_clock_of_its_own_sets_the_pace_and_the_stamps():
+    """At the pace of this computer the buffer of one so fast would run empty within 0.8 s."""
+    acquisition, listener = started(OwnClock(1.5, lead=0.4), rate=1.0)
+    listener.wait(lambda heard: heard.failures or len(heard.deliveries) > 160)
+    assert not listener.failures
+    stamps = np.array([d.block.stamp for d in listener.deliveries]) * 1e-9
+    assert stamps[-1] - stamps[0] == pytest.approx(160 * 100 * PERIOD / 1.5, rel=0.1)
+    assert np.array_equal(listener.joined("index"), np.arange(100 * len(listener.deliveries)))
+    assert acquisition.tally.clock_drift < 0.0
+    assert acquisition.make_safe(30.0)
 
 
 def test_after_a_long_stall_stamps_move_and_samples_do_not():

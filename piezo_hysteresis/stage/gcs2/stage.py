@@ -81,6 +81,12 @@ class Gcs2Stage:
             self._axis.open_loop()
             self._move(float(drive[0]))
 
+    def read_voltage(self) -> float:
+        """One reading of the drive voltage at the piezo [V]."""
+        self._require_ready()
+        with self._guarded():
+            return self._axis.voltage()
+
     def read_displacement(self) -> float:
         """One reading of the sensor [m]."""
         self._require_ready()

@@ -1,0 +1,44 @@
+"""`DeviceClock`: keeps the time base on the clock of a device that sets the pace itself. No ROS."""
+
+from __future__ import annotations
+
+import math
+
+from .time_base import TimeBase
+
+_WINDOW = 100
+
+
+class DeviceClock:
+    """Follows the clock of a device by the times at which its blocks come.
+
+    Two quartz clocks part by some 50 µs per second. A block never comes before its last sample was taken, and mostly a
+    little later: of many blocks the least late one tells how far the clocks have parted.
+
+    Parameters
+    ----------
+    time_base : TimeBase
+        Moved when the clocks have parted by more than its tolerance.
+    """
+
+    def __init__(self, time_base: TimeBase) -> None:
+        self._time_base = time_base
+        self._least, self._blocks = math.inf, 0
+
+    def follow(self, end: int, now: float) -> float:
+        """Note that the block before sample `end` has come at `now` [s] of the steady clock.
+
+        Returns
+        -------
+        float
+            By how much later samples are due than was thought [s]; 0 where nothing had to be moved.
+        """
+        late = now - self._time_base.due(end)
+        self._least, self._blocks = min(self._least, late), self._blocks + 1
+        if late >= -self._time_base.tolerance and self._blocks < _WINDOW:
+            return 0.0
+        parted = self._least
+        self._least, self._blocks = math.inf, 0
+        if abs(parted) <= self._time_base.tolerance:
+            return 0.0
+        return self._time_base.postpone(end, self._time_base.due(end) + parted)

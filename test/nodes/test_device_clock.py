@@ -1,0 +1,31 @@
+"""The stamps follow the clock of a device, whatever the jitter of the computer."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.nodes.device_clock import DeviceClock
+from piezo_hysteresis.nodes.time_base import TimeBase
+
+PERIOD, BLOCK = 2e-5, 500
+
+
+@pytest.mark.parametrize("drift", [2e-4, -2e-4])
+def test_two_quartz_clocks_that_part_stay_together_within_the_tolerance(drift):
+    rng = np.random.default_rng(1)
+    base = TimeBase(PERIOD)
+    clock = DeviceClock(base)
+    apart = []
+    for end in range(BLOCK, 60_000 * BLOCK // 2, BLOCK):  # five minutes
+        taken = end * PERIOD * (1 + drift)
+        clock.follow(end, taken + rng.exponential(5e-4))
+        apart.append(base.due(end) - taken)
+    assert np.abs(apart).max() < 1.5 * base.tolerance
+    assert abs(end * PERIOD * drift) > 50 * base.tolerance
+
+
+def test_equal_clocks_move_nothing():
+    rng = np.random.default_rng(2)
+    base = TimeBase(PERIOD)
+    clock = DeviceClock(base)
+    ends = range(BLOCK, 5000 * BLOCK, BLOCK)
+    assert not any(clock.follow(end, end * PERIOD + rng.exponential(2e-3)) for end in ends)
