@@ -45,6 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--include", metavar="NAME", action="append", default=[], help="keep phases left out otherwise: idle, hold"
     )
     group.add_argument(
+        "--average",
+        metavar="N",
+        type=int,
+        default=1,
+        help="average N samples into one everywhere, while reading: for files too large for the memory",
+    )
+    group.add_argument(
         "--decimate",
         metavar="PHASE=N",
         action="append",
@@ -72,6 +79,7 @@ def read(args: argparse.Namespace) -> Experiment:
         rows=_rows(args.rows),
         phases=_phases(args.phase),
         include=args.include,
+        average=args.average,
         decimate=_pairs("--decimate", args.decimate, int) or None,
     )
 

@@ -72,6 +72,7 @@ def read(
     rows: tuple[int | None, int | None] | None = None,
     phases: str | Sequence[tuple[float, str]] | None = None,
     include: Sequence[str] = (),
+    average: int = 1,
     decimate: Mapping[str, int] | None = None,
 ) -> Experiment:
     """Read a recording, whatever its format.
@@ -82,7 +83,7 @@ def read(
         File or folder.
     format : str, optional
         Key of `FORMATS`; default what the path looks like.
-    axis, columns, units, sample_period, initial_voltage, rows, phases, include
+    axis, columns, units, sample_period, initial_voltage, rows, phases, include, average
         What the file does not say: see `Layout`.
     decimate : mapping of str to int, optional
         Phase name to the number of samples that are averaged into one on reading (`Record.decimate`); default what the
@@ -101,9 +102,14 @@ def read(
         If the samples form no record.
     """
     place = Path(path).expanduser()
-    layout = Layout(axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include)
-    experiment = _format(place, format).read(place, layout)
+    layout = Layout(axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include, average)
+    chosen = _format(place, format)
+    experiment = chosen.read(place, layout if chosen.averages else replace(layout, average=1))
     records = experiment.records
+    if average > 1 and not chosen.averages:
+        records = tuple(r.decimate(average) for r in records if r.size >= average)
+        if not records:
+            raise RecordingError(f"{place}: average: got {average} samples into one, expected fewer than a phase has")
     if records[0].continues:  # what it continues is not here
         records = (replace(records[0], continues=False, truncated=True), *records[1:])
     if initial_voltage is not None:

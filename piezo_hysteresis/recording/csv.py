@@ -26,6 +26,8 @@ class Csv:
     `other_displacement_m` and `temperature_K`. Numbers are written in full, so that reading gives the same ones.
     """
 
+    averages = True
+
     def recognises(self, path: Path) -> bool:
         """True for the endings of text tables."""
         return path.is_file() and path.suffix.lower() in _ENDINGS
@@ -38,12 +40,9 @@ class Csv:
             places = found.columns
             numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
             words = {name: at for name, (at, _) in places.items() if name in LABELS}
-            stop = layout.rows[1] if layout.rows else None
-            columns, marks, bad = read_cells(
-                path, dialect, numbers, words, stop if stop is not None and stop >= 0 else None
-            )
+            columns, marks, bad = read_cells(path, dialect, numbers, words, layout)
             channels = {name: layout.in_si(name, values, places[name][1]) for name, values in columns.items()}
-            records, notices = table_records(channels, marks, layout)
+            records, notices = table_records(channels, marks, layout.after_reading(), truncated=layout.passes_over)
             notices += found.notices
             if bad:
                 notices.append(Notice("not_a_number", f"{bad} cells are empty or no number"))

@@ -22,6 +22,8 @@ class GcsArray:
     a position, other than a commanded or target one, is the displacement [µm].
     """
 
+    averages = True
+
     def recognises(self, path: Path) -> bool:
         """True where the first block holds the end of a GCS header."""
         if not path.is_file():
@@ -43,15 +45,16 @@ class GcsArray:
             separator = int(header.get("SEPARATOR", "32"))
             dialect = Dialect(None if separator in (9, 32) else chr(separator), False, skipped, (), width)
             numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
-            values, _, bad = read_cells(path, dialect, numbers, {})
+            values, _, bad = read_cells(path, dialect, numbers, {}, layout)
             units = {"voltage": "V", "displacement": "um", "other_displacement": "um", "time": "s"}
             channels = {name: layout.in_si(name, column, units.get(name)) for name, column in values.items()}
             period = layout.sample_period or float(header.get("SAMPLE_TIME", "nan"))
-            records, notices = table_records(channels, [], layout.with_period(period if period > 0 else None))
+            rest = layout.with_period(period if period > 0 else None).after_reading()
+            records, notices = table_records(channels, [], rest, truncated=layout.passes_over)
             said = ", ".join(f"{name} = '{titles[at]}'" for name, at in numbers.items())
             notices.append(Notice("columns", f"columns taken: {said}; positions without a unit in um"))
             declared = int(header.get("NDATA", "-1"))
-            if declared >= 0 and layout.rows is None and channels["voltage"].size != declared:
+            if declared >= 0 and layout.rows is None and layout.average == 1 and channels["voltage"].size != declared:
                 notices.append(
                     Notice("cut", f"got {channels['voltage'].size} rows of the {declared} that the header declares")
                 )

@@ -14,6 +14,8 @@ _WORDS = {
     "voltage": r"volt|drive|spannung|input|\bu\b|\bv\b|\bu_?in\b|\bv_?in\b",
     "displacement": r"disp|posi|sensor|stroke|weg\b|elong|output|\by\b|\bx\b",
 }
+_PERIODS = ("sampleperiod", "ts", "dt", "sampletime", "samplingperiod", "samplingtime", "deltat")
+_RATES = ("fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate")
 _NOT_MEASURED = re.compile(r"command|target|desired|set_?point|reference|error|other", re.IGNORECASE)
 
 
@@ -62,6 +64,19 @@ def guessed(names: Sequence[str], taken: Iterable[int], wanted: Iterable[str]) -
                     used.add(candidates[0])
                 break
     return found
+
+
+def guessed_period(names: Iterable[str]) -> tuple[str, bool] | None:
+    """Name of the variable that holds the sample period [s], or with True the sample rate [Hz]; None where none does.
+
+    >>> guessed_period(["u", "y", "fs"]), guessed_period(["run.Ts"]), guessed_period(["u"])
+    (('fs', True), ('run.Ts', False), None)
+    """
+    for name in names:
+        word = name.rpartition(".")[2].lower().replace("_", "")
+        if word in _PERIODS or word in _RATES:
+            return name, word in _RATES
+    return None
 
 
 def guess_notice(found: Mapping[str, str], units: Mapping[str, str | None]) -> tuple[Notice, ...]:

@@ -11,9 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
+from ..record import Samples
+from .intake import Intake
+from .layout import Layout
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _LARGEST_EXPANSION = 1100
+_ROWS = 1 << 20
 
 
 def is_hdf5(path: Path) -> bool:
@@ -68,7 +72,49 @@ class Hdf5Variables(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
+    def samples(self, name: str, column: int | None, layout: Layout) -> Samples:
+        """A vector, or a column of a matrix; only the rows that a layout keeps are read.
+
+        Parameters
+        ----------
+        name : str
+            Dotted name.
+        column : int or None
+            Column in MATLAB, counted from 0.
+        layout : Layout
+            Its `rows`, where they count from the beginning, and its `average` apply.
+
+        Raises
+        ------
+        RecordingError
+            If there is no such column, or several where none is named.
+        """
+        dataset = self._numbers(name)
+        shape = tuple(dataset.shape[::-1])  # as in MATLAB
+        if column is None and dataset.size != max(shape, default=1):
+            raise RecordingError(f"{name}: got shape {shape}, expected a vector; choose a column as {name}[1]")
+        if column is not None and (len(shape) != 2 or column >= shape[1]):
+            raise RecordingError(f"{name}: got shape {shape}, expected a matrix with that column")
+        along = dataset.ndim - 1 if column is not None else int(np.argmax(dataset.shape))
+        intake = Intake.of(1, layout)
+        for first in range(0, dataset.shape[along], _ROWS):
+            index: list[int | slice] = [column or 0] * dataset.ndim
+            index[along] = slice(first, first + _ROWS)
+            skipped = first + _ROWS <= intake.start
+            intake.add(np.empty((_ROWS, 1)) if skipped else np.asarray(dataset[tuple(index)], np.float64)[:, None])
+            if intake.is_full:
+                break
+        return intake.column(0)
+
     def __getitem__(self, name: str) -> NDArray[Any]:
+        dataset = self._numbers(name)
+        values = np.asarray(dataset[()]).T
+        if dataset.attrs.get("MATLAB_class") == b"char":
+            return np.array("".join(map(chr, values.ravel(order="F").tolist())))
+        return values
+
+    def _numbers(self, name: str) -> Any:
+        """The dataset of a name, its size checked."""
         if name not in set(self):
             raise KeyError(name)
         dataset = self._file[name.replace(".", "/")]
@@ -77,7 +123,4 @@ class Hdf5Variables(Mapping[str, NDArray[Any]]):
         size = dataset.size * dataset.dtype.itemsize
         if size > _LARGEST_EXPANSION * (dataset.id.get_storage_size() + 1000):
             raise RecordingError(f"{name}: declares {size} bytes, more than the file can hold")
-        values = np.asarray(dataset[()]).T
-        if dataset.attrs.get("MATLAB_class") == b"char":
-            return np.array("".join(map(chr, values.ravel(order="F").tolist())))
-        return values
+        return dataset

@@ -43,6 +43,8 @@ class Layout:
         first samples, and without `initial_voltage`, a record is `truncated`.
     phases : str or sequence of (float, str), optional
         Name of the only phase, or start time [s] and name of each one, instead of what the data propose.
+    average : int
+        Samples averaged into one while they are read, so that a large file fits into memory.
     include : sequence of str
         Phases to keep that are otherwise left out: ``idle``, ``hold``.
 
@@ -60,6 +62,7 @@ class Layout:
     rows: tuple[int | None, int | None] | None = None
     phases: str | Sequence[tuple[float, str]] | None = None
     include: Sequence[str] = ()
+    average: int = 1
 
     def __post_init__(self) -> None:
         known = (*CHANNELS, *LABELS)
@@ -72,6 +75,8 @@ class Layout:
             raise RecordingError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
         if self.initial_voltage is not None and not math.isfinite(self.initial_voltage):
             raise RecordingError(f"initial_voltage: got {self.initial_voltage!r} V, expected a finite voltage")
+        if self.average < 1:
+            raise RecordingError(f"average: got {self.average}, expected a whole number of samples, 1 or more")
         columns = {k: int(c) if isinstance(c, str) and c.isdigit() else c for k, c in self.columns.items()}
         for name, column in columns.items():
             if isinstance(column, int) and column < 1:
@@ -83,6 +88,22 @@ class Layout:
         given = self.units.get(channel, unit)
         factor = 1.0 if given is None else si_factor(channel, given)
         return values if factor == 1.0 else np.asarray(values * factor)
+
+    @property
+    def from_the_beginning(self) -> tuple[int, int | None]:
+        """`rows` as far as a reader can apply them on its way through a file: those not counted from the end."""
+        start, stop = self.rows or (None, None)
+        if (start or 0) < 0 or (stop is not None and stop < 0):
+            return 0, None
+        return start or 0, stop
+
+    def after_reading(self) -> Layout:
+        """What is left to do of it once `from_the_beginning` and `average` have been applied."""
+        rows = None if self.rows is None or self.from_the_beginning != (0, None) else self.rows
+        period = None if self.sample_period is None else self.sample_period * self.average
+        if rows is not None and self.average > 1:
+            raise RecordingError(f"rows: got {self.rows} with an average, expected rows counted from the beginning")
+        return replace(self, rows=rows, sample_period=period)
 
     def part(self, size: int) -> slice:
         """`rows` as a slice of a record of `size` samples."""
@@ -96,6 +117,11 @@ class Layout:
     def truncates(self, part: slice) -> bool:
         """True where a part of a record leaves its beginning, and so its initial state, unknown."""
         return bool(part.start) and self.initial_voltage is None
+
+    @property
+    def passes_over(self) -> bool:
+        """True where reading begins behind the first row, with an unknown initial state."""
+        return bool(self.from_the_beginning[0]) and self.initial_voltage is None
 
     def with_period(self, sample_period: float | None) -> Layout:
         """The same layout with a sample period [s] that the file tells."""

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..record import Experiment, Notice, Record, Samples
 from .damage import naming
+from .guess import guess_notice, guessed, guessed_period, unit_in
 from .hdf5_variables import Hdf5Variables, is_hdf5
+from .intake import Intake
 from .layout import CHANNELS, LABELS, Layout
 from .mat5_sizes import check_sizes
 from .table import table_records
@@ -32,6 +34,8 @@ class Mat:
     (`phase`, `sample_period`, `continues`, …). `Layout.columns` names others: ``"u"``, ``"data.position"`` for a field
     of a struct, ``"y[2]"`` for a column of a matrix, counted from 1 as in MATLAB.
     """
+
+    averages = True
 
     def recognises(self, path: Path) -> bool:
         """True for the ending .mat."""
@@ -81,14 +85,12 @@ def _opened(path: Path, layout: Layout) -> AbstractContextManager[Variables]:
 
     check_sizes(path)
     named = {re.split(r"[.\[]", str(place))[0] for place in layout.columns.values()}
-    wanted = [
-        name
-        for name, _, _ in io.whosmat(path)
-        if name in named or name in (*CHANNELS, *LABELS) or re.fullmatch(_STRUCT + r"\d+", name)
-    ]
-    if not wanted:
-        held = ", ".join(name for name, _, _ in io.whosmat(path)[:30]) or "no variables"
-        raise RecordingError(f"got {held}, expected voltage and displacement; name them by columns")
+    held = [name for name, _, _ in io.whosmat(path)]
+    wanted = [name for name in held if name in named or name in (*CHANNELS, *LABELS) or guessed_period([name])]
+    wanted += [name for name in held if re.fullmatch(_STRUCT + r"\d+", name)]
+    found = {channel for channel in CHANNELS if channel in layout.columns or channel in held}
+    if not {"voltage", "displacement"} <= found and not any(name.startswith(_STRUCT) for name in wanted):
+        wanted = held  # of other software: whatever it calls them
     flat: dict[str, NDArray[Any]] = {}
     _flatten("", io.loadmat(path, simplify_cells=True, variable_names=wanted), flat)
     return nullcontext(flat)
@@ -105,39 +107,49 @@ def _flatten(prefix: str, content: Mapping[str, Any], flat: dict[str, NDArray[An
 def _records(
     variables: Variables, prefix: str, layout: Layout, before: Sequence[Record]
 ) -> tuple[list[Record], list[Notice]]:
-    columns: dict[str, Samples] = {}
-    for channel in CHANNELS:
-        place = str(layout.columns.get(channel, prefix + channel))
-        if channel in layout.columns or place in variables:
-            columns[channel] = layout.in_si(channel, _channel(variables, place))
-        elif channel in ("voltage", "displacement"):
-            raise RecordingError(f"got {_listed(variables)}, expected {place}; name it by columns")
+    given = {c: str(layout.columns.get(c, prefix + c)) for c in (*CHANNELS, *LABELS)}
+    places = {c: place for c, place in given.items() if c in layout.columns or place in variables}
+    labels = {name: _label(variables[places[name]], places[name]) for name in LABELS if name in places}
+    if layout.sample_period is None and "sample_period" not in places and (found := guessed_period(variables)):
+        value = float(_label(variables[found[0]], found[0]))
+        labels["sample_period"] = repr(1.0 / value if found[1] else value)
+    timed = layout.sample_period is not None or "sample_period" in labels
+    names = [name for name in variables if name not in places.values()]
+    wanted = [c for c in ("time", "voltage", "displacement") if c not in places and not (c == "time" and timed)]
+    guess = {c: names[at] for c, at in guessed([n.rpartition(".")[2] for n in names], (), wanted).items()}
+    places |= guess
+    for channel in ("voltage", "displacement"):
+        if channel not in places:
+            raise RecordingError(f"got {_listed(variables)}, expected {given[channel]}; name it by columns")
+    units = {c: unit_in(place, c) for c, place in places.items() if c in CHANNELS}
+    columns = {c: layout.in_si(c, _channel(variables, places[c], layout), units[c]) for c in CHANNELS if c in places}
     sizes = {name: values.size for name, values in columns.items()}
     if len(set(sizes.values())) > 1:
         raise RecordingError(f"got channels of {sizes} samples, expected equal lengths")
-    labels = {}
-    for label in LABELS:
-        place = str(layout.columns.get(label, prefix + label))
-        if place in variables:
-            labels[label] = _label(variables[place], place)
-    return table_records(columns, [(0, labels)], layout, before)
+    records, notices = table_records(
+        columns, [(0, labels)], layout.after_reading(), before, truncated=layout.passes_over
+    )
+    return records, [*notices, *guess_notice(guess, units)]
 
 
-def _channel(variables: Variables, place: str) -> Samples:
+def _channel(variables: Variables, place: str, layout: Layout) -> Samples:
     match = _PLACE.fullmatch(place)
-    name, column = (match["name"], match["column"]) if match else (place, None)
+    name, number = (match["name"], match["column"]) if match else (place, None)
     if name not in variables:
         raise RecordingError(f"got {_listed(variables)}, expected {place}")
+    column = None if number is None else int(number) - 1
+    if isinstance(variables, Hdf5Variables):
+        return variables.samples(name, column, layout)
     values = variables[name]
     if values.dtype.kind not in "fiub":
         raise RecordingError(f"{place}: got {values.dtype}, expected real numbers")
-    if column is not None:
-        if values.ndim != 2 or int(column) > values.shape[1]:
-            raise RecordingError(f"{place}: got shape {values.shape}, expected a matrix with that column")
-        return values[:, int(column) - 1].astype(np.float64)
-    if values.size != max(values.shape, default=1):
+    if column is not None and (values.ndim != 2 or column >= values.shape[1]):
+        raise RecordingError(f"{place}: got shape {values.shape}, expected a matrix with that column")
+    if column is None and values.size != max(values.shape, default=1):
         raise RecordingError(f"{place}: got shape {values.shape}, expected a vector; choose a column as {place}[1]")
-    return values.astype(np.float64).ravel()
+    intake = Intake.of(1, layout)
+    intake.add((values.ravel() if column is None else values[:, column]).astype(np.float64, copy=False)[:, None])
+    return intake.column(0)
 
 
 def _label(value: NDArray[Any], place: str) -> str:

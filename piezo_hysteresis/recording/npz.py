@@ -13,8 +13,10 @@ from ..errors import RecordingError
 from ..record import Experiment, Notice, Record, Samples
 from .damage import naming
 from .finite import finite_records
+from .guess import guess_notice, guessed, guessed_period, unit_in
 from .layout import CHANNELS, LABELS, Layout
 from .phases import labelled
+from .time_base import TimeBase
 
 _MAGIC_READERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 _LARGEST_EXPANSION = 100
@@ -29,6 +31,8 @@ class Npz:
     `truncated`, `initial_voltage` [V], `other_displacement` [m], `temperature` [K]. Other keys are ignored, unless
     `Layout.columns` names them for a channel. Pickled objects are refused.
     """
+
+    averages = False
 
     def recognises(self, path: Path) -> bool:
         """True for an .npz file or a folder that holds one."""
@@ -72,34 +76,56 @@ def _phase(file: Path, layout: Layout, end: float) -> tuple[list[Record], list[N
     with zipfile.ZipFile(file) as archive:
         values = _Members(archive, file.stat().st_size)
         place = {name: str(layout.columns.get(name, name)) for name in (*CHANNELS, *LABELS)}
+        open_ = [c for c in ("voltage", "displacement") if c not in layout.columns and c not in values]
+        names = [name for name in values.names() if name not in place.values()]
+        guess = {c: names[at] for c, at in guessed(names, (), open_).items()}
+        place |= guess
+        units = {c: unit_in(name, c) for c, name in place.items() if c in CHANNELS}
         whole = values.numbers(place["voltage"])
         part = layout.part(whole.size)
 
         def channel(name: str) -> Samples:
             samples = whole if name == "voltage" else values.numbers(place[name])
-            return layout.in_si(name, samples[part] if layout.rows else samples)
+            return layout.in_si(name, samples[part] if layout.rows else samples, units.get(name))
 
         def number(name: str, default: float | None) -> float | None:
             return values.number(place[name]) if place[name] in values else default
 
-        period = layout.sample_period
-        if period is None:
-            period = float(layout.in_si("sample_period", np.array(values.number(place["sample_period"]))))
+        period, breaks, told = _time_base(values, place, layout, part)
         optional = [name for name in ("other_displacement", "temperature") if place[name] in values]
         named = place["phase"] in values or _NUMBERED.match(file.name)
         records, notices = finite_records(
             {name: channel(name) for name in ("voltage", "displacement", *optional)},
             period,
+            breaks,
             phase=values.text(place["phase"], _NUMBERED.sub("", file.stem)),
             start_time=number("start_time", end),
             continues=bool(number("continues", 0.0)),
             truncated=bool(number("truncated", 0.0)) or layout.truncates(part),
             initial_voltage=number("initial_voltage", None),
         )
+    notices += [*told, *guess_notice(guess, units)]
     if named and layout.phases is None:
         return records, notices
     records, told = labelled(records, layout.phases)
     return records, [*notices, *told]
+
+
+def _time_base(
+    values: _Members, place: dict[str, str], layout: Layout, part: slice
+) -> tuple[float, dict[int, int], list[Notice]]:
+    """Sample period [s] from wherever the file tells it; missing samples, where it holds times; what to tell."""
+    if layout.sample_period is not None:
+        return layout.sample_period, {}, []
+    if place["sample_period"] in values or "sample_period" in layout.columns:
+        return float(layout.in_si("sample_period", np.array(values.number(place["sample_period"])))), {}, []
+    if place["time"] in values:
+        base = TimeBase.of(layout.in_si("time", values.numbers(place["time"])[part], unit_in(place["time"], "time")))
+        return base.period, dict(zip(base.breaks.tolist(), base.lost.tolist(), strict=True)), base.notices()
+    if found := guessed_period(values.names()):
+        value = values.number(found[0])
+        return (1.0 / value if found[1] else value), {}, []
+    return values.number(place["sample_period"]), {}, []  # raises, and says what the file holds
 
 
 def _keys(record: Record) -> dict[str, Any]:
@@ -136,6 +162,9 @@ class _Members:
 
     def __contains__(self, name: object) -> bool:
         return name in self._members
+
+    def names(self) -> list[str]:
+        return list(self._members)
 
     def array(self, name: str) -> np.ndarray[Any, Any]:
         member = self._members.get(name)

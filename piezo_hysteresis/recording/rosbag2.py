@@ -41,6 +41,8 @@ class Rosbag2:
     exactly. So is one whose beginning is not in the bag.
     """
 
+    averages = False
+
     def recognises(self, path: Path) -> bool:
         """True for a storage file or a folder with one."""
         files = [path] if path.is_file() else path.iterdir()

@@ -100,7 +100,12 @@ def _listed(titles: Sequence[str], width: int) -> str:
 
 
 def table_records(
-    columns: Mapping[str, Samples], marks: Sequence[Mark], layout: Layout, before: Sequence[Record] = ()
+    columns: Mapping[str, Samples],
+    marks: Sequence[Mark],
+    layout: Layout,
+    before: Sequence[Record] = (),
+    *,
+    truncated: bool = False,
 ) -> tuple[list[Record], list[Notice]]:
     """Records of a table.
 
@@ -114,6 +119,8 @@ def table_records(
         Its `rows`, `phases`, `sample_period` apply.
     before : sequence of Record
         Records of tables that come before.
+    truncated : bool
+        True where rows before the first one were passed over.
 
     Returns
     -------
@@ -132,7 +139,7 @@ def table_records(
     marks = marks or [(0, {})]
     if layout.phases is not None or not any("phase" in labels for _, labels in marks):
         records, notices = _stretch(columns, marks[0][1], layout, before)
-        if layout.truncates(part):
+        if truncated or layout.truncates(part):
             records[0] = replace(records[0], truncated=True)
         named, told = labelled(records, layout.phases)
         return named, [*notices, *told]
@@ -144,7 +151,7 @@ def table_records(
             parts, told = _stretch(piece, labels, layout, [*before, *records[-1:]])
             records += parts
             notices += told
-    if layout.truncates(part):
+    if truncated or layout.truncates(part):
         records[0] = replace(records[0], truncated=True)
     return records, notices
 
@@ -154,7 +161,8 @@ def _stretch(
 ) -> tuple[list[Record], list[Notice]]:
     phase = labels.get("phase") or "record"
     time = columns.get("time")
-    period = layout.sample_period or _number(labels, "sample_period")
+    labelled_period = _number(labels, "sample_period")
+    period = layout.sample_period or (labelled_period and labelled_period * layout.average)
     notices: list[Notice] = []
     breaks: dict[int, int] = {}
     if time is not None and (time.size > 1 or period is None):

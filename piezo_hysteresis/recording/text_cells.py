@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,8 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..record import Samples
+from .intake import Intake
+from .layout import Layout
 
 BLOCK_BYTES = 1 << 20
 """Text that is parsed at a time; no line may be longer."""
@@ -99,7 +100,7 @@ def decoded(block: bytes) -> str:
 
 
 def read_cells(
-    path: Path, dialect: Dialect, numbers: Mapping[str, int], words: Mapping[str, int], stop: int | None = None
+    path: Path, dialect: Dialect, numbers: Mapping[str, int], words: Mapping[str, int], layout: Layout
 ) -> tuple[dict[str, Samples], list[tuple[int, dict[str, str]]], int]:
     """Read columns of a text file.
 
@@ -111,42 +112,45 @@ def read_cells(
         How it is written.
     numbers, words : mapping of str to int
         Name of every column to read to its position, counted from 0.
-    stop : int, optional
-        Rows to read.
+    layout : Layout
+        Its `rows`, where they count from the beginning, and its `average` apply before anything is kept.
 
     Returns
     -------
     columns : dict of str to (n,) ndarray
         The `numbers`; NaN where a cell is empty or no number.
     marks : list of (int, dict)
-        The `words` and the first row at which they are those; empty without words.
+        The `words` and the first row kept at which they are those; empty without words.
     bad : int
         Cells that are no number.
 
     Raises
     ------
     RecordingError
-        On a line that is longer than a block.
+        On a line that is longer than a block, or more samples than can be kept.
     """
-    columns = {name: array("d") for name in numbers}
+    intake = Intake.of(len(numbers), layout)
     marks: list[tuple[int, dict[str, str]]] = []
-    rows = bad = 0
+    bad = 0
     for lines in _line_blocks(path, dialect.skipped):
-        values, wrong = _parsed(lines, dialect, list(numbers.values()))
-        for name, column in zip(columns, values.T, strict=True):
-            columns[name].frombytes(np.ascontiguousarray(column).tobytes())
-        if words:
+        first, behind = intake.rows, intake.rows + len(lines)
+        if behind > intake.start:
+            values, wrong = _parsed(lines, dialect, list(numbers.values()))
+            bad += wrong
+        else:
+            values = np.empty((len(lines), len(numbers)))  # passed over
+        intake.add(values)
+        if words and behind > intake.start:
             cells = _labels(lines, dialect, list(words.values()))
             changes = np.flatnonzero((cells[1:] != cells[:-1]).any(axis=1)) + 1
             for row in (0, *changes.tolist()):
                 labels = dict(zip(words, map(str, cells[row]), strict=True))
                 if not marks or marks[-1][1] != labels:
-                    marks.append((rows + row, labels))
-        rows += len(lines)
-        bad += wrong
-        if stop is not None and rows >= stop:
+                    marks.append((first + row, labels))
+        if intake.is_full:
             break
-    return {name: np.frombuffer(column, np.float64) for name, column in columns.items()}, marks, bad
+    columns = {name: intake.column(at) for at, name in enumerate(numbers)}
+    return columns, [(intake.kept_row(row), labels) for row, labels in marks], bad
 
 
 def _line_blocks(path: Path, skipped: int) -> Iterator[list[str]]:

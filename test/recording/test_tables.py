@@ -218,6 +218,26 @@ def test_variables_fields_and_matrix_columns_of_matlab(tmp_path, version):
             read(path, columns=columns, sample_period=5e-3)
 
 
+@pytest.mark.parametrize("version", ["5", "7.3", "npz"])
+@pytest.mark.parametrize("timed", [True, False])
+def test_variables_of_other_software_are_understood_where_they_leave_no_doubt(tmp_path, version, timed):
+    path = tmp_path / ("r.npz" if version == "npz" else "r.mat")
+    variables = {"u_V": VOLTAGE, "pos_um": MICRONS} | ({"time": TIME} if timed else {"Fs": np.array(200.0)})
+    if version == "npz":
+        np.savez(path, **variables)
+    elif version == "5":
+        io.savemat(path, {"data": variables})
+    else:
+        with h5py.File(path, "w", userblock_size=512) as file:
+            for name, values in variables.items():
+                file[f"data/{name}"] = np.atleast_2d(values)
+    (record,) = experiment = read(path, phases="sine_1hz")
+    np.testing.assert_array_equal(record.voltage, VOLTAGE)
+    np.testing.assert_allclose(record.displacement, MICRONS * 1e-6, rtol=1e-12)
+    assert record.sample_period == pytest.approx(5e-3, rel=1e-12)
+    assert "columns" in kinds(experiment)
+
+
 def measured():
     for folder in (os.environ.get("PIEZO_DATA", ""), Path(__file__).parents[3] / "shared" / "data"):
         if folder and (path := Path(folder) / "picma-p885").is_dir():
