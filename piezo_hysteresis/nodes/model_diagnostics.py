@@ -15,6 +15,9 @@ from ..predictor import Predictor
 from .conversions import SampleBlock, diagnostic
 from .sending import send
 
+_LONGEST_REASON = 500
+"""Characters of a reason that are told again every second."""
+
 _LOG_INTERVAL = 0.1
 """Shortest time between two lines of one kind in the log [s]: no stream of faults fills a disk."""
 
@@ -46,15 +49,15 @@ class ModelDiagnostics:
 
     def problem(self, message: str) -> None:
         """Tell one line of what went wrong, now and in the next report."""
-        if message != self._problem:
+        if message[:_LONGEST_REASON] != self._problem:
             self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
-        self._problem = message
+        self._problem = message[:_LONGEST_REASON]
         self._problems += 1
 
     def refused(self, message: str) -> None:
         """Tell why a model was not taken, until another one is."""
         self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
-        self._refused = message
+        self._refused = message[:_LONGEST_REASON]
         self._problems += 1
 
     def model(self, model: Model) -> None:

@@ -127,7 +127,7 @@ class PlantParameters:
             known = {row.name for row in _GROUPS[part].table()} if part in _GROUPS else set()
             if quantity not in known:
                 expected = f"one of {', '.join(sorted(known))}" if known else f"a part of {', '.join(_GROUPS)}"
-                raise ParameterError(f"{name}: unknown quantity of the simulated stage, expected {expected}")
+                raise ParameterError(f"{name!r}: unknown quantity of the simulated stage, expected {expected}")
             changes.setdefault(part, {})[quantity] = value
         parts = {part: replace(getattr(self, part), **new) for part, new in changes.items()}
         return replace(self, sub_step=sub_step, **parts)
