@@ -95,7 +95,6 @@ def test_a_server_that_went_away_and_came_back_is_found_again(rig, streamed, ide
         r.stage.exchange(WAVE[800:1200])
     stands = r.card.voltage
     assert stands > 1.0, "the card holds its output"
-    r.card.stop()
     with Server(r.card, port=port):
         r.stage.safe()
         assert r.card.voltage == r.stage.voltage == 0.0

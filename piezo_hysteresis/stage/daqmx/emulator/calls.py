@@ -64,8 +64,10 @@ class Calls:
             self._card.underflow()
 
     def end(self) -> None:
-        """Keep nobody waiting any more."""
+        """Keep nobody waiting any more, and end the tasks: the card stops where it is."""
         self._ended.set()
+        with self._turn:
+            self._card.stop()
 
     def sleep(self, seconds: float) -> None:
         """Wait, until the server ends."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -93,8 +94,9 @@ class Card:
         self._begin, self.is_running, self._is_finite = time.monotonic(), True, is_finite
 
     def stop(self) -> None:
-        """Stop the clock; the output holds what it has."""
-        self._advance()
+        """Stop the clock, also of a run that has ended by itself; the output holds what it has."""
+        with suppress(CardError):
+            self._advance()
         self.is_running, self._buffer = False, np.empty(0)
 
     def write(self, voltage: Samples) -> None:

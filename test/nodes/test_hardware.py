@@ -1,0 +1,138 @@
+"""The driver as a process on a controller and on a card: gaps, streams, lost links, and the safe voltage."""
+
+import re
+import signal
+
+import numpy as np
+import pytest
+from rcl_interfaces.srv import GetParameters
+from rclpy.parameter import parameter_value_to_python
+
+from piezo_hysteresis.stage.fault import Faults
+from piezo_hysteresis.stage.gcs2.emulator.controller import Controller
+from piezo_hysteresis.stage.gcs2.emulator.faults import FAULTS
+from piezo_hysteresis.stage.gcs2.emulator.server import Server
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+pytestmark = pytest.mark.nodes
+
+PERIOD = 1e-4
+RAMP_RATE = 20.0
+GAIN = 20.0
+LSB = 1e-3
+"""Converters round the drive to less than this [V]."""
+
+
+class Driven:
+    """A driver process, what it tells, and the emulated device that it drives."""
+
+    def __init__(self, lab, stage, **parameters):
+        self.lab, self.told = lab, lab.diagnostics()
+        self.process = lab.driver(stage=stage, ramp_rate=RAMP_RATE, **parameters)
+        self.samples, self.statuses = lab.streaming(), lab.statuses()
+
+    def play(self, name, drive):
+        """Send a waveform, and return its samples when it is done."""
+        self.lab.send(drive, name, PERIOD)
+        ended = ("done", "refused", "stopped")
+        self.lab.wait(lambda: set(ended) & set(self.lab.states(self.statuses, name)), f"the end of {name}")
+        assert self.lab.states(self.statuses, name)[-1] == "done"
+        number = self.lab.value(self.statuses, name, "done", "phase")
+        self.lab.wait(lambda: self.samples.newest.phase[-1] > number, "the hold after it")
+        blocks = [block for block in self.samples.blocks if (block.phase == number).any()]
+        inside = np.concatenate([block.phase for block in blocks]) == number
+        voltage, index = (np.concatenate([getattr(block, k) for block in blocks])[inside] for k in ("voltage", "index"))
+        return blocks, voltage, index.astype(np.int64)
+
+    def await_failure(self, *words):
+        """Wait until the driver has given the device up and said all the words."""
+        self.lab.wait(lambda: self.lab.state() == "unconfigured", "the end of the failed stage")
+        for word in words:
+            told = re.compile(word)
+            self.lab.wait(lambda t=told: any(t.search(s.message) for a in self.told for s in a.status), f"'{word}'")
+
+    def configure_again(self):
+        count = len(self.samples.blocks)
+        assert self.lab.transition("configure")
+        assert self.lab.transition("activate")
+        self.lab.wait(lambda: len(self.samples.blocks) > count + 3, "samples again")
+
+    def in_force(self, name):
+        request = GetParameters.Request(names=[f"in_force.{name}"])
+        (value,) = self.lab.call(GetParameters, "driver_node/get_parameters", request).values
+        return parameter_value_to_python(value)
+
+    def end(self, number, moves):
+        """Signal the driver in mid-waveform, once the device moves."""
+        self.lab.send(np.concatenate((np.linspace(0, 4, 3000), np.full(100_000, 4.0))), "long", PERIOD)
+        self.lab.wait(moves, "motion")
+        self.process.signal(number)
+        assert self.process.wait() == 0, self.process.output
+
+
+def hill(top, size):
+    return 0.5 * top * (1 - np.cos(2 * np.pi * np.arange(size) / size))
+
+
+def test_a_controller_with_memory(lab):
+    faults = [FAULTS.parse("link_lost@DRR?:4")]
+    controller = Controller(SimulatedStage(seed=3, sample_period=PERIOD), recorder_points=8 * 4000, faults=faults)
+
+    def voltage_now():
+        return float(controller.carry_out("VOL? 1").lines[0].partition("=")[2]) / GAIN
+
+    with Server(controller) as server:
+        address = {"gcs2__host": server.host, "gcs2__port": server.port}
+        driven = Driven(lab, "gcs2", gcs2__amplifier_gain=GAIN, gcs2__points_per_command=500, **address)
+        assert "E-727.EMULATED" in driven.in_force("stage")
+        assert driven.in_force("voltage_max") == 10.0
+
+        drive = hill(5.0, 9000)
+        blocks, voltage, index = driven.play("hill", drive)
+        assert [block.size for block in blocks] == [4000, 4000, 1000]
+        np.testing.assert_allclose(voltage, drive, atol=LSB)
+        assert (voltage != drive).any(), "measured, not commanded"
+        assert all(block.follows_gap for block in blocks), "uploading takes time, and it is told"
+        assert (np.diff(index) > 1).sum() == 2
+
+        lab.send(hill(2.0, 500), "cut", PERIOD)
+        driven.await_failure("the link was closed from the other side", "brought to its safe voltage, 0 V")
+        assert voltage_now() == 0.0
+        driven.configure_again()
+    driven.await_failure("lost the link|closed from the other side|cannot connect", "voltage of the stage is unknown")
+    with Server(controller, port=server.port):
+        driven.configure_again()
+        driven.end(signal.SIGINT, lambda: voltage_now() > 0.5)
+        assert voltage_now() == 0.0
+        assert controller.carry_out("\x09").lines == ["0x0"], "the generator stands"
+
+
+def test_a_card_that_streams(lab):
+    pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
+    pytest.importorskip("grpc")
+    from piezo_hysteresis.stage.daqmx.emulator.card import Card
+    from piezo_hysteresis.stage.daqmx.emulator.faults import FAULTS as NI_FAULTS
+    from piezo_hysteresis.stage.daqmx.emulator.server import Server as NiServer
+
+    card = Card(SimulatedStage(seed=3, sample_period=PERIOD))
+    with NiServer(card) as server:
+        wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1"}
+        wiring |= {"nidaqmx__voltage_input": "ai1", "nidaqmx__lead": 1.0, "sample_period": PERIOD}
+        driven = Driven(lab, "nidaqmx", block_duration=0.02, **wiring)
+        assert driven.in_force("stage").endswith("Dev1/ao0")
+
+        drive = hill(5.0, 9000)
+        blocks, voltage, index = driven.play("hill", drive)
+        np.testing.assert_allclose(voltage[: index.size], drive[index - index[0]], atol=LSB)
+        assert (voltage != drive[index - index[0]]).any(), "measured, not commanded"
+        assert not any(block.follows_gap for block in blocks)
+        card.faults = Faults([NI_FAULTS.parse("device_lost@ReadAnalogF64:1")])
+        driven.await_failure("Device not available", "safe voltage, 0 V")
+        assert card.voltage == 0.0
+        driven.configure_again()
+    driven.await_failure("Failed to connect|Socket closed|no answer", "voltage of the stage is unknown")
+    with NiServer(card, port=server.port):
+        driven.configure_again()
+        driven.end(signal.SIGTERM, lambda: card.voltage > 0.5)
+        assert card.voltage == 0.0
+        assert driven.samples.steepest(PERIOD) <= max(RAMP_RATE, 4 / (2999 * PERIOD)) * 1.1
