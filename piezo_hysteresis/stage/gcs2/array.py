@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,8 +40,7 @@ class GcsArray:
         header, first = _header(lines)
         if len(lines) - first != rows:
             raise Gcs2Error(f"got {len(lines) - first} rows, expected {rows}")
-        code = header.get("SEPARATOR", "32")
-        separator = chr(int(code)) if code.isdecimal() and code not in ("9", "32") else None
+        separator = _separator(header.get("SEPARATOR", "32"))
         values = np.empty((rows, columns))
         for row, line in enumerate(lines[first:]):
             cells = line.split(separator)
@@ -55,11 +55,18 @@ class GcsArray:
 
     @property
     def sample_time(self) -> float | None:
-        """Time between rows [s]; None where the header does not tell."""
+        """Time between rows [s]; None where the header does not tell one that can be."""
         try:
-            return float(self.header["SAMPLE_TIME"])
+            told = float(self.header["SAMPLE_TIME"])
         except (KeyError, ValueError):
             return None
+        return told if 0 < told < math.inf else None
+
+
+def _separator(code: str) -> str | None:
+    """The character of a code; None for white space, and for what is no visible character."""
+    visible = code.isascii() and code.isdecimal() and len(code) <= 3 and 32 < int(code) < 127
+    return chr(int(code)) if visible else None
 
 
 def _header(lines: list[str]) -> tuple[dict[str, str], int]:

@@ -89,9 +89,12 @@ class Client:
         except NoAnswerError as error:
             raise self._unanswered("#9", error) from None
         try:
-            return int(words, 16)
+            mask = int(words, 16)
         except ValueError:
-            raise self.nonsense("#9", words, "a hexadecimal number") from None
+            mask = -1
+        if mask < 0:
+            raise self.nonsense("#9", words, "a hexadecimal number")
+        return mask
 
     def stop(self) -> None:
         """Stop all motion at once; the error that tells so is read and forgotten."""

@@ -106,7 +106,7 @@ class Server:
             return
         if "garbled" in struck and lines:
             lines[-1 - len(lines) // 4] = "".join("nan" if c.isdigit() else c for c in lines[-1 - len(lines) // 4][:9])
-        text = " \n".join(lines).encode(_CODE_PAGE) + b"\n" if lines else b""
+        text = " \n".join(lines).encode(_CODE_PAGE, errors="replace") + b"\n" if lines else b""
         if struck.keys() & {"link_lost", "gone", "partial_answer"}:
             text = text[: len(text) // 2]
         link.sendall(text)

@@ -8,6 +8,9 @@ from ...description import Samples
 from ..error_number import NO_WAVE_SELECTED, OUT_OF_RANGE, SYNTAX, WAVE_TOO_LARGE, WRONG_COUNT
 from .refusal import Refusal
 
+_LONGEST_RUN = 10_000_000
+"""Servo cycles of one run: the output is made before it is played."""
+
 
 class WaveGenerator:
     """Wave tables by number, and the settings of the one generator that plays them.
@@ -66,6 +69,6 @@ class WaveGenerator:
         points = self._points.get(self.table, [])
         if not points:
             raise Refusal(NO_WAVE_SELECTED)
-        if self.cycles < 1:
+        if self.cycles < 1 or self.cycles * self.rate * len(points) > _LONGEST_RUN:
             raise Refusal(OUT_OF_RANGE)
         return np.tile(np.repeat(np.array(points) + self.offset, self.rate), self.cycles)
