@@ -21,14 +21,13 @@ def lagrange(fraction: float) -> tuple[Array, Array]:
     >>> lagrange(0.0)[0].tolist()
     [0.0, 1.0, 0.0, 0.0]
     """
-    nodes, at = np.arange(4.0), 1.0 + fraction
-    taps, slopes = np.empty(4), np.empty(4)
-    for k in range(4):
-        others = np.delete(nodes, k)
-        scale = float(np.prod(k - others))
-        taps[k] = float(np.prod(at - others)) / scale
-        slopes[k] = sum(float(np.prod(at - np.delete(others, j))) for j in range(3)) / scale
-    return taps + 0.0, slopes
+    t0 = 1.0 + fraction
+    t1, t2, t3 = fraction, fraction - 1.0, fraction - 2.0
+    scale = np.array([-6.0, 2.0, -2.0, 6.0])
+    taps = np.array([t1 * t2 * t3, t0 * t2 * t3, t0 * t1 * t3, t0 * t1 * t2]) / scale
+    by_others = [t2 * t3 + t1 * t3 + t1 * t2, t2 * t3 + t0 * t3 + t0 * t2]
+    by_others += [t1 * t3 + t0 * t3 + t0 * t1, t1 * t2 + t0 * t2 + t0 * t1]
+    return taps + 0.0, np.array(by_others) / scale
 
 
 def padded(coefficients: Array) -> Array:

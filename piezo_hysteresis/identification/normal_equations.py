@@ -41,16 +41,17 @@ class Nuisance:
 
     def rows(self, record: Record, part: slice) -> Array:
         """Basis functions, shape (k, n)."""
-        t = record.sample_period * np.arange(part.start, part.stop)
-        rows = [np.ones(t.size)] if self.offset else []
+        size = part.stop - part.start
+        rows = [np.ones(size)] if self.offset else []
         if self.hum_frequency is not None:
+            t = record.sample_period * np.arange(part.start, part.stop)
             for order in range(1, self.harmonics + 1):
                 line = order * self.hum_frequency * record.sample_period
                 # a line that the sample period folds onto dc is averaged away, and would free the offset
                 if abs(line - round(line)) * record.size > 1.0:
                     angle = 2 * np.pi * order * self.hum_frequency * t
                     rows += [np.cos(angle), np.sin(angle)]
-        return np.array(rows).reshape(len(rows), t.size)
+        return np.array(rows).reshape(len(rows), size)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -143,6 +144,6 @@ def residuals(model: Model, records: Sequence[Record], nuisance: Nuisance | None
         residual = record.displacement - y
         rows = nuisance.rows(record, slice(0, record.size))
         if len(rows):
-            residual = residual - np.linalg.lstsq(rows.T, residual, rcond=None)[0] @ rows
+            residual = residual - np.linalg.lstsq(rows @ rows.T, rows @ residual, rcond=None)[0] @ rows
         result.append(residual)
     return result
