@@ -16,6 +16,7 @@ from ..errors import IdentificationError, PiezoError
 COMMANDS = {
     "simulate": "play a protocol to a simulated stage and record it",
     "emulate": "be a controller without hardware, behind a TCP port",
+    "calibrate": "measure the delay of a card, kept apart from that of the stage",
     "identify": "identify a model from an experiment",
     "validate": "judge a model in free run on an experiment",
     "diagnose": "say where a model is wrong and which effect is missing",

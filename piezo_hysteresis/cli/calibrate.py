@@ -1,0 +1,83 @@
+"""``piezo calibrate``: the delay of a card from output to input, wired together, as a parameter file for the driver.
+
+No stage and no amplifier may be connected: noise is put out. The delay of the card is kept apart from that of the
+stage; it is taken off what the driver records.
+"""
+
+from __future__ import annotations
+
+import argparse
+from datetime import UTC, datetime
+from pathlib import Path
+
+from ..errors import RecordingError
+from ..parameter_file import number
+from ..stage.daqmx.loop_back import loop_back_delay
+from ..stage.daqmx.setup import DaqmxSetup
+from ..stage.daqmx.stage import DaqmxStage
+from .terminal import console
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    default = DaqmxSetup("-")
+    parser = subparsers.add_parser("calibrate", description=__doc__)
+    parser.add_argument("device", help="name of the National Instruments card, as NI MAX shows it")
+    parser.add_argument(
+        "--server", metavar="HOST:PORT", default="", help="NI gRPC device server (default: this machine)"
+    )
+    parser.add_argument("--wired-output", metavar="NAME", default=default.output, help=f"default: {default.output}")
+    parser.add_argument(
+        "--wired-input",
+        metavar="NAME",
+        default=default.displacement_input,
+        help=f"default: {default.displacement_input}",
+    )
+    parser.add_argument(
+        "--sample-period",
+        metavar="S",
+        type=float,
+        default=default.sample_period,
+        help=f"default: {default.sample_period}",
+    )
+    parser.add_argument("--amplitude", metavar="V", type=float, default=1.0, help="peak of the noise (default: 1)")
+    parser.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="parameter file to write")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and write; returns 0.
+
+    Raises
+    ------
+    StageError
+        If the card is not there, or output and input are not wired together.
+    RecordingError
+        If the file cannot be written.
+    """
+    setup = DaqmxSetup(
+        args.device,
+        output=args.wired_output,
+        displacement_input=args.wired_input,
+        server=args.server,
+        sample_period=args.sample_period,
+        sensor_gain=1.0,
+    )
+    stage = DaqmxStage(setup)
+    try:
+        delay = loop_back_delay(stage, args.amplitude)
+    finally:
+        stage.close()
+    wired = f"{args.device}, {args.wired_output} to {args.wired_input}"
+    text = (
+        f"# Delay of {wired}, at {args.sample_period:g} s per sample, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC\n"
+        f"/**:\n  ros__parameters:\n    nidaqmx.io_delay: {number(max(delay, 0.0))}\n"
+    )
+    try:
+        args.output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"cannot write {args.output} ({error.strerror})") from None
+    console().print(
+        f"{wired}: {1e6 * delay:.2f} µs, {delay / args.sample_period:.2f} samples; written to {args.output}"
+    )
+    return 0

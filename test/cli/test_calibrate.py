@@ -1,0 +1,54 @@
+"""``piezo calibrate`` measures a card that is wired back to itself, and the driver reads what it wrote."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
+pytest.importorskip("grpc")
+
+from piezo_hysteresis.parameter_file import parameters
+from piezo_hysteresis.stage.daqmx.emulator.card import Card
+from piezo_hysteresis.stage.daqmx.emulator.server import Server
+from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
+from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+PERIOD = 2e-5
+WAVE = 2.0 - 2.0 * np.cos(2 * np.pi * np.arange(4000) / 2000)
+
+
+@pytest.fixture
+def address():
+    with Server(Card(SimulatedStage(seed=3), speed=float("inf"))) as server:
+        yield f"127.0.0.1:{server.port}"
+
+
+def test_the_delay_that_was_written_is_taken_off(piezo, address, tmp_path):
+    file = tmp_path / "card.yaml"
+    done = piezo("calibrate", "Dev1", "--server", address, "--wired-input", "ai2", "-o", str(file))
+    assert done.status == 0, done.err
+    assert "2.00 samples" in done.out
+    written = parameters(file.read_text())
+    delay = written["/**"]["nidaqmx.io_delay"]
+    assert delay == pytest.approx(2 * PERIOD, abs=0.05 * PERIOD)
+    wiring = {"displacement_input": "ai2", "sensor_gain": 1.0, "server": address}
+    stage = DaqmxStage(DaqmxSetup("Dev1", io_delay=delay, **wiring))
+    got = stage.exchange(np.concatenate((WAVE, np.zeros(5000))))
+    np.testing.assert_allclose(got.displacement, got.voltage, atol=2e-4)
+    stage.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--wired-input", "ai0"), "wire the output"),
+        (("--wired-input", "ai9"), "does not exist"),
+        (("-o", "/"), "write"),
+    ],
+)
+def test_what_cannot_be_measured_is_one_line(piezo, address, tmp_path, words, reason):
+    arguments = ("--wired-input", "ai2", "-o", str(tmp_path / "card.yaml"))
+    done = piezo("calibrate", "Dev1", "--server", address, *arguments, *words)
+    assert done.status == 2
+    assert done.err.count("\n") == 1
+    assert reason in done.err
