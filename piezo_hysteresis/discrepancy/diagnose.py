@@ -35,7 +35,7 @@ Progress = Callable[[str, float], None]
 
 FEWEST = 4
 """Records below which none can be held out and no name is given."""
-SEARCHED, FITTED = 6_000, 100_000
+SEARCHED, FITTED = 6_000, 50_000
 """Samples of a fast record that take part in the search, and in the last fit."""
 FALLS = 0.95
 """Share of the gap on records set aside that may remain after an effect is named."""

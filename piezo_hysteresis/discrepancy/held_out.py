@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 RIDGE = 1e-9
 """Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
+REFINEMENTS = 2
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,17 +83,23 @@ def held_out(
         inner.append(weight * columns.T @ gram.matrix @ columns)
         cross.append(weight * columns.T @ gram.matrix[:, -1])
         power.append(weight * gram.matrix[-1, -1])
-    hessian, slope = np.sum(inner, axis=0), np.sum(cross, axis=0)
+    hessians, slopes = np.array(inner), np.array(cross)
+    hessian, slope = hessians.sum(axis=0), slopes.sum(axis=0)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-    squares = []
-    for h, g, e, out in zip(inner, cross, power, spared, strict=True):
-        step = _solve(hessian - h, slope - g, scale) if out and len(inner) > 1 else _solve(hessian, slope, scale)
-        squares.append(max(0.0, e - 2.0 * step @ g + step @ h @ step))
-    return Score(np.sqrt(squares), _solve(hessian, slope, scale))
+    left = np.array(spared, dtype=float) * (len(inner) > 1)
+    steps = _solve(hessian - left[:, None, None] * hessians, slope - left[:, None] * slopes, scale)
+    changes = np.einsum("rj,rjk,rk->r", steps, hessians, steps) - 2.0 * np.sum(steps * slopes, axis=1)
+    return Score(np.sqrt(np.maximum(0.0, np.array(power) + changes)), _solve(hessian[None], slope[None], scale)[0])
 
 
-def _solve(matrix: Array, right: Array, scale: Array) -> Array:
-    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
-    known = values > RIDGE * max(values[-1], 1e-300)
-    part = vectors[:, known]
-    return np.asarray(scale * (part @ ((part.T @ (scale * right)) / values[known])))
+def _solve(matrices: Array, rights: Array, scale: Array) -> Array:
+    """Solutions (r, q) of r normal equations; what is undetermined stays at zero.
+
+    A ridge keeps them solvable, and steps of refinement take its pull out of every direction above it.
+    """
+    scaled, right = matrices * np.outer(scale, scale), (scale * rights)[..., None]
+    inverse = np.linalg.inv(scaled + RIDGE * scale.size * np.eye(scale.size))
+    found = inverse @ right
+    for _ in range(REFINEMENTS):
+        found += inverse @ (right - scaled @ found)
+    return np.asarray(scale * found[..., 0])

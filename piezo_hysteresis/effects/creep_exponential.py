@@ -65,6 +65,10 @@ class CreepExponentialBlock(AddedBlock):
         self.poles = tuple(PoleBlock("", float(t), 1, sample_period) for t in tau)
         self.gain = float(c.sum())
 
+    @property
+    def is_idle(self) -> bool:
+        return not self.c.any()
+
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, 2 * self.c.size))
 

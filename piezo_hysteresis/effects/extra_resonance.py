@@ -127,6 +127,10 @@ class ModeBlock(AddedBlock):
         self.r = r
         self.step, self.slopes = oscillator(f0, zeta, sample_period)
 
+    @property
+    def is_idle(self) -> bool:
+        return self.r == 0.0
+
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, 3))
 

@@ -141,5 +141,9 @@ class HysteresisMemoryBlock(Block):
         y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
         rows = np.empty((len(dx) + self.c.size, x.size))
         mapped, own = rows[: len(dx)], rows[len(dx) :]
-        linearise_plays(x, np.ascontiguousarray(dx), self.c, self.radii, state, tangent, y, mapped, own)
+        if not self.c.any():  # plays without weight pass nothing on
+            linearise_plays(x, dx[:0].copy(), self.c, self.radii, state, tangent[:0].copy(), y, mapped[:0], own)
+            mapped[:] = 0.0
+        else:
+            linearise_plays(x, np.ascontiguousarray(dx), self.c, self.radii, state, tangent, y, mapped, own)
         return y, rows, state, tangent

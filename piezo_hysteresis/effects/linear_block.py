@@ -75,6 +75,11 @@ class AddedBlock(LinearBlock):
 
     gain = 0.0
 
+    @property
+    def is_idle(self) -> bool:
+        """True where `filter` gives zero for every input: sensitivities from upstream pass as they are."""
+        return False
+
     def static(self, x0: float) -> float:
         return x0 + self.gain * x0
 
@@ -86,6 +91,18 @@ class AddedBlock(LinearBlock):
         return x + added, state
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        if self.is_idle:
+            return self._linearise_idle(x, dx, state, tangent)
         added, rows, state, tangent = super().linearise(x, dx, state, tangent)
         rows[: len(dx)] += dx
         return x + added, rows, state, tangent
+
+    def _linearise_idle(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        x0, z = state
+        dx0, dz, own = tangent
+        m, y, rows = len(dx), np.empty((1, x.size)), np.empty((len(dx) + len(self.names), x.size))
+        z_next = self.filter((x - x0)[None, :], z, y)
+        own = self.by_parameter(x - x0, y[0], z[0], own, rows[m:])
+        rows[:m] = dx
+        rows[m:] += (self.gain_slopes() * x0)[:, None]
+        return x, rows, (x0, z_next), (dx0, dz, own)

@@ -92,6 +92,10 @@ class RelaxationBlock(AddedBlock):
         self.hold = hold(np.pad(tau, (0, idle), mode="edge"), sample_period)
         self.gain = float(mix.sum())
 
+    @property
+    def is_idle(self) -> bool:
+        return not self.mix.any()
+
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.mix.size))
 
