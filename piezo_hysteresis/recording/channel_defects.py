@@ -15,6 +15,7 @@ _DRIVE_MOVES = 0.05
 _DRIVE_RETURNS = 0.01
 _RETURN = 0.03
 _ARC = 0.3
+_CONSTANT_SPEED = 0.75
 _SEVERE_SHARE = 0.05
 
 
@@ -106,13 +107,20 @@ def _dropouts(record: Record) -> list[Notice]:
     return [Notice("dropout", text, record.phase, severe=samples > 0.001 * record.size)]
 
 
+def _ramps(values: Samples) -> bool:
+    """Whether samples that move go on as they moved before; those of a rounded ramp stop now and then."""
+    moves = np.diff(values[:200_000])
+    goes_on = np.abs(np.diff(moves)) < 1e-6 * np.abs(moves).max(initial=0.0)
+    return bool(goes_on[moves[1:] != 0.0].mean() > _CONSTANT_SPEED)
+
+
 def _quantised(record: Record) -> list[Notice]:
     """Channels whose values lie on few levels."""
     notices = []
     for name, unit, values in (("voltage", "V", record.voltage), ("displacement", "m", record.displacement)):
         levels = np.unique(values[:200_000])
-        if levels.size < 3 or (name == "voltage" and levels.size < 16):  # a drive of steps has few levels
-            continue
+        if levels.size < 3 or (name == "voltage" and (levels.size < 16 or _ramps(values))):
+            continue  # a drive of steps has few levels, one of ramps has equal increments
         gaps = np.diff(levels)
         step = float(gaps[gaps > 1e-9 * np.ptp(values)].min(initial=np.inf))
         count = float(np.ptp(values)) / step

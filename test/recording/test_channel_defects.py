@@ -1,0 +1,24 @@
+"""Honest drives are not taken for defects of their channel."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.record import Record
+from piezo_hysteresis.recording.channel_defects import channel_defects
+
+PERIOD = 1e-4
+
+
+def kinds(drive):
+    displacement = 1.5e-6 * drive + 5e-9 * np.random.default_rng(0).normal(size=drive.size)
+    return {notice.kind for notice in channel_defects(Record(drive, displacement, PERIOD, "steps"))}
+
+
+@pytest.mark.parametrize("samples", [8, 12, 50])
+def test_ramps_of_few_samples_are_not_quantised_but_rounded_ones_are(samples):
+    edge = np.linspace(0.0, 9.0, samples, endpoint=False)
+    other = np.linspace(1.0, 6.0, samples + 5, endpoint=False)
+    trapezoids = np.tile(np.concatenate((edge, np.full(99, 9.0), edge[::-1], other, other[::-1])), 20)
+    assert "quantisation" not in kinds(trapezoids)
+    slow = np.interp(np.arange(20_000), np.arange(trapezoids.size) * (20_000 / trapezoids.size), trapezoids)
+    assert "quantisation" in kinds(np.round(slow / 0.25) * 0.25)
