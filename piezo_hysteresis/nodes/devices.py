@@ -26,15 +26,22 @@ GCS2: tuple[Row, ...] = (
     Setting("wave_table", _GCS2.wave_table, "wave table that is overwritten"),
     Setting("voltage_table", _GCS2.voltage_table, "recorder table of the piezo voltage"),
     Setting("displacement_table", _GCS2.displacement_table, "recorder table of the position"),
+    Setting("voltage_option", _GCS2.voltage_option, f"record option of the piezo voltage; {_UNVERIFIED}"),
+    Setting("displacement_option", _GCS2.displacement_option, "record option of the position"),
+    Setting("servo_time_parameter", _GCS2.servo_time_parameter, f"number of the servo time; {_UNVERIFIED}"),
+    Setting("recorder_parameter", _GCS2.recorder_parameter, f"number of the recorder's points; {_UNVERIFIED}"),
     Setting("points_per_command", _GCS2.points_per_command, f"wave points in one line; {_UNVERIFIED}"),
     Setting("rows_per_answer", _GCS2.rows_per_answer, "recorded samples asked for at once"),
     Setting("read_back", _GCS2.read_back, "compare the wave table with what was sent before anything moves"),
-    Setting("longest_wave", _GCS2.longest_wave, "points of the wave table; 0: ask the controller"),
+    Setting("longest_wave", _GCS2.longest_wave, f"points of the wave table; 0: ask the controller; {_UNVERIFIED}"),
+    Setting("longest_multiple", _GCS2.longest_multiple, f"largest sample period in servo times; {_UNVERIFIED}"),
     Parameter(
         "amplifier_gain", "G_a", "V/V", 1.0, -1e4, 1e4, "piezo voltage over drive voltage; 1: drive = piezo", "rig"
     ),
-    Parameter("command_per_volt", "c", "1/V", 1.0, -1e3, 1e3, "open-loop command over piezo voltage", _UNVERIFIED),
-    Parameter("command_at_zero", "c_0", "1", 0.0, -1e4, 1e4, "open-loop command at 0 V", _UNVERIFIED),
+    Parameter(
+        "command_per_volt", "c", "1/V", 1.0, -1e3, 1e3, f"open-loop command over piezo voltage; {_UNVERIFIED}", "rig"
+    ),
+    Parameter("command_at_zero", "c_0", "1", 0.0, -1e4, 1e4, f"open-loop command at 0 V; {_UNVERIFIED}", "rig"),
     Parameter("position_unit", "", "m", 1e-6, 1e-12, 1.0, "length of one unit of POS?", "manual of the controller"),
     Parameter("safe_voltage", "u_s", "V", 0.0, -1e4, 1e4, "drive voltage of the stage at rest", "rig"),
     Parameter("max_slew_rate", "S", "V/s", 0.0, 0.0, 1e12, "steepest drive; 0: no limit but the amplifier's", "rig"),

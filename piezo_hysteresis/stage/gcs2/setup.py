@@ -25,7 +25,7 @@ class Gcs2Setup:
     voltage_table, displacement_table : int
         Recorder tables that are used.
     voltage_option, displacement_option : int
-        Record options of piezo voltage and actual position.
+        Record options of piezo voltage [U] and actual position.
     amplifier_gain : float
         Piezo voltage over drive voltage [V/V]; 1 where the drive is the piezo voltage itself.
     command_per_volt, command_at_zero : float
