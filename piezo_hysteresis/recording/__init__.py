@@ -32,7 +32,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import RecordingError
-from ..record import Experiment
+from ..record import Experiment, Notice
 from .bag import Bag
 from .bag_writer import BagWriter
 from .csv import Csv
@@ -42,6 +42,7 @@ from .gcs_array import GcsArray
 from .layout import Column, Layout
 from .mat import Mat
 from .npz import Npz
+from .onset import is_within_its_loop
 from .quality import inspect
 from .rosbag2 import Rosbag2, recorded_model
 
@@ -116,6 +117,9 @@ def read(
         records = tuple(
             r if r.continues or r.truncated else replace(r, initial_voltage=initial_voltage) for r in records
         )
+    midway = {i for i, r in enumerate(records) if is_within_its_loop(r)}
+    within = [Notice("truncated", _WITHIN, records[i].phase) for i in sorted(midway)]
+    records = tuple(replace(r, truncated=True) if i in midway else r for i, r in enumerate(records))
     if decimate is None:
         decimate = load_decimation(place)
     elif unknown := set(decimate) - {name for r in records for name in (r.phase, r.phase.split("_")[0])}:
@@ -124,7 +128,7 @@ def read(
     if decimate:
         records = tuple(r.decimate(decimate.get(r.phase, decimate.get(r.phase.split("_")[0], 1))) for r in records)
     experiment = replace(experiment, records=records)
-    return replace(experiment, notices=(*experiment.notices, *inspect(experiment)))
+    return replace(experiment, notices=(*experiment.notices, *within, *inspect(experiment)))
 
 
 def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str | None = None) -> None:
@@ -151,6 +155,7 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     chosen.write(experiment, place)
 
 
+_WITHIN = "begins on a branch of its loop: what came before is not recorded; a settled stage needs initial_voltage"
 _BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
 
 

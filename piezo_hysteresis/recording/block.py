@@ -55,6 +55,9 @@ class Block:
         Time of every sample from the stamp [s].
     index : (n,) ndarray of uint32, optional
         Running number of every sample, modulo 2³².
+    follows_pause : bool
+        True where the samples before it were never measured, while the voltage was held: a device that reads out its
+        memory.
     """
 
     stamp_ns: int
@@ -62,6 +65,7 @@ class Block:
     phase: NDArray[np.uint32]
     time: Samples | None = None
     index: NDArray[np.uint32] | None = None
+    follows_pause: bool = False
 
     @classmethod
     def from_cdr(cls, raw: bytes) -> Block:
@@ -101,6 +105,7 @@ class Block:
             columns["phase"] if "phase" in columns else np.zeros(rows, np.uint32),
             columns.get("time"),
             columns.get("index"),
+            not message.is_dense,
         )
 
     def to_cdr(self, frame_id: str = "") -> bytes:
@@ -121,6 +126,6 @@ class Block:
         data = np.frombuffer(samples.tobytes(), np.uint8)
         cloud = kinds[TYPE](
             kinds["std_msgs/msg/Header"](stamp, frame_id),
-            1, samples.size, fields, False, FIELDS.itemsize, data.size, data, True,
+            1, samples.size, fields, False, FIELDS.itemsize, data.size, data, not self.follows_pause,
         )  # fmt: skip
         return bytes(typestore().serialize_cdr(cloud, TYPE))

@@ -36,6 +36,7 @@ def finite_records(
     channels: Mapping[str, Samples],
     sample_period: float,
     breaks: Mapping[int, int] | None = None,
+    pauses: Mapping[int, int] | None = None,
     **labels: Any,
 ) -> tuple[list[Record], list[Notice]]:
     """One phase as records without its non-finite and missing samples.
@@ -49,13 +50,16 @@ def finite_records(
         Time between samples [s].
     breaks : mapping of int to int, optional
         Sample before which others are missing, to their number.
+    pauses : mapping of int to int, optional
+        Sample before which others were never measured while the voltage was held, to their number.
     **labels
         The other fields of `Record`.
 
     Returns
     -------
     records : list of Record
-        A record behind a hole `continues` and is `truncated`: its state can be carried, but not exactly.
+        A record behind a hole `continues` and is `truncated`: its state can be carried, but not exactly. Behind a pause
+        it is not `truncated`.
     notices : list of Notice
         What was dropped.
 
@@ -78,11 +82,14 @@ def finite_records(
     if not PERIODS[0] <= sample_period <= PERIODS[1]:
         raise RecordError(f"sample_period: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
     good = (np.abs(voltage) < LARGEST) & (np.abs(displacement) < LARGEST)
-    edges = sorted(breaks or {})
+    gaps = {**(breaks or {}), **(pauses or {})}
+    edges = sorted(gaps.keys() - {0})
     pieces = [(a + i, a + j) for a, b in _between(edges, good.size) for i, j in stretches(good[a:b])]
     if not pieces:
         raise RecordError(f"phase '{phase}': got no finite sample among {good.size}")
     shortest = min(SHORTEST_SHARE * good.size, max(b - a for a, b in pieces))
+    known = {a for (_, before), (a, _) in zip(pieces, pieces[1:], strict=False) if before == a and a in (pauses or {})}
+    known -= {b for a, b in pieces if b - a < shortest}
     pieces = [(a, b) for a, b in pieces if b - a >= shortest]
     dropped = good.size - sum(b - a for a, b in pieces)
     if bad := int(np.count_nonzero(~good)):
@@ -94,13 +101,13 @@ def finite_records(
     if len(pieces) > 1:
         notices.append(Notice("split", f"the phase is split at its holes into {len(pieces)} records", phase))
     begin = float(labels.pop("start_time", 0.0))
-    missing = np.cumsum([0, *((breaks or {})[e] for e in edges)])
+    missing = np.cumsum([0, *(gaps[e] for e in edges)])
     records: list[Record] = []
     for a, b in pieces:
         if a > 0:
             labels |= {
                 "continues": bool(records or labels.get("continues")),
-                "truncated": True,
+                "truncated": a not in known,
                 "initial_voltage": None,
             }
         start = begin + (a + int(missing[np.searchsorted(edges, a, "right")])) * sample_period

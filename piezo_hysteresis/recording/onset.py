@@ -5,9 +5,42 @@ from __future__ import annotations
 import numpy as np
 
 from ..record import Notice, Record
+from .waveform import turning_points
 
 _OPENING = 0.1
+_EXCERPT = 1 << 20
+_SWING = 0.02
+_INSIDE = 0.1
+_SAME = 0.02
+_ON_BRANCH = 0.2
 _NOISE = 8.0
+
+
+def is_within_its_loop(record: Record) -> bool:
+    """True where a periodic record begins in motion, its displacement already where it is a period later.
+
+    A stage that had settled at the first voltage begins between the branches of its loop; one that was cycling before
+    begins on a branch. Where both are the same, at the end of a swing, the stage is taken to have settled.
+    """
+    if record.continues or record.truncated or record.initial_voltage is not None or record.size < 64:
+        return False
+    u, y = record.voltage[:_EXCERPT], record.displacement[:_EXCERPT]
+    span = float(np.ptp(u))
+    turns = turning_points(u, _SWING * span) if span > 0.0 else np.empty(0, np.int64)
+    if turns.size < 5:
+        return False
+    first, second, third = (int(t) for t in turns[1:4])
+    period, opening = third - first, max(2, first // 20)
+    inside = min(abs(u[0] - u[first]), abs(u[0] - u[second])) > _INSIDE * span
+    if first < 8 or first > period or not inside or abs(u[opening] - u[0]) < 0.02 * abs(u[first] - u[0]):
+        return False
+    if np.abs(u[:first] - u[period : period + first]).max() > _SAME * span:
+        return False
+    back = first + int(np.argmin(np.abs(u[first:second] - u[0])))
+    width = abs(float(y[back] - y[period]))
+    noise = float(np.median(np.abs(np.diff(y, 3)))) / 3.0
+    off = abs(float(np.mean(y[:opening] - y[period : period + opening])))
+    return bool(width > 10.0 * noise and off < _ON_BRANCH * width)
 
 
 def onset(record: Record) -> list[Notice]:

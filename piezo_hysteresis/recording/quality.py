@@ -8,6 +8,7 @@ import numpy as np
 
 from ..record import Experiment, Notice, Record, Samples
 from .channel_defects import channel_defects
+from .lag import lag_notice
 from .onset import onset
 from .waveform import phase_name
 
@@ -15,6 +16,11 @@ DISPLACEMENT_RANGE = (1e-9, 2e-3)
 """Range of displacement that a piezo stage can have [m]."""
 VOLTAGE_RANGE = (1e-3, 1.2e3)
 """Largest drive voltage that a piezo stage can have [V]."""
+
+GAIN_RANGE = (1e-10, 3e-4)
+"""Range of displacement per volt that a piezo stage can have, with or without an amplifier [m/V]."""
+FAINT = (4e-8, 1e-12)
+"""A smaller displacement per volt [m/V], read by a sensor of less noise [m], is rather one in another unit."""
 
 _SCALE_MISMATCH = 100.0
 _FREQUENCY_MISMATCH = 0.1
@@ -29,7 +35,7 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
     -------
     tuple of Notice
         Kinds: ``units``, ``scale``, ``constant``, ``sample_period``, ``time_base``, ``clipped``, ``stuck``,
-        ``dropout``, ``quantisation``, ``leads``, ``polarity``, ``not_at_rest``. What is found in reading (``gap``,
+        ``dropout``, ``quantisation``, ``leads``, ``late``, ``polarity``, ``not_at_rest``. What reading finds (``gap``,
         ``duplicate``, …) stands in `Experiment.notices`.
     """
     spans = np.array([[np.ptp(r.voltage), np.ptp(r.displacement)] for r in experiment])
@@ -39,7 +45,9 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
     for record in moving:
         notices += _named_frequency(record)
         notices += channel_defects(record)
-    notices += _polarity_and_lead(moving)
+    late = [notice for record in moving for notice in lag_notice(record)]
+    notices += late
+    notices += [n for n in _polarity_and_lead(moving) if n.kind not in {told.kind for told in late}]
     for record in experiment:
         notices += onset(record)
     return tuple(notices)
@@ -59,7 +67,19 @@ def _units(experiment: Experiment, spans: Samples) -> list[Notice]:
     elif not DISPLACEMENT_RANGE[0] <= y_span <= DISPLACEMENT_RANGE[1]:
         text = f"range of displacement {y_span:.3g} m, expected 1 nm to 2 mm{_likely(y_span, DISPLACEMENT_RANGE)}"
         notices.append(Notice("units", text, severe=True))
-    return notices
+    return notices or _gain(experiment, y_span / u_span)
+
+
+def _gain(experiment: Experiment, gain: float) -> list[Notice]:
+    """A displacement per volt that both channels alone would not betray."""
+    if not GAIN_RANGE[0] <= gain <= GAIN_RANGE[1]:
+        text = f"displacement per volt {gain:.2g} m/V, expected 0.1 nm/V to 300 µm/V{_likely(gain, GAIN_RANGE)}"
+        return [Notice("units", text)]
+    noise = min(float(np.median(np.abs(np.diff(r.displacement, 3)))) / 3.0 if r.size > 8 else 0.0 for r in experiment)
+    if gain < FAINT[0] and 0.0 < noise < FAINT[1]:
+        text = f"displacement per volt {gain:.2g} m/V with a noise of {noise:.1g} m: a unit may be off by 1e+3"
+        return [Notice("units", text)]
+    return []
 
 
 def _likely(value: float, bounds: tuple[float, float]) -> str:

@@ -173,6 +173,9 @@ def _records(stretches: list[Stretch], names: PhaseNames, layout: Layout) -> tup
             places = len(stretch.breaks) + (stretch.lost > 0)
             severe = not left_out and missing > _SEVERE_SHARE * (stretch.size + missing)
             notices.append(Notice("gap", f"{lost} in {places} places", name, severe))
+        if paused := sum(n for at, n in stretch.pauses.items() if at):
+            held = f"{paused} samples ({paused * stretch.sample_period:.3g} s) were not measured"
+            notices.append(Notice("pause", f"{held} while the device held its voltage and was read out", name))
         if left_out and moves:
             text = f"the drive moved by {_travel(stretch):.3g} V before the first phase: taken as settled after it"
             notices.append(Notice("moved", text, name))
@@ -184,6 +187,7 @@ def _records(stretches: list[Stretch], names: PhaseNames, layout: Layout) -> tup
                 stretch.channels,
                 stretch.sample_period,
                 stretch.breaks,
+                stretch.pauses,
                 phase=name,
                 start_time=stretch.start_time,
                 continues=kept,

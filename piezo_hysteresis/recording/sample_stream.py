@@ -58,6 +58,7 @@ class SampleStream:
         self._times_ns: list[int] = []
         self._periods: list[float] = []
         self._received_ns: list[int] = []
+        self._after_pause: set[int] = set()
         self._uneven = 0
 
     @property
@@ -83,6 +84,8 @@ class SampleStream:
             period = float(time[-1] - time[0]) / (n - 1)
             self._uneven += bool(np.abs(np.diff(time) - period).max() > UNEVEN * abs(period))
         offset = float(time[0]) if time is not None and abs(time[0]) < LONGEST_SILENCE else 0.0
+        if block.follows_pause:
+            self._after_pause.add(begin)
         self._starts.append(begin)
         self._times_ns.append(block.stamp_ns + round(offset * 1e9))
         self._periods.append(period if period > 0 else np.nan)
@@ -177,6 +180,7 @@ class SampleStream:
             notices.append(Notice("non_monotonic", f"{late} pieces came out of order: sorted by their index"))
         starts = [start for start, _, _ in pieces]
         lost = [0] + [start - _end(earlier) for start, earlier in zip(starts[1:], pieces, strict=False)]
+        pausing = self._after_pause if self._tells_pauses(pieces) else set()
         offsets = [0, *accumulate(b - a for _, a, b in pieces)]
         channels = {
             name: _gathered(np.frombuffer(column, np.float64), pieces) for name, column in self._channels.items()
@@ -187,16 +191,26 @@ class SampleStream:
             piece = bisect_right(offsets, i) - 1
             inside = range(piece + 1, bisect_left(offsets, j))
             within = i - offsets[piece]
+            gaps = {offsets[p] - i: p for p in inside if lost[p]} | ({} if within or not lost[piece] else {0: piece})
+            pauses = {at: lost[p] for at, p in gaps.items() if pieces[p][1] in pausing}
+            breaks = {at: lost[p] for at, p in gaps.items() if at not in pauses}
             yield Stretch(
                 {name: values[i:j] for name, values in channels.items()},
                 run.period,
                 int(phase[i]),
                 begin + (starts[piece] + within - starts[0]) * run.period,
                 self._received_ns[self._block_of(pieces[piece][1] + within)],
-                0 if within else lost[piece],
-                {offsets[p] - i: lost[p] for p in inside if lost[p]},
+                breaks.pop(0, 0),
+                breaks,
+                pauses,
                 run.first and i == 0,
             )
+
+    def _tells_pauses(self, pieces: list[tuple[int, int, int]]) -> bool:
+        """False where blocks are said to follow a pause though nothing is missing: that mark means something else."""
+        begin, end = pieces[0][1], max(b for _, _, b in pieces)
+        told = {start for start in self._after_pause if begin < start < end}
+        return told <= {a for _, a, _ in pieces}
 
 
 def _signed(step: int) -> int:

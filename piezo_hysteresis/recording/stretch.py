@@ -23,6 +23,8 @@ class Stretch:
     """Samples missing just before it."""
     breaks: dict[int, int]
     """Sample before which others are missing, to their number."""
+    pauses: dict[int, int]
+    """Sample before which others were never measured while the voltage was held, to their number."""
     first: bool
     """True for the first stretch since a start of the driver, or of the recording."""
 

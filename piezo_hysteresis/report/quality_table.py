@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..record import Experiment
+from ..record import Experiment, Record
+from ..recording.lag import lag_of
 from .table import Table
 from .words import duration
+
+_NOTE = "Lag: of the displacement at the turning points of the drive (in samples); dynamics, or a late channel."
 
 
 def record_table(experiment: Experiment, noise: np.ndarray) -> Table:
@@ -31,11 +34,19 @@ def record_table(experiment: Experiment, noise: np.ndarray) -> Table:
                 f"{record.voltage.min():.3g} … {record.voltage.max():.3g}",
                 f"{1e6 * record.displacement.min():.4g} … {1e6 * record.displacement.max():.4g}",
                 f"{1e9 * sigma:.2g}",
+                _lag(record),
                 "truncated" if record.truncated else start,
             )
         )
-    header = ("phase", "samples", "period", "length", "drive [V]", "displacement [µm]", "noise [nm]", "start")
-    return Table("What was recorded", header, tuple(rows), "", frozenset(range(1, 7)))
+    header = ("phase", "samples", "period", "length", "drive [V]", "displacement [µm]", "noise [nm]", "lag", "start")
+    return Table("What was recorded", header, tuple(rows), _NOTE, frozenset(range(1, 8)))
+
+
+def _lag(record: Record) -> str:
+    lag = lag_of(record)
+    if lag is None:
+        return ""
+    return f"{'-' if lag.time < 0 else ''}{duration(abs(lag.time))} ({lag.time / record.sample_period:.2g})"
 
 
 def notice_table(experiment: Experiment) -> Table | None:

@@ -5,7 +5,8 @@ import pytest
 from scipy.signal import lfilter
 
 from piezo_hysteresis.record import Experiment, Record
-from piezo_hysteresis.recording import inspect
+from piezo_hysteresis.recording import inspect, read, write
+from piezo_hysteresis.recording.lag import lag_of
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
 PERIOD = 1e-4
@@ -219,3 +220,41 @@ def test_a_start_that_is_not_settled_contradicts_rest():
     assert "not_at_rest" in kinds(late)
     assert "not_at_rest" not in kinds(Record(late.voltage, late.displacement, PERIOD, "x", initial_voltage=0.0))
     assert "not_at_rest" not in kinds(Record(late.voltage, late.displacement, PERIOD, "x", truncated=True))
+
+
+@pytest.mark.parametrize("kind", ["sine", "triangle"])
+@pytest.mark.parametrize("shift", [0, 40, 120])
+def test_a_late_channel_is_found_by_where_the_displacement_turns(kind, shift):
+    drive = sine(5.0) if kind == "sine" else 7.0 * np.abs(np.mod(5.0 * PERIOD * np.arange(10_000) + 0.5, 1.0) * 2 - 1)
+    y = stage(drive, lag=1e-9)
+    record = Record(drive[shift:], y[: y.size - shift], PERIOD, f"{kind}_5hz")
+    lag = lag_of(record)
+    assert lag.time == pytest.approx((shift + 1) * PERIOD, abs=0.005 * lag.swing)
+    assert ("late" in kinds(record)) == (shift * PERIOD > 3e-3)
+
+
+def test_the_lag_of_a_stage_is_no_late_channel():
+    for frequency in (1.0, 5.0, 50.0):
+        drive = sine(frequency, 4 / frequency)
+        assert not {"late", "leads"} & kinds(Record(drive, stage(drive), PERIOD, f"sine_{frequency:g}hz"))
+
+
+def test_a_displacement_per_volt_that_no_stage_has_is_told():
+    drive = sine()
+    y = stage(drive, noise=5e-10)
+    assert "units" in kinds(Record(drive * 1e-3, y, PERIOD, "x")), "kilovolts taken for volts"
+    assert "units" in kinds(Record(drive, y * 1e-3, PERIOD, "x")), "nanometres written as micrometres"
+
+
+@pytest.mark.parametrize("start", [200, 900, 1150])
+def test_a_record_that_begins_on_a_branch_of_its_loop_does_not_claim_rest(tmp_path, start):
+    drive = sine()
+    y = stage(drive)
+    (settled, within) = (Record(drive[a:], y[a:], PERIOD, "sine_5hz") for a in (0, 2000 + start))
+    for name, record in (("settled", settled), ("within", within)):
+        write(Experiment((record,)), tmp_path / name)
+    assert not read(tmp_path / "settled")[0].truncated
+    experiment = read(tmp_path / "within")
+    assert experiment[0].truncated
+    assert any(n.kind == "truncated" for n in experiment.notices)
+    assert not read(tmp_path / "within", initial_voltage=3.5)[0].truncated
