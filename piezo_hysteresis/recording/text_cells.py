@@ -20,6 +20,8 @@ BLOCK_BYTES = 1 << 20
 
 
 _COMMENT = ("#", "%")
+_NO_ROW = (b"#", b"%", b"\n\n", b"\n\r", b"\r\r", b"\n ", b"\n\t", b"\f", b"\v")
+"""Bytes without which every line is a row: looking at each line takes longer than reading its numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +169,9 @@ def _line_blocks(path: Path, skipped: int) -> Iterator[list[str]]:
             lines = decoded(whole + newline).splitlines()
             used = min(skipped, len(lines))
             skipped -= used
-            rows = [line for line in lines[used:] if line.strip() and not line.lstrip().startswith(_COMMENT)]
+            rows = lines[used:]
+            if not rows or not rows[-1].strip() or any(mark in whole for mark in _NO_ROW):
+                rows = [line for line in rows if line.strip() and not line.lstrip().startswith(_COMMENT)]
             if rows:
                 yield rows
 
