@@ -1,5 +1,7 @@
 """Bags: what the driver sends comes back sample by sample; what is missing, cut or doubled is told."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -157,6 +159,34 @@ def test_a_lost_block_splits_the_phase_also_where_the_index_wraps(tmp_path, inde
     np.testing.assert_array_equal(experiment[1].voltage, np.concatenate([b.channels["voltage"] for b in last]))
     assert experiment[1].start_time == pytest.approx(3 * SIZE * PERIOD)
     assert any(n.kind == "gap" and str(SIZE) in n.message for n in experiment.notices)
+
+
+@pytest.mark.parametrize("always", [False, True])
+def test_a_pause_of_a_device_that_reads_its_memory_is_no_loss(tmp_path, always):
+    """Unless every block claims to follow one, as clouds of other software may."""
+    with BagWriter(tmp_path / "bag") as bag:
+        driver = Driver(bag)
+
+        def played(after_pause):
+            if after_pause:
+                driver.advance(driver.block())
+            for k in range(2):
+                block = replace(driver.block(), follows_pause=always or (after_pause and k == 0))
+                driver.send(block)
+                driver.advance(block)
+
+        driver.phase(0, "idle")
+        played(False)
+        driver.phase(1, "noise")
+        played(True)
+        played(True)
+    experiment = read(tmp_path / "bag")
+    assert [(r.phase, r.size) for r in experiment] == 2 * [("noise", 2 * SIZE)]
+    assert [r.truncated for r in experiment] == [always, always]
+    assert [r.continues for r in experiment] == [False, True]
+    assert experiment[1].start_time == pytest.approx(3 * SIZE * PERIOD)
+    assert kinds(experiment) & {"gap", "pause"} == ({"gap"} if always else {"pause"})
+    assert any(n.severe for n in experiment.notices) is always
 
 
 def test_repeated_and_reordered_blocks_are_put_right_and_told(tmp_path):
