@@ -2,17 +2,22 @@
 
 import re
 import signal
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import parameter_value_to_python
 
+from piezo_hysteresis.model_file import load
 from piezo_hysteresis.stage.fault import Faults
 from piezo_hysteresis.stage.gcs2.emulator.controller import Controller
 from piezo_hysteresis.stage.gcs2.emulator.faults import FAULTS
 from piezo_hysteresis.stage.gcs2.emulator.server import Server
+from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
+
+from .test_identification_node import Identification
 
 pytestmark = pytest.mark.nodes
 
@@ -136,3 +141,40 @@ def test_a_card_that_streams(lab):
         driven.end(signal.SIGTERM, lambda: card.voltage > 0.5)
         assert card.voltage == 0.0
         assert driven.samples.steepest(PERIOD) <= max(RAMP_RATE, 4 / (2999 * PERIOD)) * 1.1
+
+
+@contextmanager
+def emulated_controller():
+    controller = Controller(SimulatedStage(seed=3, sample_period=PERIOD))
+    with Server(controller) as server:
+        address = {"gcs2__host": server.host, "gcs2__port": server.port}
+        yield {"stage": "gcs2", "gcs2__amplifier_gain": GAIN, "gcs2__points_per_command": 500, **address}
+
+
+@contextmanager
+def emulated_card():
+    pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
+    from piezo_hysteresis.stage.daqmx.emulator.card import Card
+    from piezo_hysteresis.stage.daqmx.emulator.server import Server as NiServer
+
+    with NiServer(Card(SimulatedStage(seed=3, sample_period=PERIOD))) as server:
+        wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1", "nidaqmx__lead": 1.0}
+        yield {"stage": "nidaqmx", "nidaqmx__voltage_input": "ai1", "sample_period": PERIOD, **wiring}
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("emulated", [emulated_controller, emulated_card], ids=["gcs2", "nidaqmx"])
+def test_from_an_unknown_stage_to_its_model_and_its_gap_through_the_nodes(lab, emulated):
+    with emulated() as parameters:
+        lab.driver(**parameters)
+        identification = Identification(lab)
+        path = identification.begin()
+        told = identification.await_state("done", "failed", timeout=600.0)
+        assert "% of range" in told.message, told.message
+        model = load(path / "identification.yaml")
+        plant = PlantParameters()
+        assert float(model.provenance["free_run_error"]) < 1.5 * plant.sensor.noise * plant.full_stroke
+        assert identification.ask("diagnose").success
+        identification.await_state("fitting")
+        told = identification.await_state("done", "failed", timeout=600.0)
+        assert told.message.startswith("nothing_missing: "), told.message
