@@ -21,8 +21,8 @@ ADEQUATE = 1.5
 """Mean R² up to which nothing is missing beyond noise."""
 LEAST_GAIN = 0.15
 """Least gain in mean ln max(1, R²) for which an effect is accepted."""
-KEEPS = (0.8, 0.6)
-"""Share of V that may remain after the first accepted effect, and after further ones."""
+KEEPS = (0.8, 0.5)
+"""Share of V beyond noise that may remain after the first accepted effect, and after further ones."""
 NAMED = 0.6
 """Explained fraction of the gap from which a family is named."""
 REFITS = 6
@@ -164,7 +164,7 @@ def select(
     """
     baseline, steps, accepted = model, list[Step](), 0
     while score.excess > ADEQUATE and len(steps) < MOST_TURNS and accepted < MOST:
-        step = _turn(model, evidence, score, effects, KEEPS[min(accepted, 1)], progress)
+        step = _turn(model, evidence, score, null, effects, KEEPS[min(accepted, 1)], progress)
         if step is None:
             break
         steps.append(step)
@@ -202,6 +202,7 @@ def _turn(
     model: Model,
     evidence: Evidence,
     before: Score,
+    null: float,
     effects: Collection[type[Effect]],
     keeps: float,
     progress: Progress | None,
@@ -220,12 +221,13 @@ def _turn(
     best = _finest(_simplest(refits), before)
     rivals, rejected = [], []
     gain = before.cost - best.score.cost
-    accepted = gain >= LEAST_GAIN and best.score.excess <= keeps * before.excess
+    left = _left(best.score, before, null)
+    accepted = gain >= LEAST_GAIN and left <= keeps
     renewed = None
     alone = without(best, LATER) if accepted else None
     if alone is not None:
         owed = alone.score.cost - best.score.cost
-        accepted = owed >= LEAST_GAIN and best.score.excess <= keeps * alone.score.excess
+        accepted = owed >= LEAST_GAIN and _left(best.score, alone.score, null) <= keeps
         if not accepted:
             rejected.append(Rejection(best.name, f"gains {owed:.2f} over the model fitted anew without it"))
             renewed = alone if before.cost - alone.score.cost > 0.5 * LEAST_GAIN else None
@@ -246,11 +248,15 @@ def _turn(
         for c in screened
         if c.name not in {r.name for r in likely}
     ]
-    if gain < LEAST_GAIN or best.score.excess > keeps * before.excess:
-        left = best.score.excess / before.excess
-        reason = f"closest, but a held-out gain of {gain:.2f} and {left:.2f} of V left do not suffice"
+    if gain < LEAST_GAIN or left > keeps:
+        reason = f"closest, but a held-out gain of {gain:.2f} and {left:.2f} of V beyond noise left do not suffice"
         rejected.insert(0, Rejection(best.name, reason))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
+
+
+def _left(after: Score, before: Score, null: float) -> float:
+    """Share of V beyond noise that is left."""
+    return max(0.0, after.excess - null) / max(before.excess - null, 1e-12)
 
 
 def _may_be_off(candidate: Candidate) -> bool:

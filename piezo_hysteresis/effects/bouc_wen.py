@@ -68,7 +68,7 @@ class BoucWen(Effect):
         check_bounded(self)
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
-        return BoucWenBlock(self, setting.sample_period, terms)
+        return BoucWenBlock(self, setting, terms)
 
 
 class BoucWenBlock(Block):
@@ -76,8 +76,8 @@ class BoucWenBlock(Block):
 
     keeps_state = True
 
-    def __init__(self, effect: Effect, sample_period: float, terms: tuple[Effect, ...] = ()) -> None:
-        self.sample_period = sample_period
+    def __init__(self, effect: Effect, setting: Setting, terms: tuple[Effect, ...] = ()) -> None:
+        self.sample_period, self.jump_period = setting.sample_period, setting.model_period
         self.p1, self.p2 = effect["p1"], effect["p2"]
         self.loop = LOOP_OFF.copy()
         self.start = 0.0
@@ -108,7 +108,7 @@ class BoucWenBlock(Block):
         if self.is_plain:
             run_plain(x, self.loop, self.p1, self.p2, state, w)
         else:
-            run_general(x, self.loop, self.p1, self.p2, self.sample_period, state, w)
+            run_general(x, self.loop, self.p1, self.p2, self.sample_period, self.jump_period, state, w)
         return w, state
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
@@ -119,6 +119,18 @@ class BoucWenBlock(Block):
         slopes, last = tangent[0].copy(), tangent[1].copy()
         rows = np.empty((len(slopes) + 2, x.size))
         linearise_general(
-            x, dx, self.loop, self.p1, self.p2, self.own, self.sample_period, state, slopes, last, w, rows
+            x,
+            dx,
+            self.loop,
+            self.p1,
+            self.p2,
+            self.own,
+            self.sample_period,
+            self.jump_period,
+            state,
+            slopes,
+            last,
+            w,
+            rows,
         )
         return w, rows, state, (slopes, last)

@@ -20,6 +20,8 @@ LOOP = ("A", "beta", "gamma", "phi1", "phi2", "n", "k", "a")
 A, BETA, GAMMA, PHI1, PHI2, EXPONENT, RATE, RATE_EXPONENT = range(8)
 H_REFERENCE = 0.2
 SUB_STEP = 0.01
+JUMP = 0.05
+"""Change of v in one sample beyond which a slow record holds a jump: how fast, the model's own period tells."""
 SLOWEST = 1e-4
 """Rates below this (normalised units per second) count as this, so that the rate law stays finite."""
 
@@ -84,8 +86,8 @@ def run_plain(v, p, p1, p2, state, w):
 
 
 @kernel
-def run_general(v, p, p1, p2, sample_period, state, w):
-    """The loop with all its terms; arguments as `run_plain`."""
+def run_general(v, p, p1, p2, sample_period, jump_period, state, w):
+    """The loop with all its terms; arguments as `run_plain`. A jump takes `jump_period`, all else `sample_period`."""
     n, k = p[EXPONENT], p[RATE]
     h, last = state[0], state[1]
     for i in range(v.size):
@@ -96,7 +98,8 @@ def run_general(v, p, p1, p2, sample_period, state, w):
             s = copysign(1.0, dv)
             drive = s * p[A]
             if k != 0.0:
-                drive = drive * (1.0 + k * rate_factor(abs(dv) / sample_period, p[RATE_EXPONENT]))
+                period = jump_period if abs(dv) > JUMP else sample_period
+                drive = drive * (1.0 + k * rate_factor(abs(dv) / period, p[RATE_EXPONENT]))
             steps = 1
             if n != 1.0:
                 steps = max(1, int(ceil(abs(dv) / SUB_STEP)))

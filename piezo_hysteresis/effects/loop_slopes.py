@@ -12,6 +12,7 @@ from .loop import (
     EXPONENT,
     GAMMA,
     H_REFERENCE,
+    JUMP,
     LOOP,
     PHI1,
     PHI2,
@@ -81,7 +82,7 @@ def slope_at(h, p, s):
 
 
 @kernel
-def linearise_general(v, dv_in, p, p1, p2, own, sample_period, state, tangent, last_in, w, dw):
+def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, state, tangent, last_in, w, dw):
     """`run_general` with sensitivities.
 
     dv_in (m, n) are incoming rows; own (q,) the indices into `LOOP` of the own rows, or `START`; tangent (m + q,) holds
@@ -109,8 +110,9 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, state, tangent, l
             drive = s * p[A]
             drive_by[A] = s
             drive_by_speed = 0.0
+            period = jump_period if abs(dv) > JUMP else sample_period
             if rated:
-                speed = abs(dv) / sample_period
+                speed = abs(dv) / period
                 factor = rate_factor(speed, p[RATE_EXPONENT])
                 drive_by[RATE] = drive * factor
                 if k != 0.0:
@@ -154,12 +156,12 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, state, tangent, l
                 h_next = advance_slopes(
                     h, drive, length, power * loss - bend - gm, power * loss_flipped - bend + gm, full
                 )
-                by_v = s * (full[1] * drive_by_speed / sample_period + full[2] / steps)
+                by_v = s * (full[1] * drive_by_speed / period + full[2] / steps)
                 for j in range(m):
                     fresh = by_v * (dv_in[j, i] - last_in[j])
                     if n != 1.0:
                         move = s * (dv_in[j, i] - last_in[j])
-                        middle_by = half[0] * tangent[j] + half[1] * drive_by_speed * move / sample_period
+                        middle_by = half[0] * tangent[j] + half[1] * drive_by_speed * move / period
                         middle_by += 0.5 * half[2] * move / steps
                         middle_by += (half[3] * loss + half[4] * loss_flipped) * first_by_h * tangent[j]
                         fresh += (full[3] * loss + full[4] * loss_flipped) * power_by_h * middle_by

@@ -22,7 +22,8 @@ class RateDependentHysteresis(Term):
     Notes
     -----
     v̇ = Δv/Ts is the speed of the drive between two samples and v0 = 1 normalised unit per second. Speeds below
-    1e-4 per second count as that, so that the law stays finite at rest.
+    1e-4 per second count as that, so that the law stays finite at rest. A change of v by more than 0.05 in one sample
+    of a slow record is a jump, and takes the model's own sample period.
     """
 
     name = "rate_dependent_hysteresis"

@@ -127,7 +127,7 @@ def test_the_general_kernel_with_everything_off_is_the_plain_one_bit_for_bit(
     samples, plain, general = np.array(v), np.empty(len(v)), np.empty(len(v))
     start = np.array([0.01, v[0]])
     run_plain(samples, loop, -0.1, 2.0, start.copy(), plain)
-    run_general(samples, loop, -0.1, 2.0, PERIOD, start.copy(), general)
+    run_general(samples, loop, -0.1, 2.0, PERIOD, PERIOD, start.copy(), general)
     np.testing.assert_array_equal(general, plain)
 
 
