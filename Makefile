@@ -3,7 +3,7 @@ PYTHON ?= python3
 RUN := scripts/run
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo test lint bench bench-naming docs
+.PHONY: setup demo test lint bench bench-naming soak docs
 
 setup: install/.built                 ## .venv with ROS 2 and all dependencies, and the colcon build
 demo: setup ; @$(RUN) python examples/demo $(DEMO)
@@ -11,6 +11,7 @@ test: setup ; @$(RUN) python -m pytest -n 2 --dist loadgroup $(TEST)
 lint: setup ; @scripts/lint
 bench: setup ; @$(RUN) python -m benchmarks $(BENCH)
 bench-naming: setup ; @$(RUN) python -m benchmarks.naming $(BENCH)
+soak: setup ; @$(RUN) python -m benchmarks.soak $(SOAK)
 docs: setup ; @$(RUN) python docs/generate.py
 
 .venv/.installed: requirements.txt constraints.txt ; @scripts/setup $(PYTHON) && touch $@

@@ -121,6 +121,7 @@ class Lab:
         self.processes: list[NodeProcess] = []
         self._added: list[Any] = []
         self._heard: list[Any] = []
+        self._others: list[tuple[Node, SingleThreadedExecutor, threading.Thread]] = []
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
         self.node = Node("lab", context=self._context)
@@ -135,9 +136,13 @@ class Lab:
         *arguments: str,
         namespace: str = "",
         environment: dict[str, str] | None = None,
+        program: list[str] | None = None,
         **parameters: Any,
     ) -> NodeProcess:
-        """Start ``driver_node``, ``model_node`` or ``identification_node``; '__' in a parameter name means '.'."""
+        """Start ``driver_node``, ``model_node`` or ``identification_node``; '__' in a parameter name means '.'.
+
+        A `program` of the test's own takes the place of the executable.
+        """
         number = len(self.processes)
         values = {name.replace("__", "."): value for name, value in parameters.items()}
         file = self.folder / f"parameters_{number}.yaml"
@@ -152,14 +157,14 @@ class Lab:
             "XDG_RUNTIME_DIR": str(self.folder),
             **(environment or {}),
         }
-        command = [*_command(executable), *ros, *arguments]
+        command = [*(program or _command(executable)), *ros, *arguments]
         process = NodeProcess(command, full, self.folder / f"{executable}_{number}.log")
         self.processes.append(process)
         return process
 
-    def driver(self, *arguments: str, namespace: str = "", **parameters: Any) -> NodeProcess:
+    def driver(self, *arguments: str, **named: Any) -> NodeProcess:
         """Start a driver that does not wait long for another one."""
-        return self.start("driver_node", *arguments, namespace=namespace, **{"discovery_time": 0.1, **parameters})
+        return self.start("driver_node", *arguments, **{"discovery_time": 0.1, **named})
 
     def add(self, kind: type[Node], **parameters: Any) -> Any:
         """A node with `end`, in the process and the thread of the test's own."""
@@ -167,6 +172,16 @@ class Lab:
         node = kind(context=self._context, parameter_overrides=overrides)
         self._executor.add_node(node)
         self._added.append(node)
+        return node
+
+    def second_node(self, name: str) -> Node:
+        """A node of the test's own in a thread of its own: what it does holds up nobody."""
+        node = Node(name, context=self._context)
+        executor = SingleThreadedExecutor(context=self._context)
+        executor.add_node(node)
+        thread = threading.Thread(target=executor.spin, daemon=True)
+        thread.start()
+        self._others.append((node, executor, thread))
         return node
 
     def wait(self, condition: Callable[[], Any], what: str, timeout: float = PATIENCE) -> Any:
@@ -178,6 +193,11 @@ class Lab:
                 pytest.fail(f"waited {timeout:g} s in vain for {what}\n{logs}")
             time.sleep(0.005)
         return value
+
+    @staticmethod
+    def pause(duration: float) -> None:
+        """Let the processes run for a while [s]."""
+        time.sleep(duration)
 
     def do(self, function: Callable[[], Any]) -> Any:
         """Call a function in the thread of the node, where what it takes part in can be taken away."""
@@ -272,6 +292,10 @@ class Lab:
             node.end()
         self._executor.shutdown()
         self._thread.join(10.0)
+        for node, executor, thread in self._others:
+            executor.shutdown()
+            thread.join(10.0)
+            node.destroy_node()
         for node in self._added:
             node.destroy_node()
         self.node.destroy_node()

@@ -1,0 +1,186 @@
+"""The faults of the soak: each strikes, lasts a moment, and leaves; what must hold is checked elsewhere."""
+
+from __future__ import annotations
+
+import random
+import signal
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from rcl_interfaces.srv import SetParameters
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
+
+from benchmarks.soak_keeper import Keeper
+from benchmarks.soak_processes import NAMESPACE, Soaked
+from piezo_hysteresis.nodes.conversions import command_to_cloud
+from piezo_hysteresis.nodes.quality import COMMAND, LATCHED
+
+RELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+
+
+@dataclass
+class Bench:
+    """What a fault strikes at."""
+
+    soaked: Soaked
+    keeper: Keeper
+    chance: random.Random
+    models: tuple[str, str]
+    """Two model files, both of the stage."""
+    sample_period: float
+
+
+def stall(name: str, longest: float) -> Callable[[Bench], None]:
+    """SIGSTOP for a while."""
+
+    def strike(bench: Bench) -> None:
+        bench.soaked.send(name, signal.SIGSTOP)
+        time.sleep(bench.chance.uniform(0.05, longest))
+        bench.soaked.send(name, signal.SIGCONT)
+
+    return strike
+
+
+def kill_driver(bench: Bench) -> None:
+    """SIGKILL; the next driver must start at once."""
+    bench.soaked.kill("driver_node")
+    time.sleep(0.3)  # what was sent still arrives
+    bench.keeper.begin_anew()
+    bench.soaked.start("driver_node")
+
+
+def kill_model(bench: Bench) -> None:
+    """SIGKILL of the model node."""
+    bench.soaked.kill("model_node")
+    bench.keeper.is_good = False
+    bench.soaked.start("model_node")
+
+
+def kill_recorder(bench: Bench) -> None:
+    """SIGKILL of the recorder; all that is older than a second must be in the bag."""
+    old = bench.keeper.newest
+    time.sleep(1.0)
+    bag = bench.soaked.recording
+    bench.soaked.kill("recorder")
+    lost = bench.keeper.missing(bag, old)
+    if lost > 0:
+        bench.keeper.break_promise(f"{lost} samples older than a second are not in {bag}")
+    bench.soaked.forget(bag)
+    bench.soaked.start("recorder")
+
+
+def flood_of_commands(bench: Bench) -> None:
+    """Waveforms and set-points without sense, a hundred of each."""
+    command = bench.keeper.node.create_publisher(PointCloud2, "command", COMMAND)
+    ask = bench.keeper.node.create_publisher(Float64, "set_voltage", COMMAND)
+    time.sleep(0.5)
+    noise = np.random.default_rng(bench.chance.getrandbits(32))
+    for _ in range(100):
+        wave = noise.uniform(-2, 12, 200)
+        wave[noise.integers(200)] = noise.choice([np.nan, np.inf, 11.0, -1.0])
+        cloud = command_to_cloud(wave, bench.sample_period, "flood")
+        cloud.header.stamp.nanosec = int(noise.choice([0, 1, 2**32 - 1]))
+        command.publish(cloud)
+        ask.publish(Float64(data=float(noise.choice([np.nan, -np.inf, 1e300, 10.5, -0.1]))))
+    time.sleep(0.3)
+    bench.keeper.node.destroy_publisher(command)
+    bench.keeper.node.destroy_publisher(ask)
+
+
+def broken_blocks(bench: Bench) -> None:
+    """Messages on `samples` that are none."""
+    samples = bench.keeper.node.create_publisher(PointCloud2, "samples", RELIABLE)
+    time.sleep(0.5)
+    for _ in range(50):
+        cloud = command_to_cloud(np.zeros(500), bench.sample_period, "x" * bench.chance.randrange(2000))
+        cloud.width = bench.chance.choice([0, 1, 500, 2**32 - 1])
+        cloud.header.stamp.nanosec = bench.chance.choice([0, 2**32 - 1])
+        samples.publish(cloud)
+    time.sleep(0.3)
+    bench.keeper.node.destroy_publisher(samples)
+
+
+def storm_of_parameters(bench: Bench) -> None:
+    """Sets what is read only, unknown, of another type, or no number, on both nodes."""
+    names = ("ramp_rate", "voltage_max", "model_file", "live_rate", "in_force.stage", "nonsense")
+    values = (1.0, float("nan"), "/dev/zero", True, 7, [1.0], "")
+    for node in ("driver_node", "model_node"):
+        client = bench.keeper.node.create_client(SetParameters, f"{node}/set_parameters")
+        client.wait_for_service(5.0)
+        for _ in range(50):
+            named = Parameter(bench.chance.choice(names), value=bench.chance.choice(values))
+            client.call_async(SetParameters.Request(parameters=[named.to_parameter_msg()]))
+            time.sleep(0.005)
+        bench.keeper.node.destroy_client(client)
+
+
+def models_ten_times_a_second(bench: Bench) -> None:
+    """Two models in turn on `model`, with texts that are none between them."""
+    models = bench.keeper.node.create_publisher(String, "model", LATCHED)
+    time.sleep(0.3)
+    for k in range(21):
+        models.publish(String(data=bench.models[k % 2]))
+        models.publish(String(data="model: [" * bench.chance.randrange(2000)))
+        time.sleep(0.1)
+    models.publish(String(data=bench.models[0]))
+    time.sleep(0.3)
+    bench.keeper.node.destroy_publisher(models)
+
+
+def slow_subscriber(bench: Bench) -> None:
+    """A reliable subscriber of depth 5, ten times slower than the stream, in a thread of its own."""
+    node, executor = Node("slow"), SingleThreadedExecutor()
+    node.create_subscription(PointCloud2, f"{NAMESPACE}/samples", lambda cloud: time.sleep(0.1), 5)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    time.sleep(bench.chance.uniform(1.0, 3.0))
+    executor.shutdown()
+    thread.join()
+    node.destroy_node()
+
+
+def foreign_topics(bench: Bench) -> None:
+    """Two hundred publishers of other names come and go."""
+    node = bench.keeper.node
+    publishers = [node.create_publisher(String, f"/foreign_{k}/samples", 10) for k in range(200)]
+    for publisher in publishers:
+        publisher.publish(String(data="x" * 1000))
+    for publisher in publishers:
+        node.destroy_publisher(publisher)
+
+
+def stop(bench: Bench) -> None:
+    """`~/stop` in whatever plays."""
+    client = bench.keeper.node.create_client(Trigger, "driver_node/stop")
+    client.wait_for_service(5.0)
+    client.call_async(Trigger.Request())
+    time.sleep(0.5)
+    bench.keeper.node.destroy_client(client)
+
+
+FAULTS: Mapping[str, Callable[[Bench], None]] = {
+    "driver stopped for up to 2 s": stall("driver_node", 2.0),
+    "model node stopped for up to 4 s": stall("model_node", 4.0),
+    "recorder stopped for up to 3 s": stall("recorder", 3.0),
+    "driver killed": kill_driver,
+    "model node killed": kill_model,
+    "recorder killed": kill_recorder,
+    "flood of commands": flood_of_commands,
+    "broken blocks": broken_blocks,
+    "storm of parameters": storm_of_parameters,
+    "models ten times a second": models_ten_times_a_second,
+    "slow subscriber": slow_subscriber,
+    "200 foreign topics": foreign_topics,
+    "stop": stop,
+}
+"""Every fault by its name."""

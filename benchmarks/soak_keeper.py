@@ -1,0 +1,161 @@
+"""`Keeper`: hears everything in the soak and keeps the balance: what went in, what came out, what was wrong."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import PointCloud2
+
+from benchmarks.soak_processes import NAMESPACE
+from piezo_hysteresis.errors import PiezoError
+from piezo_hysteresis.nodes.cloud import from_cloud
+from piezo_hysteresis.nodes.conversions import (
+    PREDICTED_SAMPLES,
+    SampleBlock,
+    command_to_cloud,
+    samples_from_cloud,
+    values_of,
+)
+from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
+from piezo_hysteresis.recording import Bag
+
+LOST = "samples lost on the way to the keeper, told by the index"
+DEEP = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
+
+
+class Keeper:
+    """A node in a thread of its own.
+
+    Parameters
+    ----------
+    false : float
+        Residual beyond which a prediction is false [m].
+    tolerance : float
+        Difference between a voltage commanded and applied that is none [V].
+    """
+
+    def __init__(self, false: float, tolerance: float) -> None:
+        self._false, self._tolerance = false, tolerance
+        self.node = Node("keeper", namespace=NAMESPACE)
+        self.counts: Counter[str] = Counter()
+        self.broken: list[str] = []
+        self.newest = -1
+        self.predicted = -1
+        self.is_good = False
+        self.state: dict[str, tuple[str, int]] = {}
+        self._commands: dict[int, np.ndarray] = {}
+        self._firsts: dict[int, int] = {}
+        self._access = threading.Lock()
+        self._sender = self.node.create_publisher(PointCloud2, "command", COMMAND)
+        self.node.create_subscription(PointCloud2, "samples", self._on_samples, DEEP)
+        self.node.create_subscription(PointCloud2, "predicted_samples", self._on_predicted, DEEP)
+        self.node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
+        self._waveforms: dict[str, np.ndarray] = {}
+        self._thread.start()
+
+    def send(self, waveform: np.ndarray, name: str, sample_period: float) -> None:
+        """Send a command that is followed to its end."""
+        self._waveforms[name] = waveform
+        self.counts["commands sent"] += 1
+        self._sender.publish(command_to_cloud(waveform, sample_period, name, self.node.get_clock().now().to_msg()))
+
+    def fate(self, name: str) -> str:
+        """State of a command; empty before the driver told one."""
+        return self.state.get(name, ("", 0))[0]
+
+    def begin_anew(self) -> None:
+        """The driver was killed: its numbers begin again."""
+        with self._access:
+            self.newest, self.is_good = -1, False
+            self._commands.clear()
+
+    def break_promise(self, what: str) -> None:
+        """Note a promise that was not kept."""
+        self.counts["promises broken"] += 1
+        if len(self.broken) < 50:
+            self.broken.append(what)
+
+    def _on_samples(self, cloud: PointCloud2) -> None:
+        try:
+            block = samples_from_cloud(cloud)
+        except PiezoError:
+            return  # one of those that the soak itself publishes
+        first, last = int(block.index[0]), int(block.index[-1])
+        with self._access:
+            if first > self.newest + 1 and self.newest >= 0:
+                self.counts[LOST] += first - self.newest - 1
+            self.newest = last
+            self.counts["samples received"] += block.size
+            for number in np.unique(block.phase).tolist():
+                self._compare(block, number)
+
+    def _compare(self, block: SampleBlock, number: int) -> None:
+        """A sample of a command against what was commanded."""
+        told = self._commands.get(number)
+        if told is None:
+            return
+        inside = block.phase == number
+        at = block.index[inside].astype(np.int64) - self._firsts[number]
+        if (at < 0).any() or (at >= told.size).any():
+            self.break_promise(f"phase {number} has samples outside its command")
+            return
+        wrong = np.abs(block.voltage[inside] - told[at]) > self._tolerance
+        self.counts["samples of commands compared"] += int(inside.sum())
+        if wrong.any():
+            self.break_promise(f"phase {number}: {int(wrong.sum())} samples were not played as commanded")
+
+    def _on_status(self, status: DiagnosticStatus) -> None:
+        told = values_of(status)
+        self.state[status.name] = (told["state"], int(told.get("first_index") or 0))
+        self.counts[f"commands {told['state']}"] += 1
+        if told["state"] == "playing" and status.name in self._waveforms:
+            with self._access:
+                self._commands[int(told["phase"])] = self._waveforms[status.name]
+                self._firsts[int(told["phase"])] = int(told["first_index"])
+
+    def _on_predicted(self, cloud: PointCloud2) -> None:
+        columns = from_cloud(cloud, PREDICTED_SAMPLES)
+        size, worst = columns["index"].size, float(np.abs(columns["residual"]).max())
+        self.predicted = int(columns["index"][-1])
+        self.counts["samples predicted"] += size
+        self.is_good = bool(cloud.is_dense)
+        if not cloud.is_dense:
+            self.counts["predictions flagged as not to be trusted"] += size
+        elif worst > self._false:
+            self.counts["false predictions published as good"] += size
+            self.break_promise(f"prediction {self.predicted} is off by {worst * 1e9:.0f} nm and published as good")
+
+    def missing(self, bag: Path, newest: int) -> int:
+        """Samples up to index `newest`, since the driver began or the recorder came, that a recording does not hold."""
+        held: list[np.ndarray] = []
+        for message in Bag(bag).messages({f"{NAMESPACE}/samples"}):
+            try:
+                index = samples_from_cloud(deserialize_message(message.raw, PointCloud2)).index
+            except PiezoError:
+                continue
+            if held and index[0] < held[-1][0]:
+                held.clear()
+            held.append(index)
+        if not held:
+            return newest + 1
+        self.counts["samples recorded"] += sum(index.size for index in held)
+        return newest + 1 - int(held[0][0]) - int((np.concatenate(held) <= newest).sum())
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._thread.join(5.0)
+        self.node.destroy_node()
+        rclpy.try_shutdown()

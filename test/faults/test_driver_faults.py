@@ -1,0 +1,203 @@
+"""The driver under fire: its stage is never asked for a voltage outside the limits or too steep, sample by sample.
+
+Its stage is the test's own and notes what it is given; every test ends with a look into that log.
+"""
+
+import signal
+import threading
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
+
+from benchmarks.stage_log import StageLog
+from piezo_hysteresis.nodes.conversions import command_to_cloud, to_stamp, values_of
+
+pytestmark = pytest.mark.nodes
+
+PERIOD = 1e-4
+LIMITS = {"voltage_min": 0.0, "voltage_max": 8.0, "max_slew_rate": 1000.0, "ramp_rate": 40.0}
+WAVE = 3.5 - 3.5 * np.cos(2 * np.pi * 10 * PERIOD * np.arange(10_000))
+
+
+@pytest.fixture
+def log(tmp_path):
+    """What the stage was given; checked when the test is over."""
+    log = StageLog(tmp_path / "voltages", PERIOD, **LIMITS)
+    yield log
+    log.check()
+
+
+def start(lab, log, **parameters):
+    """A driver with the test's own stage, and its samples."""
+    process = lab.driver(program=log.driver, environment=log.environment, sample_period=PERIOD, **LIMITS, **parameters)
+    return process, lab.streaming()
+
+
+def reaches(lab, samples, voltage):
+    lab.wait(lambda: samples.newest.voltage[-1] >= voltage, f"{voltage:g} V")
+
+
+@pytest.mark.parametrize("when", ["idle", "waveform", "hold", "way_to_safety"])
+def test_a_driver_killed_in_any_phase_starts_again_at_once(lab, log, when):
+    driver, samples = start(lab, log)
+    if when != "idle":
+        lab.send(np.concatenate((WAVE[:400], np.full(20_000 if when == "waveform" else 1, WAVE[400]))), when, PERIOD)
+        reaches(lab, samples, 3.4)
+    if when == "hold":
+        lab.wait(lambda: samples.newest.phase[-1] == 2, "the hold")
+    elif when == "way_to_safety":
+        lab.call(Trigger, "driver_node/stop")
+        lab.wait(lambda: 0 < samples.newest.voltage[-1] < 3.3, "the way down")
+    driver.signal(signal.SIGKILL)
+    driver.wait()
+    lab.forget()
+    driver, samples = start(lab, log)
+    statuses = lab.statuses()
+    lab.send(WAVE[:2000], "again", PERIOD)
+    lab.wait(lambda: "done" in lab.states(statuses, "again"), "a command of the new driver")
+    assert samples.voltage[0] == pytest.approx(0.0, abs=1e-3)
+    assert log.starts == 2
+
+
+def test_a_stalled_driver_takes_up_where_it_was(lab, log):
+    """Stopped for two seconds in mid-waveform: no sample is left out, the stamps tell the pause."""
+    driver, samples = start(lab, log)
+    statuses, reports = lab.statuses(), lab.diagnostics()
+    lab.send(WAVE, "wave", PERIOD)
+    reaches(lab, samples, 3.0)
+    driver.signal(signal.SIGSTOP)
+    lab.pause(2.0)
+    driver.signal(signal.SIGCONT)
+    lab.wait(lambda: "done" in lab.states(statuses, "wave"), "the end of the wave")
+    first = lab.value(statuses, "wave", "done", "first_index")
+    lab.wait(lambda: samples.newest.index[-1] >= first + WAVE.size, "its samples")
+    so_far = samples.so_far()
+    assert so_far.lost == 0
+    inside = (so_far.place() >= first) & (so_far.place() < first + WAVE.size)
+    np.testing.assert_allclose(so_far.voltage[inside], WAVE, atol=2e-4)
+    steps = np.diff([b.stamp for b in so_far.blocks]) * 1e-9 - 0.01
+    assert steps.max() > 1.0
+    assert (steps > -1e-3).all()
+    lab.wait(lambda: any("behind" in s.message for r in list(reports) for s in r.status), "the pause on /diagnostics")
+
+
+def test_floods_of_everything_at_once(lab, log):
+    """Commands good and bad, set-points, parameters, two hundred foreign topics, while a waveform plays."""
+    driver, samples = start(lab, log)
+    statuses = lab.statuses()
+    foreign = [lab.node.create_publisher(String, f"/foreign_{k}/samples", 10) for k in range(200)]
+    command, ask = lab.publisher(PointCloud2, "command"), lab.publisher(Float64, "set_voltage")
+    lab.send(WAVE, "wave", PERIOD)
+    lab.wait(lambda: "playing" in lab.states(statuses, "wave"), "the wave")
+    chance = np.random.default_rng(1)
+    client = lab.node.create_client(SetParameters, "driver_node/set_parameters")
+    lab.wait(client.service_is_ready, "the parameter service")
+    asked = []
+    for k in range(300):
+        name = chance.choice(["voltage_max", "ramp_rate", "sample_period", "in_force.voltage_max", "nonsense", "stage"])
+        value = [float(chance.uniform(-1e5, 1e5)), float("nan"), "word", True, 7, [1.0, float("inf")]][k % 6]
+        request = SetParameters.Request(parameters=[Parameter(str(name), value=value).to_parameter_msg()])
+        asked.append(client.call_async(request))
+        ask.publish(Float64(data=float(chance.choice([np.nan, np.inf, -1e300, 1e300, 12.0, 5.0]))))
+        wave = chance.uniform(-1, 9, int(chance.integers(1, 500)))
+        wave[chance.integers(wave.size)] = chance.choice([np.nan, np.inf, 0.0, 1e308])
+        cloud = command_to_cloud(wave, PERIOD, f"flood_{k}", lab.node.get_clock().now().to_msg())
+        if k % 5 == 0:
+            cloud.header.stamp.nanosec = 2**32 - 1
+        elif k % 5 == 1:
+            cloud.header.frame_id = "x" * 100_000
+        command.publish(cloud)
+        foreign[k % 200].publish(String(data="x" * 1000))
+    last = SetParameters.Request(parameters=[Parameter("ramp_rate", value=1.0).to_parameter_msg()])
+    assert not lab.call(SetParameters, "driver_node/set_parameters", last).results[0].successful
+    answered = [future.result() for future in asked if future.done()]  # a service takes ten requests at a time
+    assert len(answered) > 10
+    assert not any(result.successful for answer in answered for result in answer.results)
+    # refusals without number have pushed the end of the command out of its topic: the samples tell it
+    first, number = (lab.value(statuses, "wave", "playing", key) for key in ("first_index", "phase"))
+    lab.wait(lambda: samples.newest.phase[-1] > number, "the end of the wave")
+    so_far = samples.so_far()
+    inside = so_far.phase == number
+    np.testing.assert_allclose(so_far.voltage[inside], WAVE[so_far.place()[inside] - first], atol=2e-4)
+    assert inside.sum() + so_far.lost >= WAVE.size
+    assert driver.is_running
+    for publisher in foreign:
+        lab.node.destroy_publisher(publisher)
+    assert len(driver.output) < 100_000
+
+
+def test_the_clock_of_the_system_jumps(lab, log):
+    """An hour ahead and two hours back, by way of /clock: samples go on, stamps follow, and it is told."""
+    publisher = lab.node.create_publisher(Clock, "/clock", 10)
+    clock, ended = {"now": 1_700_000_000_000_000_000}, threading.Event()
+
+    def tick():
+        while not ended.wait(0.002):
+            clock["now"] += 2_000_000
+            publisher.publish(Clock(clock=to_stamp(clock["now"])))
+
+    ticking = threading.Thread(target=tick)
+    ticking.start()
+    try:
+        _, samples = start(lab, log, use_sim_time=True)
+        statuses, reports = lab.statuses(), lab.diagnostics()
+        lab.send(WAVE, "wave", PERIOD, age=None)
+        reaches(lab, samples, 3.0)
+        for jump in (3600, -7200):
+            clock["now"] += jump * 1_000_000_000
+            lab.wait(
+                lambda: abs(samples.newest.stamp - clock["now"]) < 1_000_000_000, f"stamps after a jump of {jump} s"
+            )
+        lab.wait(lambda: "done" in lab.states(statuses, "wave"), "the end of the wave")
+        first = lab.value(statuses, "wave", "done", "first_index")
+        lab.wait(lambda: samples.newest.index[-1] >= first + WAVE.size, "its samples")
+        assert samples.so_far().lost == 0
+
+        def told():
+            return [float(values_of(s).get("clock_jumps", 0)) for r in list(reports) for s in r.status]
+
+        lab.wait(lambda: max(told(), default=0.0) > 10_000, "the jumps on /diagnostics")
+    finally:
+        ended.set()
+        ticking.join()
+
+
+def test_a_slow_subscriber_and_a_paused_model_node_cost_others_nothing(lab, log):
+    """Four seconds: a subscriber of depth 10 that sleeps, and a model node that is stopped and goes on."""
+    _, samples = start(lab, log)
+    model = lab.start("model_node")
+    reports = lab.listen(DiagnosticArray, "/diagnostics", 10)
+    lab.wait(lambda: any(s.name.startswith("model_node") for r in list(reports) for s in r.status), "the model node")
+    slow = lab.second_node("slow")
+    heard = []
+
+    def sleepy(cloud):
+        heard.append(cloud)
+        lab.pause(0.2)
+
+    quality = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+    slow.create_subscription(PointCloud2, "samples", sleepy, quality)
+    lab.wait(lambda: len(heard) > 2, "the slow subscriber")
+
+    def unaccounted():
+        """Samples that the model node has neither received nor told lost, but for the second since its report."""
+        told = [values_of(s) for r in list(reports) for s in r.status if s.name.startswith("model_node")]
+        counted = [int(values["received"]) + int(values["lost"]) for values in told if "received" in values]
+        return int(samples.newest.index[-1]) - counted[-1] if counted else None
+
+    lab.wait(lambda: unaccounted() is not None, "figures of the model node")
+    before = unaccounted()
+    model.signal(signal.SIGSTOP)
+    begin = len(samples.blocks)
+    lab.wait(lambda: len(samples.blocks) > begin + 350, "three and a half seconds of blocks")
+    model.signal(signal.SIGCONT)
+    assert samples.so_far().lost == 0
+    lab.wait(lambda: unaccounted() < before + 1.5 / PERIOD, "every sample received or told lost by the model node")
