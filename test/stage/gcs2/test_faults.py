@@ -1,5 +1,7 @@
 """Whatever fails: one clear error, the safe voltage where the link allows, and what is not known is said."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -104,3 +106,32 @@ def test_every_fault_can_be_named_and_nothing_else():
     for wrong in ("earthquake", "slow@POS?:x", "slow=fast"):
         with pytest.raises(StageError, match="expected"):
             FAULTS.parse(wrong)
+
+
+@pytest.mark.parametrize("step", ["*IDN?", "HLP?", "SAI?", "SPA?", "VMI?", "TNR?", "WMS?", "VOL?", "ERR?:4"])
+def test_a_link_lost_while_opening_is_told_and_moves_nothing(bench, step):
+    b = bench(f"link_lost@{step}", opened=False)
+    b.controller.carry_out("SVA 1 60")
+    b.controller.heard.clear()
+    with pytest.raises(StageError, match="the link was closed from the other side"):
+        Gcs2Stage(b.setup())
+    assert b.voltage == pytest.approx(3.0, abs=1e-3)
+    assert not any(line.startswith(("SV", "W", "\x18")) for line in b.controller.heard if not line.startswith("WMS?"))
+
+
+def test_the_error_queue_is_read_after_every_command(bench, play):
+    b = bench()
+    b.controller.heard.clear()
+    work(b.stage, play)
+    b.stage.close()
+    heard = [line.strip() for line in b.controller.heard if line != "\x09"]
+    assert len(heard) > 50
+    for line, following in zip(heard, [*heard[1:], ""], strict=True):
+        assert line == "ERR?" or following == "ERR?", line
+
+
+def test_waiting_takes_no_processor_time(bench):
+    b = bench("slow@POS?=0.6")
+    before = time.thread_time()
+    b.stage.read_displacement()
+    assert time.thread_time() - before < 0.1
