@@ -2,13 +2,18 @@
 
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
+from piezo_hysteresis.nodes.bag_recorder import TOPICS
+
 pytestmark = pytest.mark.nodes
 
-PAGE = (Path(__file__).parents[2] / "docs" / "ros.md").read_text()
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "ros.md").read_text()
+POLICY = ROOT / "config" / "sros2_policy.xml"
 NODES = {"driver": "driver_node", "model": "model_node", "identification": "identification_node"}
 OF_ROS = {"/rosout", "/parameter_events", "/clock"}
 
@@ -31,7 +36,7 @@ def nodes(shared_lab):
         shared_lab.start(executable)
     there = shared_lab.node.get_node_names
     shared_lab.wait(lambda: set(NODES.values()) <= set(there()), "all nodes")
-    last = {"driver_node": "/samples", "model_node": "/predicted_live", "identification_node": "/command"}
+    last = {"driver_node": "/samples", "model_node": "/predicted_live", "identification_node": "/model"}
     for node, topic in last.items():
         shared_lab.wait(lambda node=node, topic=topic: topic in published(shared_lab, node), f"{topic} of the {node}")
     return shared_lab
@@ -81,3 +86,40 @@ def test_every_service_is_served_as_documented(nodes):
             if kinds[0].startswith("std_srvs"):
                 real[name] = kinds[0].replace("/srv/", "/")
     assert real == documented
+
+
+def allowed(node):
+    """Names that the security policy allows a node, by right; those in its namespace begin with '/' here."""
+    root = ElementTree.parse(POLICY).getroot()
+    (profile,) = root.iterfind(f"enclaves/enclave/profiles/profile[@node='{node}']")
+    names = {}
+    for kind in profile:
+        (right,) = kind.attrib
+        assert kind.attrib[right] == "ALLOW"
+        names.setdefault(right, set()).update("/" + name.text.lstrip("/") for name in kind)
+    return names
+
+
+@pytest.mark.parametrize("node", NODES.values())
+def test_the_security_policy_allows_what_a_node_uses_and_nothing_more(nodes, node):
+    def of(what):
+        return {name for name, _ in getattr(nodes.node, f"get_{what}_names_and_types_by_node")(node, "/")}
+
+    policy = allowed(node)
+    assert policy["publish"] == of("publisher") | {"/rosout", "/parameter_events"}
+    own = of("subscriber") - OF_ROS
+    if node == "identification_node":
+        own |= {"/" + name.lstrip("/") for name in TOPICS}  # while it records
+    if node == "driver_node":
+        own.add("/samples")  # before it begins, to find another driver
+    assert policy["subscribe"] == own | {"/clock"}
+    assert policy["reply"] == of("service")
+    assert policy.get("request", set()) == of("client")
+
+
+def test_the_policy_has_a_key_for_who_drives_and_one_for_who_looks():
+    operator, observer = allowed("operator"), allowed("observer")
+    assert {"/command", "/set_voltage"} <= operator["publish"]
+    assert not {"/command", "/set_voltage", "/samples", "/model"} & observer["publish"]
+    assert "request" not in observer
+    assert not any("set_parameters" in name for name in operator["request"] if "identification" not in name)
