@@ -24,10 +24,11 @@ def lag(fit: Fit) -> tuple[float, float]:
         return dynamics_of(model).group_delay * model.sample_period
 
     steps = {n: max(1e-6 * abs(fit.values[n]), 1e-12) for n in names}
-    slopes = np.array([(at({n: fit.values[n] + h}) - at({n: fit.values[n] - h})) / (2.0 * h) for n, h in steps.items()])
+    value = at({})
+    slopes = np.array([(at({n: fit.values[n] + h}) - value) / h for n, h in steps.items()])  # upward: d may be at 1
     rows = [fit.names.index(n) for n in names]
     variance = float(slopes @ fit.covariance[np.ix_(rows, rows)] @ slopes) if names else 0.0
-    return at({}), float(np.sqrt(max(variance, 0.0)))
+    return value, float(np.sqrt(max(variance, 0.0)))
 
 
 def lag_notices(fit: Fit, contents: Sequence[Content]) -> tuple[Notice, ...]:
