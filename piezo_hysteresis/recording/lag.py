@@ -19,6 +19,8 @@ _WINDOWS = 24
 _POINTS = 96
 _EXCERPT = 1 << 20
 _FEWEST = 6
+_FEWEST_TURNS = 2
+"""One turning point alone may look like a lead by the way its loop bends."""
 _EXPLAINED = 0.999
 _SURE = 4.0
 _JUMP = 0.3
@@ -68,7 +70,7 @@ def lag_of(record: Record) -> Lag | None:
         wide &= length >= 0.6 * np.median(length[wide])
         wide &= (at >= length) & (at + length < u.size)
     chosen = np.flatnonzero(wide)[:: max(1, np.count_nonzero(wide) // _WINDOWS)]
-    if not chosen.size:
+    if chosen.size < _FEWEST_TURNS:
         return None
     half = np.minimum(at - before, after - at)[chosen] // 2
     reach = float(half.min()) / 2.0
