@@ -15,7 +15,9 @@ T = TypeVar("T")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the experiment and what the file may not say about itself."""
-    parser.add_argument("experiment", metavar="EXPERIMENT", help="recording: folder of .npz, bag, .csv, .mat, …")
+    parser.add_argument(
+        "experiment", metavar="EXPERIMENT", nargs="+", help="recording: folder of .npz, bag, .csv, .mat, …; or several"
+    )
     group = parser.add_argument_group("reading, where the recording does not say it")
     group.add_argument("--format", choices=tuple(recording.FORMATS), help="default: what the path looks like")
     group.add_argument("--axis", metavar="NS", help="namespace of one stage in a bag of several, e.g. /stage_x")
@@ -69,7 +71,7 @@ def read(args: argparse.Namespace) -> Experiment:
         If it cannot be read, or an option makes no sense.
     """
     return recording.read(
-        args.experiment,
+        *args.experiment,
         format=args.format,
         axis=args.axis,
         columns=_pairs("--column", args.column, str),

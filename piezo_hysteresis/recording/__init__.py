@@ -32,7 +32,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import RecordingError
-from ..record import Experiment, Notice
+from ..record import Experiment, Notice, Record
 from .bag import Bag
 from .bag_writer import BagWriter
 from .csv import Csv
@@ -62,8 +62,7 @@ FORMATS: Mapping[str, Format] = {
 
 
 def read(
-    path: str | os.PathLike[str],
-    *,
+    *paths: str | os.PathLike[str],
     format: str | None = None,
     axis: str | None = None,
     columns: Mapping[str, Column] | None = None,
@@ -76,12 +75,12 @@ def read(
     average: int = 1,
     decimate: Mapping[str, int] | None = None,
 ) -> Experiment:
-    """Read a recording, whatever its format.
+    """Read a recording, whatever its format, or several of one stage as one experiment.
 
     Parameters
     ----------
-    path : path-like
-        File or folder.
+    *paths : path-like
+        Files or folders. No recording continues the one before it.
     format : str, optional
         Key of `FORMATS`; default what the path looks like.
     axis, columns, units, sample_period, initial_voltage, rows, phases, include, average
@@ -102,33 +101,43 @@ def read(
     RecordError
         If the samples form no record.
     """
-    place = Path(path).expanduser()
+    if not paths:
+        raise RecordingError("read: got no path, expected a recording")
     layout = Layout(axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include, average)
-    chosen = _format(place, format)
+    records: list[Record] = []
+    notices: list[Notice] = []
+    for path in paths:
+        place = Path(path).expanduser()
+        found = _one(place, _format(place, format), layout)
+        factors = load_decimation(place) if decimate is None else decimate
+        by_record = [(r, factors.get(r.phase, factors.get(r.phase.split("_")[0]))) for r in found]
+        records += [r if factor is None else r.decimate(factor) for r, factor in by_record]
+        notices += found.notices
+    names = {name for r in records for name in (r.phase, r.phase.split("_")[0])}
+    if unknown := set(decimate or ()) - names:
+        held = ", ".join(dict.fromkeys(r.phase for r in records))
+        raise RecordingError(f"{paths[0]}: decimate: no phase {min(unknown)!r}, expected one of {held}")
+    experiment = Experiment(tuple(records), ", ".join(str(Path(path).expanduser()) for path in paths))
+    return replace(experiment, notices=(*notices, *inspect(experiment)))
+
+
+def _one(place: Path, chosen: Format, layout: Layout) -> Experiment:
+    """The experiment of one path, what its records claim about their beginning checked."""
     experiment = chosen.read(place, layout if chosen.averages else replace(layout, average=1))
     records = experiment.records
-    if average > 1 and not chosen.averages:
-        records = tuple(r.decimate(average) for r in records if r.size >= average)
+    if layout.average > 1 and not chosen.averages:
+        records = tuple(r.decimate(layout.average) for r in records if r.size >= layout.average)
         if not records:
-            raise RecordingError(f"{place}: average: got {average} samples into one, expected fewer than a phase has")
+            raise RecordingError(f"{place}: average: got {layout.average}, expected fewer samples than a phase has")
     if records[0].continues:  # what it continues is not here
         records = (replace(records[0], continues=False, truncated=True), *records[1:])
-    if initial_voltage is not None:
-        records = tuple(
-            r if r.continues or r.truncated else replace(r, initial_voltage=initial_voltage) for r in records
-        )
+    if layout.initial_voltage is not None:
+        settled = layout.initial_voltage
+        records = tuple(r if r.continues or r.truncated else replace(r, initial_voltage=settled) for r in records)
     midway = {i for i, r in enumerate(records) if is_within_its_loop(r)}
-    within = [Notice("truncated", _WITHIN, records[i].phase) for i in sorted(midway)]
+    told = [Notice("truncated", _WITHIN, records[i].phase) for i in sorted(midway)]
     records = tuple(replace(r, truncated=True) if i in midway else r for i, r in enumerate(records))
-    if decimate is None:
-        decimate = load_decimation(place)
-    elif unknown := set(decimate) - {name for r in records for name in (r.phase, r.phase.split("_")[0])}:
-        held = ", ".join(dict.fromkeys(r.phase for r in records))
-        raise RecordingError(f"{place}: decimate: no phase {min(unknown)!r}, expected one of {held}")
-    if decimate:
-        records = tuple(r.decimate(decimate.get(r.phase, decimate.get(r.phase.split("_")[0], 1))) for r in records)
-    experiment = replace(experiment, records=records)
-    return replace(experiment, notices=(*experiment.notices, *within, *inspect(experiment)))
+    return replace(experiment, records=records, notices=(*experiment.notices, *told))
 
 
 def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str | None = None) -> None:

@@ -104,6 +104,17 @@ def test_import_maps_columns_units_and_period_of_a_foreign_file(piezo, tmp_path)
     assert json.loads((tmp_path / "i.json").read_text())["phases"][0]["samples"] == 200
 
 
+def test_several_recordings_of_one_stage_are_one_experiment(piezo, identified, folder, tmp_path):
+    paths = [folder / "04_triangle.npz", folder / "03_noise.npz"]
+    assert piezo("validate", identified / "model.yaml", *paths, "--json", tmp_path / "v.json").status == 0
+    assert [p["phase"] for p in json.loads((tmp_path / "v.json").read_text())["phases"]] == ["triangle", "noise"]
+    assert piezo("import", *paths, "-o", tmp_path / "both").status == 0
+    assert [(r.phase, r.continues) for r in recording.read(tmp_path / "both")] == [
+        ("triangle", False),
+        ("noise", False),
+    ]
+
+
 def test_simulate_is_repeatable_and_hides_what_a_seed_draws(piezo, tmp_path):
     for name in ("one", "two"):
         words = ["--protocol", "paper", "--sample-period", "1e-4", "--seed", 7, "--hidden", 3]
