@@ -41,7 +41,12 @@ def test_a_process_that_is_a_device(device):
 
 @pytest.mark.parametrize(
     "words",
-    [("gcs2", "--fault", "earthquake"), ("gcs2", "--port", "99999"), ("gcs2", "--servo-time", "0")],
+    [
+        ("gcs2", "--fault", "earthquake"),
+        ("nidaqmx", "--fault", "servo_on"),
+        ("gcs2", "--port", "99999"),
+        ("gcs2", "--servo-time", "0"),
+    ],
 )
 def test_what_cannot_be_emulated_is_one_line(piezo, words):
     done = piezo("emulate", *words)

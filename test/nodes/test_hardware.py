@@ -122,8 +122,8 @@ def test_a_card_that_streams(lab):
     card = Card(SimulatedStage(seed=3, sample_period=PERIOD))
     with NiServer(card) as server:
         wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1"}
-        wiring |= {"nidaqmx__voltage_input": "ai1", "nidaqmx__lead": 1.0, "sample_period": PERIOD}
-        driven = Driven(lab, "nidaqmx", block_duration=0.02, **wiring)
+        wiring |= {"nidaqmx__voltage_input": "ai1", "nidaqmx__lead": 1.5, "sample_period": PERIOD}
+        driven = Driven(lab, "nidaqmx", block_duration=0.05, **wiring)
         assert driven.in_force("stage").endswith("Dev1/ao0")
 
         drive = hill(5.0, 9000)
@@ -158,8 +158,14 @@ def emulated_card():
     from piezo_hysteresis.stage.daqmx.emulator.server import Server as NiServer
 
     with NiServer(Card(SimulatedStage(seed=3, sample_period=PERIOD))) as server:
-        wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1", "nidaqmx__lead": 1.0}
-        yield {"stage": "nidaqmx", "nidaqmx__voltage_input": "ai1", "sample_period": PERIOD, **wiring}
+        wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1", "nidaqmx__lead": 1.5}
+        yield {
+            "stage": "nidaqmx",
+            "nidaqmx__voltage_input": "ai1",
+            "sample_period": PERIOD,
+            "block_duration": 0.05,
+            **wiring,
+        }
 
 
 @pytest.mark.soak
