@@ -42,7 +42,7 @@ def gap(comparison: Comparison) -> Drawing | None:
     axis.set_xscale("log")
     plain_log(axis.xaxis)
     axis.set_yticks(place, names)
-    axis.invert_yaxis()
+    axis.set_ylim(len(names) - 0.4, -0.6)
     axis.set_xlabel("rms error [% of range]")
     legend_above(figure, handles_of(axis))
     worst = names[int(np.argmax(after))]

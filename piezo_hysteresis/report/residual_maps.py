@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 PER_RECORD = 20_000
 """Samples of every record that enter, so that no phase drowns the others."""
 BINS = 24
+DECADES = 30.0
+"""Rates that span less than this from the slowest to the fastest are drawn on a linear axis."""
 
 
 @styled
@@ -37,13 +39,13 @@ def residual_maps(comparison: Comparison) -> Drawing | None:
         ("rate_V_per_s", rate, "rate du/dt [V/s]"),
     )
     for axis, (name, values, label) in zip(axes.flat, quantities, strict=True):
-        if name == "rate_V_per_s":
+        if name == "rate_V_per_s" and fast > DECADES * slow:
             axis.set_xscale("symlog", linthresh=slow)
             axis.set_xticks([t for t in (-100 * slow, -slow, slow, 100 * slow) if abs(t) <= fast])
             positive = np.geomspace(slow, max(fast, 2.0 * slow), BINS // 2)
             edges = np.concatenate((-positive[::-1], positive))
         else:
-            edges = np.linspace(values.min(), values.max(), BINS + 1)
+            edges = np.linspace(values.min(), max(values.max(), values.min() + 1e-9), BINS + 1)
         fine = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b in zip(edges, edges[1:], strict=False)]))
         counts, xs, ys = np.histogram2d(values, e, bins=(fine, np.linspace(-limit, limit, 101)))
         seen = np.where(counts > 0, counts, np.nan).T

@@ -47,11 +47,15 @@ def whiteness(comparison: Comparison) -> Drawing | None:
         axis.set_title(f"{title}, {record.phase}")
         axis.set_xlabel(f"lag [{unit}]")
         axis.legend(loc="upper right")
+    if found.cross_bound >= 1.0:
+        axes[1].set_title(f"{title}, {record.phase}: undecided")
     reach = 1.1 * float(np.max(np.abs(found.cross), initial=min(found.cross_bound, 1.0)))
     axes[1].set_ylim(-reach, reach)
     axes[0].set_ylabel("correlation")
     white = "white" if found.is_white else "not white"
-    free = "does not depend on the drive" if found.is_independent else "depends on the drive"
+    free = "depends on the drive" if not found.is_independent else "does not depend on the drive"
+    if found.cross_bound >= 1.0:
+        free = "may or may not depend on the drive: one of few frequencies decides nothing, the bound is above 1"
     return Drawing(
         "residual_tests",
         "Residual tests",
