@@ -27,7 +27,7 @@ from rich.console import Console
 
 from benchmarks.figures import Cell, Figures, machine
 from benchmarks.soak_faults import FAULTS, Bench
-from benchmarks.soak_keeper import LOST, Keeper
+from benchmarks.soak_keeper import BEFORE, LOST, Keeper
 from benchmarks.soak_processes import Soaked
 from benchmarks.stage_log import STEP, StageLog
 from piezo_hysteresis.model import Model
@@ -164,7 +164,7 @@ class Soak:
             self.keeper.break_promise(f"voltages outside the limits or too steep: {error}")
         applied = int(np.isfinite(self.log.voltages).sum())
         counts = self.keeper.counts
-        unaccounted = applied - counts["samples received"] - counts[LOST]
+        unaccounted = applied - counts["samples received"] - counts[LOST] - counts[BEFORE]
         if abs(unaccounted) > ALLOWED * self.soaked.starts["driver_node"]:
             self.keeper.break_promise(f"{unaccounted} samples neither received nor told lost")
         rows: list[tuple[Cell, ...]] = [("voltages given to the stage", applied), ("outside limits or slew", outside)]

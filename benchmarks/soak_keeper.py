@@ -29,6 +29,7 @@ from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
 from piezo_hysteresis.recording import Bag
 
 LOST = "samples lost on the way to the keeper, told by the index"
+BEFORE = "samples before the keeper had found the driver, told by the index"
 DEEP = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
 
 
@@ -94,8 +95,8 @@ class Keeper:
             return  # one of those that the soak itself publishes
         first, last = int(block.index[0]), int(block.index[-1])
         with self._access:
-            if first > self.newest + 1 and self.newest >= 0:
-                self.counts[LOST] += first - self.newest - 1
+            if first > self.newest + 1:
+                self.counts[LOST if self.newest >= 0 else BEFORE] += first - self.newest - 1
             self.newest = last
             self.counts["samples received"] += block.size
             for number in np.unique(block.phase).tolist():
@@ -138,20 +139,18 @@ class Keeper:
             self.break_promise(f"prediction {self.predicted} is off by {worst * 1e9:.0f} nm and published as good")
 
     def missing(self, bag: Path, newest: int) -> int:
-        """Samples up to index `newest`, since the driver began or the recorder came, that a recording does not hold."""
-        held: list[np.ndarray] = []
+        """Samples at the end of a recording, up to index `newest`, that it does not hold."""
+        last, held = -1, 0
         for message in Bag(bag).messages({f"{NAMESPACE}/samples"}):
             try:
                 index = samples_from_cloud(deserialize_message(message.raw, PointCloud2)).index
             except PiezoError:
                 continue
-            if held and index[0] < held[-1][0]:
-                held.clear()
-            held.append(index)
-        if not held:
-            return newest + 1
-        self.counts["samples recorded"] += sum(index.size for index in held)
-        return newest + 1 - int(held[0][0]) - int((np.concatenate(held) <= newest).sum())
+            if held and int(index[0]) > last + 1:
+                self.counts["samples lost on the way to the recorder, told by the index"] += int(index[0]) - last - 1
+            last, held = int(index[-1]), held + index.size
+        self.counts["samples recorded by recorders that were killed"] += held
+        return newest - last
 
     def close(self) -> None:
         """Leave the graph."""
