@@ -16,7 +16,7 @@ from rich.console import Console
 
 from benchmarks.figures import Figures, machine, show, write
 
-SPEED = ("kernels", "simulation", "identification", "streaming")
+SPEED = ("kernels", "simulation", "identification", "streaming", "diagnosis")
 """What runs where nothing is named."""
 QUALITY = ("recovery", "table_1", "real_recordings")
 """What takes minutes or needs data, by name only."""
@@ -27,7 +27,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(SPEED + QUALITY)} (default: the first 4)")
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"{', '.join(SPEED + QUALITY)} (default: the first {len(SPEED)})"
+    )
     parser.add_argument("--json", type=Path, default=Path("benchmarks.json"), help="default: benchmarks.json")
     chosen = parser.parse_args()
     unknown = [name for name in chosen.names if name not in SPEED + QUALITY]

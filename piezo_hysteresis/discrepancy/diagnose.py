@@ -26,6 +26,7 @@ from .gap import Gap, measure_gap
 from .localise import localise
 from .next_experiment import NextExperiment, propose
 from .noise_floor import floors, noise_floors, stroke
+from .reach import beyond_reach
 from .sampling import at_period, common_period, shortened, slowed
 from .selection import ADEQUATE, NAMED, Selection, select
 from .split import reporting
@@ -144,7 +145,7 @@ def diagnose(
         where=where,
         gap=gap,
         next_experiment=_next(selection, evidence),
-        notices=experiment.notices,
+        notices=(*experiment.notices, *beyond_reach([records[i] for i in usable])),
     )
 
 

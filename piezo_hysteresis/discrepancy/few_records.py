@@ -25,7 +25,8 @@ from .gap import measure_gap
 from .localise import localise
 from .next_experiment import NextExperiment, propose
 from .noise_floor import floors, noise_floors, stroke
-from .selection import Selection, Step, explained, select
+from .reach import beyond_reach
+from .selection import ADEQUATE, Selection, Step, explained, select
 
 BLOCKS = 16
 """Blocks into which the records are cut, about."""
@@ -103,13 +104,15 @@ def diagnose_few(
     )
     names = [s.best.effect.public_name() for s in selection.accepted]
     closed = explained(before.excess, selection.score.excess, null)
-    told = (
-        f"closest is {' with '.join(names)}, which explains {100 * closed:.0f} % and is in the model"
-        if names
-        else "nothing in the catalogue helps on blocks left out"
-    )
+    lacking = beyond_reach([records[i] for i in used])
+    if before.excess <= ADEQUATE:
+        told = "the published model describes it down to the floor, so that it speaks for no effect and against none"
+    elif names:
+        told = f"closest is {' with '.join(names)}, which explains {100 * closed:.0f} % and is in the model"
+    else:
+        told = "nothing in the catalogue helps on blocks left out"
     count = "one record" if len(used) == 1 else f"{len(used)} records"
-    reason = f"No name: {count} cannot tell effects apart; {told}"
+    reason = "; ".join((f"No name: {count} cannot tell effects apart", told, *(n.message for n in lacking)))
     return Diagnosis(
         verdict=Verdict.UNKNOWN,
         reason=f"{reason}.",
@@ -120,7 +123,7 @@ def diagnose_few(
         where=where,
         gap=gap,
         next_experiment=_next(selection, evidence),
-        notices=experiment.notices,
+        notices=(*experiment.notices, *lacking),
     )
 
 

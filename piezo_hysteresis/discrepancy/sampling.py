@@ -19,9 +19,9 @@ from ..record import Record
 
 Array = NDArray[np.float64]
 
-ENOUGH = 20_000
+ENOUGH = 10_000
 """Samples of a record above which it is thinned out."""
-SLOWEST = 1e-3
+SLOWEST = 2e-3
 """Sample period to which slow records are averaged at most [s]: mains hum stays visible."""
 FAITHFUL = 3e-4
 """Share of its range by which the drive may differ from straight lines between its block averages, rms."""
@@ -47,11 +47,13 @@ def slowed(record: Record) -> Record:
     --------
     >>> t = 2e-5 * np.arange(100_000)
     >>> slowed(Record(np.sin(2 * np.pi * t), np.sin(2 * np.pi * t), 2e-5)).size
-    20000
+    10000
     """
-    wanted = min(record.size // ENOUGH, int(SLOWEST / record.sample_period * (1.0 + 1e-9)))
-    factor = wanted if wanted > 1 and not _differs(record, wanted) else 1
-    return record.decimate(factor) if factor > 1 else record
+    return _averaged(record, min(record.size // ENOUGH, int(SLOWEST / record.sample_period * (1.0 + 1e-9))))
+
+
+def _averaged(record: Record, factor: int) -> Record:
+    return record.decimate(factor) if factor > 1 and not _differs(record, factor) else record
 
 
 def _differs(record: Record, factor: int) -> bool:
@@ -65,9 +67,9 @@ def _differs(record: Record, factor: int) -> bool:
 
 
 def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
-    """Every record with at most about `most` samples, as far as its beginning stands for all of it.
+    """Every record with about `most` samples: slow ones averaged, fast ones cut where the beginning stands for all.
 
-    A record that another one continues is left whole, and so is one whose drive changes on its way.
+    A record that another one continues is not cut, and neither is one whose drive changes on its way.
 
     Parameters
     ----------
@@ -78,7 +80,7 @@ def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
     """
     followed = [*(r.continues for r in records[1:]), False]
     return tuple(
-        r[:most] if r.size > most and not goes_on and _is_alike(r, most) else r
+        r[:most] if r.size > most and not goes_on and _is_alike(r, most) else _averaged(r, r.size // most)
         for r, goes_on in zip(records, followed, strict=True)
     )
 

@@ -103,6 +103,8 @@ def test_one_phase_is_no_ground_for_a_verdict():
     found = diagnose(Experiment(triangle(1)))
     assert found.verdict is Verdict.UNKNOWN
     assert "one record" in found.reason
+    assert "explains" not in found.reason, "there is no gap to explain"
+    assert "creep can hardly be seen" in found.reason
     answer = found.answer()
     assert answer["effects"] == [] and answer["verdict"] == "unknown"
 

@@ -1,0 +1,106 @@
+"""Cost of a diagnosis: seconds of one core and memory against samples and against effects in the library.
+
+The stage of the naming benchmark with creep hidden in it; the rich protocol with its slow phases stored slowly, as it
+should be, and at the full rate of 50 kHz, as a recorder may have left it.
+
+    python -m benchmarks.diagnosis --holds 1 5 15
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+from collections.abc import Collection
+
+import numpy as np
+
+from benchmarks.figures import Cell, Figures, alone
+from benchmarks.independent_plant import NATIVE, Plant
+from benchmarks.naming_experiments import Layout, rich
+from piezo_hysteresis.discrepancy import diagnose
+from piezo_hysteresis.effects import CATALOGUE, Creep, Effect
+from piezo_hysteresis.record import Experiment
+
+USUAL, LONG, MEMORY = 10.0, 60.0, 4.0
+"""Seconds for 150 000 samples, seconds for 8.75 million, GB for these."""
+
+
+class FullRate:
+    """A stage of which every phase is stored at its fastest period."""
+
+    def __init__(self, plant: Plant) -> None:
+        self.plant, self.volt = plant, plant.volt
+
+    def play(self, drive, period, phase, rng, start_time=0.0, averaged=1):
+        """See `benchmarks.naming_experiments.Player`."""
+        finer = round(period / NATIVE)
+        drive = np.interp(np.arange(drive.size * finer) / finer, np.arange(drive.size), drive)
+        return self.plant.play(drive, NATIVE, phase, rng, start_time)
+
+
+def stage() -> Plant:
+    """One that creeps."""
+    return Plant.random(np.random.default_rng(5), hidden={"creep": ("logarithmic", 0.015)})
+
+
+def cost(experiment: Experiment, effects: Collection[type[Effect]] = CATALOGUE) -> tuple[float, str]:
+    """Processor time of a diagnosis [s], and what it says."""
+    begin = time.process_time()
+    found = diagnose(experiment, effects=effects)
+    return time.process_time() - begin, " and ".join(found.names) or str(found.verdict)
+
+
+def peak() -> float:
+    """Most memory this process has held so far [GB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+
+
+def exponent(sizes: list[float], costs: list[float]) -> float:
+    """Slope of log cost over log size: 1 is linear."""
+    return float(np.polyfit(np.log(sizes), np.log(costs), 1)[0]) if len(sizes) > 1 else float("nan")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    parser.add_argument("--holds", type=float, nargs="+", default=[1.0, 5.0, 15.5], help="length of the steps [s]")
+
+
+def run(options: argparse.Namespace) -> list[Figures]:
+    """Usual experiment, experiments at full rate, libraries of several sizes."""
+    usual = rich(stage(), 1)
+    cost(usual)
+    spent, said = cost(usual)
+    failures = [] if spent <= USUAL else [f"{usual.size} samples: {spent:.1f} s, expected at most {USUAL:g} s"]
+    rows: list[tuple[Cell, ...]] = [("slow phases stored slowly", usual.size, spent, peak(), said)]
+    sizes, costs = [], []
+    for hold in sorted(options.holds):
+        full = rich(FullRate(stage()), 1, Layout(hold=hold))
+        spent, said = cost(full)
+        rows.append((f"all at 50 kHz, {sum(r.duration for r in full):.0f} s", full.size, spent, peak(), said))
+        sizes.append(float(full.size))
+        costs.append(spent)
+    if costs and costs[-1] > LONG:
+        failures.append(f"{full.size} samples: {costs[-1]:.1f} s, expected at most {LONG:g} s")
+    if peak() > MEMORY:
+        failures.append(f"{peak():.1f} GB, expected at most {MEMORY:g} GB")
+    samples = Figures(
+        f"Diagnosis against samples: cost ∝ samples^{exponent(sizes, costs):.2f} at 50 kHz",
+        ("experiment", "samples", "s of one core", "peak memory so far, GB", "answer"),
+        rows,
+        tuple(failures),
+    )
+    others = [e for e in CATALOGUE if e is not Creep]
+    counts = (3, 6, 12, len(CATALOGUE))
+    times = [cost(usual, (Creep, *others[: count - 1])) for count in counts]
+    slope = exponent([float(c) for c in counts], [t for t, _ in times])
+    library = Figures(
+        f"Diagnosis against effects in the library: cost ∝ effects^{slope:.2f}",
+        ("effects", "s of one core", "answer"),
+        [(count, *outcome) for count, outcome in zip(counts, times, strict=True)],
+    )
+    return [samples, library]
+
+
+if __name__ == "__main__":
+    alone(__name__)

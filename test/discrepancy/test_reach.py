@@ -1,0 +1,43 @@
+"""What an experiment cannot show is told, and what it can is not."""
+
+import numpy as np
+
+from piezo_hysteresis.discrepancy.reach import beyond_reach
+from piezo_hysteresis.record import Record
+
+TIME = 1e-3 * np.arange(2000)
+
+
+def record(drive, period=1e-3, phase="triangle", **options):
+    return Record(drive, 1e-6 * drive, period, phase=phase, **options)
+
+
+def loops(*peaks):
+    return np.concatenate([peak * (1 - np.abs(2 * (TIME % 1) - 1)) for peak in peaks])
+
+
+def told(*records):
+    return " ".join(n.message for n in beyond_reach(records))
+
+
+def test_one_triangle_of_one_amplitude_leaves_most_open():
+    said = told(record(loops(4.0)))
+    for name in ("creep", "thermal_drift", "gain_drift", "hysteresis_memory", "hysteresis_exponent", "extra_resonance"):
+        assert name in said
+
+
+def test_smaller_loops_show_memory():
+    assert "hysteresis_memory" not in told(record(loops(4.0, 2.0)))
+    assert "hysteresis_memory" not in told(record(loops(4.0)), record(loops(2.0)))
+
+
+def test_a_level_held_after_a_change_shows_creep_and_one_held_from_the_start_does_not():
+    assert "creep" in told(record(np.full(2000, 3.0)), record(loops(4.0)))
+    assert "creep" not in told(record(np.repeat([0.0, 3.0], 1500)))
+    assert "creep" not in told(record(np.full(2000, 3.0), initial_voltage=0.0))
+
+
+def test_noise_shows_dynamics_and_a_phase_that_comes_again_shows_drift():
+    noise = record(np.random.default_rng(1).normal(size=4000), 2e-5, "noise")
+    assert "extra_resonance" not in told(noise)
+    assert "drift" not in told(noise, noise)
