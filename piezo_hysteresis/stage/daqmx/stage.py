@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 
@@ -86,7 +85,8 @@ class DaqmxStage:
         self._require_open()
         period = self._description.check_sample_period(sample_period)
         if period != self._sample_period:
-            self._drain()
+            with self._guarded():
+                self._drain()
             self._sample_period = period
 
     def exchange(self, voltage: Samples) -> Acquired:
@@ -117,7 +117,7 @@ class DaqmxStage:
         with self._guarded():
             self._drain()
             readings = self._tasks.read_once()
-            return self._measured(readings) if self._setup.voltage_input else self._voltage
+            return float(self._measured(readings)) if self._setup.voltage_input else self._voltage
 
     def safe(self) -> None:
         """Let what is in the buffer play to its end, go to the safe voltage, and end the stream."""
@@ -160,9 +160,9 @@ class DaqmxStage:
         self._agreement.check(applied, measured, displacement)
         return Acquired(measured, displacement)
 
-    def _measured(self, readings: Samples) -> Any:
+    def _measured(self, readings: Samples) -> Samples:
         """Drive voltage from the monitor [V]."""
-        return readings[1] / (self._setup.monitor_gain * self._setup.amplifier_gain)
+        return np.asarray(readings[1] / (self._setup.monitor_gain * self._setup.amplifier_gain))
 
     def _found(self, readings: Samples) -> float:
         """Drive voltage at which the card stands before anything was given [V]."""

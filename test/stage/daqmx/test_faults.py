@@ -51,8 +51,8 @@ def test_a_link_lost_while_opening_is_told_and_moves_nothing(rig, step):
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
-        ("slow=5", r"no answer within 0.3 s from 127.0.0.1:\d+"),
-        ("slow@WriteAnalogF64:3=5", r"writing output failed: no answer within 0.3 s"),
+        ("slow=5", r"no answer within 0.8 s from 127.0.0.1:\d+"),
+        ("slow@WriteAnalogF64:3=5", r"writing output failed: no answer within 0.8 s"),
         ("error", "Error Code: -50103|-50103"),
         ("error@StartTask=-200077", "starting output and input failed"),
         ("device_lost", "Device not available"),
@@ -68,7 +68,7 @@ def test_a_link_lost_while_opening_is_told_and_moves_nothing(rig, step):
     ],
 )
 def test_every_failure_is_told_clearly_and_ends_safe(rig, streamed, fault, message):
-    r = rig(fault, timeout=0.3 if "slow" in fault else 5.0)
+    r = rig(fault, timeout=0.8 if "slow" in fault else 5.0)
     with pytest.raises(StageError, match=rf"{message}.*safe voltage, 0 V") as told:
         work(r.stage, streamed)
     assert "\n" not in str(told.value)
