@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 RIDGE = 1e-9
 """Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
 REFINEMENTS = 2
+FARTHEST = 100.0
+"""How far leaving a record out may raise its R² over that of the fit to all: beyond, nothing is linear any more."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -89,7 +91,8 @@ def held_out(
     left = np.array(spared, dtype=float) * (len(inner) > 1)
     steps = _solve(hessian - left[:, None, None] * hessians, slope - left[:, None] * slopes, scale)
     changes = np.einsum("rj,rjk,rk->r", steps, hessians, steps) - 2.0 * np.sum(steps * slopes, axis=1)
-    return Score(np.sqrt(np.maximum(0.0, np.array(power) + changes)), _solve(hessian[None], slope[None], scale)[0])
+    squares = np.clip(np.array(power) + changes, 0.0, FARTHEST * np.maximum(1.0, power))
+    return Score(np.sqrt(squares), _solve(hessian[None], slope[None], scale)[0])
 
 
 def _solve(matrices: Array, rights: Array, scale: Array) -> Array:

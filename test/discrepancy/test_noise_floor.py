@@ -91,3 +91,28 @@ def test_no_floor_lies_below_the_adequacy_floor():
     records = (sine(100.0, 2e-5, 0.2, sigma=1e-12),)
     assert floors(records)[0] == ADEQUACY * stroke(records)
     assert stroke(records) == pytest.approx(2e-5, rel=1e-3)
+
+
+def test_jumps_of_a_staircase_are_no_noise():
+    levels = np.repeat([0.0, 2.0, 4.0, 6.0, 4.0, 2.0], 500)
+    record = Record(levels, 4e-6 * levels + SIGMA * RANDOM.normal(size=levels.size), 1e-2)
+    assert white_noise(record) == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_a_record_that_never_settles_takes_its_noise_from_the_others():
+    quiet = [sine(f, 2e-5, 0.4) for f in (50.0, 250.0, 400.0)]
+    ringing = sine(200.0, 2e-5, 0.1, added=lambda t: 2e-5 * np.exp(-30 * t) * np.cos(2 * np.pi * 310 * t))
+    assert period_scatter(ringing) > 5 * SIGMA
+    assert noise_floors((*quiet, ringing))[-1] == pytest.approx(SIGMA, rel=1.1)
+
+
+def test_jitter_of_the_clock_counts_in_every_record_by_its_speed():
+    def jittery(frequency):
+        t = 2e-5 * np.arange(20_000)
+        late = t + 3e-6 * RANDOM.normal(size=t.size)
+        u, y = (np.cos(2 * np.pi * frequency * x) for x in (t, late))
+        return Record(u, 1e-5 * y + SIGMA * RANDOM.normal(size=t.size), 2e-5, phase="sine")
+
+    records = tuple(jittery(f) for f in (50.0, 100.0, 250.0))
+    expected = [np.hypot(SIGMA, 1e-5 * 2 * np.pi * f * 3e-6 / np.sqrt(2)) for f in (50.0, 100.0, 250.0)]
+    assert noise_floors(records) == pytest.approx(expected, rel=0.1)

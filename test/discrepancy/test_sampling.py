@@ -1,0 +1,75 @@
+"""Records are brought to the period and length that the search needs, and keep what their drive shows."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from piezo_hysteresis.discrepancy.sampling import at_period, common_period, shortened, slowed
+from piezo_hysteresis.record import Record
+
+FAST = 2e-5
+RANDOM = np.random.default_rng(5)
+
+
+def sine(frequency, period, duration, **options):
+    t = period * np.arange(round(duration / period))
+    return Record(
+        3 + np.sin(2 * np.pi * frequency * t), 1e-6 * np.sin(2 * np.pi * frequency * t - 0.3), period, **options
+    )
+
+
+@given(frequency=st.floats(0.1, 1.0))
+def test_a_slow_phase_recorded_fast_keeps_its_averages(frequency):
+    fast = sine(frequency, FAST, 1.0)
+    slow = slowed(fast)
+    assert slow.size < fast.size and slow.duration == pytest.approx(fast.duration, rel=1e-3)
+    assert slow.displacement.mean() == pytest.approx(fast.displacement.mean(), abs=1e-15)
+    assert slow.settled_voltage == fast.settled_voltage
+
+
+def test_what_the_drive_does_between_averages_is_never_lost():
+    assert slowed(sine(200.0, FAST, 1.0)).sample_period < 1e-3 / 2
+    noise = Record(RANDOM.normal(size=50_000), RANDOM.normal(size=50_000), FAST)
+    assert slowed(noise) is noise
+
+
+def test_noise_is_cut_and_a_chirp_is_not():
+    noise = Record(RANDOM.normal(size=50_000), RANDOM.normal(size=50_000), FAST)
+    t = FAST * np.arange(50_000)
+    chirp = np.sin(2 * np.pi * 200 * t * t)
+    whole = Record(chirp, chirp, FAST)
+    first, second = shortened((noise, whole), 6000)
+    assert first.size == 6000 and np.array_equal(first.voltage, noise.voltage[:6000])
+    assert second.size == whole.size
+
+
+def test_a_record_that_goes_on_in_the_next_is_not_cut():
+    noise = Record(RANDOM.normal(size=20_000), RANDOM.normal(size=20_000), FAST)
+    first, second = noise.split(10_000)
+    assert [r.size for r in shortened((first, second), 6000)] == [10_000, 6000]
+
+
+@pytest.mark.parametrize("factor", [5, 10])
+def test_a_drive_that_moves_the_dynamics_comes_to_their_period(factor):
+    slow, fast = sine(200.0, factor * FAST, 0.2), sine(200.0, FAST, 0.2)
+    found = at_period(slow, FAST)
+    assert found.sample_period == FAST
+    inside = slice(20 * factor, found.size - 20 * factor)
+    assert np.allclose(found.voltage[inside], fast.voltage[: found.size][inside], atol=1e-4)
+    assert np.allclose(found.displacement[inside], fast.displacement[: found.size][inside], atol=1e-10)
+
+
+def test_slow_loops_and_jumps_stay_at_their_own_period():
+    loop = sine(1.0, 1e-3, 2.0)
+    stairs = Record(np.repeat([0.0, 2.0, 1.0], 1000), np.zeros(3000), 1e-2)
+    assert at_period(loop, FAST) is loop
+    assert at_period(stairs, FAST) is stairs
+
+
+def test_the_dynamics_set_the_period_and_what_is_faster_is_averaged():
+    noise = Record(RANDOM.normal(size=4000), RANDOM.normal(size=4000), 5 * FAST)
+    step = Record(np.repeat([0.0, 1.0], 1000), np.repeat([0.0, 1e-6], 1000), FAST)
+    assert common_period((step, noise)) == 5 * FAST
+    assert at_period(step, 5 * FAST).sample_period == 5 * FAST
+    assert at_period(step, 5 * FAST).size == 400
