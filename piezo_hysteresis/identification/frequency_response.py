@@ -92,6 +92,49 @@ def welch(signals: Iterable[tuple[Samples, Samples]], sample_period: float, segm
     return _response(np.arange(1, lines + 1) / (segment * sample_period), uu, yy, uy, EFFECTIVE * count)
 
 
+def swept(signals: Iterable[tuple[Samples, Samples]], sample_period: float, neighbours: int = 16) -> FrequencyResponse:
+    """Response from sweeps, by averaging over neighbouring lines of the spectrum of each as a whole.
+
+    A segment of a sweep holds a part of its frequencies only; segments cannot be averaged.
+
+    Parameters
+    ----------
+    signals : iterable of (u, y)
+        Input and output of every sweep, each from rest to rest.
+    sample_period : float
+        Sample period [s].
+    neighbours : int
+        Lines averaged into one.
+
+    Returns
+    -------
+    FrequencyResponse
+        Where the sweeps have at least a thousandth of their highest power.
+
+    Raises
+    ------
+    IdentificationError
+        If no sweep is longer than two groups of lines.
+    """
+    pairs = list(signals)
+    size = min((u.size for u, _ in pairs), default=0)
+    groups = (size // 2) // neighbours
+    if groups < 2:
+        raise IdentificationError(
+            f"frequency response: got sweeps of {size} samples, expected {4 * neighbours} or more"
+        )
+    uu, yy, uy = np.zeros(groups), np.zeros(groups), np.zeros(groups, dtype=np.complex128)
+    for u, y in pairs:
+        fu, fy = (np.fft.rfft(x[:size] - x[0])[1 : groups * neighbours + 1].reshape(groups, -1) for x in (u, y))
+        uu += np.sum(np.abs(fu) ** 2, axis=1)
+        yy += np.sum(np.abs(fy) ** 2, axis=1)
+        uy += np.sum(np.conj(fu) * fy, axis=1)
+    frequency: Samples = (neighbours * (np.arange(groups) + 0.5) + 0.5) / (size * sample_period)
+    excited = uu * frequency**2 > 1e-3 * float(np.max(uu * frequency**2))
+    parts = frequency[excited], uu[excited], yy[excited], uy[excited]
+    return _response(*parts, float(neighbours * len(pairs)))
+
+
 def periodic(u: Samples, y: Samples, sample_period: float, period: int, skip: int = 1) -> FrequencyResponse:
     """Response from periodic data (multisine, sine) at the excited lines, averaged over the periods: no leakage.
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..effects import Arx
 from ..errors import IdentificationError
-from ..identification.frequency_response import FrequencyResponse, welch
+from ..identification.frequency_response import FrequencyResponse, swept, welch
 from ..model import Model
 from ..record import Record
 from .comparison import Comparison
@@ -72,6 +72,7 @@ def bode(comparison: Comparison) -> Drawing | None:
     gain_axis.set_ylabel("gain [µm/V]")
     phase_axis.set_ylabel("phase [°]")
     phase_axis.set_xlabel("frequency [Hz]")
+    plain_log(gain_axis.xaxis)
     plain_log(gain_axis.yaxis)
     legend_above(figure, handles_of(gain_axis), 2)
     figure.align_ylabels()
@@ -118,6 +119,12 @@ def _middle(samples: Array) -> Array:
 
 def _response(records: Sequence[Record], predicted: Sequence[Array] | None) -> FrequencyResponse | None:
     outputs = [r.displacement for r in records] if predicted is None else predicted
+    if records[0].phase.split("_")[0] == "chirp":
+        whole = [(r.voltage, y) for r, y in zip(records, outputs, strict=True)]
+        try:
+            return swept(whole, records[0].sample_period)
+        except IdentificationError:
+            return None
     signals = [(_middle(r.voltage), _middle(y)) for r, y in zip(records, outputs, strict=True)]
     segment = 1 << int(np.log2(max(16, min(u.size for u, _ in signals) // 4)))
     try:

@@ -191,3 +191,18 @@ def test_one_frequency_decides_nothing_about_the_residual():
     drawing = whiteness(compare(Experiment((record,)), {"model": linear(1e-3)}))
     assert "decides nothing" in drawing.alternative
     assert "does not depend" not in drawing.alternative
+
+
+def test_bode_of_a_sweep_reaches_from_end_to_end(signal):
+    period, pole = 1e-3, 0.7
+    t = period * np.arange(8000)
+    rate = np.log(200.0) / 8.0
+    u = np.concatenate((np.zeros(200), np.sin(2 * np.pi * np.expm1(rate * t) / rate), np.zeros(200)))
+    y = 1e-6 * lfilter([0.0, 1 - pole], [1.0, -pole], u) + 1e-9 * signal.normal(size=u.size)
+    data = bode(compare(Experiment((Record(u, y, period, phase="chirp"),)))).data
+    f = data["frequency_Hz_1"]
+    assert f[0] < 5.0
+    assert f[-1] > 150.0
+    z = np.exp(2j * np.pi * f * period)
+    truth = 1e-6 * (1 - pole) / (1 - pole / z) / z
+    assert data["gain_m_per_V_1"] == pytest.approx(np.abs(truth), rel=0.03)
