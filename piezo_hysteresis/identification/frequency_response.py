@@ -129,7 +129,7 @@ def swept(signals: Iterable[tuple[Samples, Samples]], sample_period: float, neig
         uu += np.sum(np.abs(fu) ** 2, axis=1)
         yy += np.sum(np.abs(fy) ** 2, axis=1)
         uy += np.sum(np.conj(fu) * fy, axis=1)
-    frequency: Samples = (neighbours * (np.arange(groups) + 0.5) + 0.5) / (size * sample_period)
+    frequency = np.asarray((neighbours * (np.arange(groups) + 0.5) + 0.5) / (size * sample_period), np.float64)
     excited = uu * frequency**2 > 1e-3 * float(np.max(uu * frequency**2))
     parts = frequency[excited], uu[excited], yy[excited], uy[excited]
     return _response(*parts, float(neighbours * len(pairs)))
