@@ -1,7 +1,7 @@
 """`make bench`: the figures of docs/performance, each beside a peer measured in the same run.
 
-Without a name: kernels, simulation, identification and streaming. Options of one benchmark belong to its own command
-line, as in `python -m benchmarks.streaming --rate 2e5`.
+Without a name: those of speed, some minutes in all. Options of one benchmark belong to its own command line, as in
+`python -m benchmarks.streaming --rate 2e5`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rich.console import Console
 
 from benchmarks.figures import Figures, machine, show, write
 
-SPEED = ("kernels", "simulation", "identification", "streaming", "diagnosis")
+SPEED = ("kernels", "simulation", "identification", "growth", "start", "streaming", "diagnosis")
 """What runs where nothing is named."""
 QUALITY = ("recovery", "table_1", "real_recordings")
 """What takes minutes or needs data, by name only."""

@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 from benchmarks import published_plant as plant
 from benchmarks import recovery
 from benchmarks.figures import Figures, alone
+from benchmarks.narmax import against_sysidentpy
 from piezo_hysteresis.effects import Arx, PublishedBoucWen
 from piezo_hysteresis.errors import PiezoError
 from piezo_hysteresis.identification import fit, identify, three_steps
@@ -140,9 +141,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
-    """Both tables."""
+    """All tables."""
     data = experiment(options.seeds)
-    return [whole(data), against_scipy(data, options.limit)]
+    tables = [whole(data), against_scipy(data, options.limit), against_sysidentpy(experiment(1))]
+    return [table for table in tables if table is not None]
 
 
 if __name__ == "__main__":
