@@ -117,6 +117,8 @@ def _play(driver: DriverLink, recorder: BagRecorder, phase: Phase, told: Progres
             raise StageError(f"phase '{phase.name}' was {driver.state}: {driver.reason}")
         if driver.state in ("sending", "sent") and time.monotonic() > deadline:
             raise StageError(f"phase '{phase.name}': no answer on 'command_status' within {PATIENCE:g} s")
+        if driver.limits is None:
+            raise StageError(f"phase '{phase.name}': {driver.missing} is gone; /diagnostics and its log tell why")
         if recorder.silence > longest_silence:
             raise StageError(f"phase '{phase.name}': no samples for {longest_silence:g} s; is the driver alive?")
         if recorder.failure is not None:

@@ -1,0 +1,51 @@
+"""A stage that fails in mid-phase ends the campaign at once, with a recording that can be read."""
+
+import time
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.identification.protocol import Phase, Protocol
+from piezo_hysteresis.nodes import back_ends
+from piezo_hysteresis.nodes.campaign import campaign
+from piezo_hysteresis.nodes.driver_link import DriverLink
+from piezo_hysteresis.nodes.driver_node import DriverNode
+from piezo_hysteresis.recording import read
+
+from .witness import Witness
+
+pytestmark = pytest.mark.nodes
+
+PERIOD = 1e-3
+
+
+def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, monkeypatch):
+    stage = Witness(PERIOD, 1e6)
+    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", back_ends.BackEnd((), lambda *_: stage, is_device=True))
+    node = lab.add(DriverNode, discovery_time=0.0)
+    lab.do(node.begin)
+    link = lab.do(lambda: DriverLink(lab.node, "driver_node"))
+    lab.wait(lambda: not link.missing, "the driver")
+    samples = lab.streaming()
+    voltage = np.concatenate((np.zeros(100), np.full(60_000, 0.1), np.zeros(100)))
+    path = lab.folder / "run"
+    job = campaign(lab.node, link, lambda limits: Protocol("long", limits, (Phase("long", voltage, PERIOD),)), path)
+
+    def step():
+        try:
+            return next(job)
+        except StageError as error:
+            return error
+
+    def ended():
+        time.sleep(0.02)
+        if samples.newest.phase[-1] == 1 and (samples.phase == 1).sum() > 1000:
+            stage.exchange = lambda block: 1 / 0
+        told = lab.do(step)
+        return told if isinstance(told, StageError) else None
+
+    told = lab.wait(ended, "the end of the campaign")
+    assert "phase 'long': a configured 'driver_node' in / is gone" in str(told)
+    assert stage.made_safe == 1
+    assert {record.phase for record in read(path)} == {"long"}
