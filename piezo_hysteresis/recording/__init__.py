@@ -7,6 +7,7 @@
 
 ====================  ==========================================================================================
 ``gap`` ``split``     samples are missing; the phase is split there, the part behind it `truncated`
+``pause``             nothing was measured while a device held its voltage and was read out; the state is carried
 ``non_finite``        samples that are no number of this world, dropped in the same way
 ``not_a_number``      cells of a table without a number
 ``duplicate``         samples that came twice; the first ones count
