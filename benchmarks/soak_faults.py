@@ -114,13 +114,11 @@ def storm_of_parameters(bench: Bench) -> None:
     names = ("ramp_rate", "voltage_max", "model_file", "live_rate", "in_force.stage", "nonsense")
     values = (1.0, float("nan"), "/dev/zero", True, 7, [1.0], "")
     for node in ("driver_node", "model_node"):
-        client = bench.keeper.node.create_client(SetParameters, f"{node}/set_parameters")
-        client.wait_for_service(5.0)
+        client = bench.keeper.client(SetParameters, f"{node}/set_parameters")
         for _ in range(50):
             named = Parameter(bench.chance.choice(names), value=bench.chance.choice(values))
             client.call_async(SetParameters.Request(parameters=[named.to_parameter_msg()]))
             time.sleep(0.005)
-        bench.keeper.node.destroy_client(client)
 
 
 def models_ten_times_a_second(bench: Bench) -> None:
@@ -161,11 +159,8 @@ def foreign_topics(bench: Bench) -> None:
 
 def stop(bench: Bench) -> None:
     """`~/stop` in whatever plays."""
-    client = bench.keeper.node.create_client(Trigger, "driver_node/stop")
-    client.wait_for_service(5.0)
-    client.call_async(Trigger.Request())
+    bench.keeper.client(Trigger, "driver_node/stop").call_async(Trigger.Request())
     time.sleep(0.5)
-    bench.keeper.node.destroy_client(client)
 
 
 FAULTS: Mapping[str, Callable[[Bench], None]] = {

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -60,6 +61,7 @@ class Keeper:
         self.node.create_subscription(PointCloud2, "samples", self._on_samples, DEEP)
         self.node.create_subscription(PointCloud2, "predicted_samples", self._on_predicted, DEEP)
         self.node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
+        self._clients: dict[str, Client] = {}
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
@@ -71,6 +73,13 @@ class Keeper:
         self._waveforms[name] = waveform
         self.counts["commands sent"] += 1
         self._sender.publish(command_to_cloud(waveform, sample_period, name, self.node.get_clock().now().to_msg()))
+
+    def client(self, kind: type, name: str) -> Client:
+        """A client of a service, kept for ever: what another thread spins cannot be taken away."""
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, name)
+        self._clients[name].wait_for_service(5.0)
+        return self._clients[name]
 
     def fate(self, name: str) -> str:
         """State of a command; empty before the driver told one."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -118,7 +119,16 @@ class FitProcess:
         self._results.close()
 
 
+def _end_with_parent() -> None:
+    """Also where the node is killed: a fit without anybody to take it would go on for minutes."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
 def _work(answers: Connection, job: Job, path: Path, model: str) -> None:
+    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the node, which ends this process
     try:
         answers.send(job(path, model, lambda word, fraction: answers.send((word, fraction))))

@@ -27,7 +27,7 @@ class Identification:
     """An identification node and what it tells."""
 
     def __init__(self, lab, root):
-        self.lab, self.statuses = lab, lab.listen(DiagnosticStatus, "status", LATCHED)
+        self.lab, self.root, self.statuses = lab, root, lab.listen(DiagnosticStatus, "status", LATCHED)
         self.process = lab.start(NODE, experiment_root=str(root))
         lab.wait(lambda: self.ask("plan").success, "the driver's limits")
 
@@ -41,71 +41,76 @@ class Identification:
         self.lab.wait(reached, f"state {' or '.join(states)}, not {self.statuses[-1:]}")
         return self.statuses[-1]
 
+    def newest(self):
+        """The last recording."""
+        return max(self.root.iterdir())
+
     def limit(self, size):
         """Files of the node may not grow beyond so many bytes from now on."""
         _, hard = resource.prlimit(self.process.pid, resource.RLIMIT_FSIZE)
         resource.prlimit(self.process.pid, resource.RLIMIT_FSIZE, (size, hard))
 
 
-@pytest.fixture
-def driven(lab):
-    lab.driver(sample_period=PERIOD)
-    return lab, lab.streaming()
+@pytest.fixture(scope="module")
+def running(shared_lab):
+    """A driver and an identification node for all tests here."""
+    shared_lab.driver(sample_period=PERIOD)
+    samples = shared_lab.streaming()
+    return shared_lab, samples, Identification(shared_lab, shared_lab.folder / "runs")
 
 
-def test_a_full_disk_ends_the_run_and_not_the_node(driven, tmp_path):
-    lab, samples = driven
-    identification = Identification(lab, tmp_path / "runs")
+def test_a_full_disk_ends_the_run_and_not_the_node(running):
+    lab, samples, identification = running
     identification.limit(ENOUGH)
     assert identification.ask("identify").success
     assert "File too large" in identification.await_state("failed").message
     lab.wait(lambda: all((b.voltage < 1e-3).all() for b in samples.blocks[-50:]), "the safe voltage")
-    path = max((tmp_path / "runs").iterdir())
-    kept = sum(record.size for record in read(path, include=("idle", "hold")))
+    kept = sum(record.size for record in read(identification.newest(), include=("idle", "hold")))
     assert kept * 32 > ENOUGH / 4
     identification.limit(resource.RLIM_INFINITY)
     assert identification.ask("identify").success
     identification.await_state("running")
     assert identification.ask("abort").success
-    assert read(max((tmp_path / "runs").iterdir()), include=("idle", "hold")).records
+    assert read(identification.newest(), include=("idle", "hold")).records
 
 
-def test_where_nothing_may_be_written_nothing_moves(driven):
-    lab, samples = driven
-    identification = Identification(lab, "/proc/runs")
+def test_where_nothing_may_be_written_nothing_moves(running):
+    """A file where the folder was: also root may not write into it."""
+    lab, samples, identification = running
+    identification.root.rename(identification.root.with_name("moved"))
+    identification.root.touch()
+    begin = len(samples.blocks)
     assert identification.ask("identify").success
-    assert "/proc/runs" in identification.await_state("failed").message
-    assert identification.process.is_running
-    assert np.ptp(samples.voltage) < 1e-3
+    assert str(identification.root) in identification.await_state("failed").message
+    lab.wait(lambda: len(samples.blocks) > begin + 20, "blocks after it")
+    assert all(np.ptp(block.voltage) < 1e-3 for block in samples.blocks[begin:])
+    identification.root.unlink()
+    identification.root.with_name("moved").rename(identification.root)
 
 
-def test_parameters_from_outside_choose_no_place(driven, tmp_path):
-    lab, _ = driven
-    (tmp_path / "runs" / "mine").mkdir(parents=True)
-    identification = Identification(lab, tmp_path / "runs")
+def test_parameters_from_outside_choose_no_place(running):
+    lab, _, identification = running
+    root = identification.root
+    (root / "mine").mkdir()
     asked = {
-        ("experiment_root", str(tmp_path)): False,
+        ("experiment_root", str(root.parent)): False,
         ("experiment", "/etc"): False,
-        ("experiment", f"{tmp_path}/runs/../../runs"): False,
-        ("experiment", f"{tmp_path}/runs/absent"): False,
-        ("experiment", f"{tmp_path}/runs/mine"): True,
+        ("experiment", f"{root}/../../runs"): False,
+        ("experiment", f"{root}/absent"): False,
+        ("experiment", f"{root}/mine"): True,
         ("driver", "another"): False,
     }
     for (name, value), wanted in asked.items():
         request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
         answer = lab.call(SetParameters, f"{NODE}/set_parameters", request).results[0]
         assert answer.successful is wanted, (name, value, answer.reason)
-    assert identification.process.is_running
+    (root / "mine").rmdir()
 
 
-def test_killed_while_it_fits_it_takes_the_fit_along_and_starts_again(driven, tmp_path):
-    lab, _ = driven
-    identification = Identification(lab, tmp_path / "runs")
-    assert identification.ask("identify").success
-    identification.await_state("running")
-    recording = max((tmp_path / "runs").iterdir())
-    assert identification.ask("abort").success
-    identification.await_state("aborted")
+@pytest.mark.soak
+def test_killed_while_it_fits_it_takes_the_fit_along_and_starts_again(running):
+    lab, _, identification = running
+    recording = identification.newest()
     request = SetParameters.Request(parameters=[Parameter("experiment", value=str(recording)).to_parameter_msg()])
     assert lab.call(SetParameters, f"{NODE}/set_parameters", request).results[0].successful
     assert identification.ask("diagnose").success
@@ -114,9 +119,10 @@ def test_killed_while_it_fits_it_takes_the_fit_along_and_starts_again(driven, tm
     identification.process.signal(signal.SIGKILL)
     identification.process.wait()
     lab.wait(lambda: not any(alive(fit) for fit in fits), "the end of the fit")
-    again = Identification(lab, tmp_path / "runs")
+    again = Identification(lab, identification.root)
     assert again.ask("identify").success
     again.await_state("running")
+    assert again.ask("abort").success
 
 
 def children(pid):

@@ -3,17 +3,23 @@
 One model node for all tests here, one stream that goes on through all of them and whose index wraps on the way.
 """
 
+import os
+import signal
 import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import String
 
-from piezo_hysteresis.model_file import save
+from piezo_hysteresis.model_file import dumps, save
 from piezo_hysteresis.nodes.conversions import samples_to_cloud, to_stamp, values_of
+from piezo_hysteresis.nodes.quality import LATCHED
 
 from .stream import FALSE, MODEL, PERIOD, SIZE, Stream, foreign, predictions, spoilt, with_bytes
 
@@ -31,10 +37,19 @@ class Bench:
         self.lab, self.stream = lab, Stream(first=2**32 - 120 * SIZE)
         self.clouds = lab.listen(PointCloud2, "predicted_samples", QUALITY)
         self.reports = lab.listen(DiagnosticArray, "/diagnostics", 10)
-        self.node = lab.start("model_node", model_file=str(save(MODEL, lab.folder / "model.yaml")))
+        self._file = str(save(MODEL, lab.folder / "model.yaml"))
+        self.start()
         self.samples = lab.publisher(PointCloud2, "samples", QUALITY)
         lab.wait(lambda: lab.node.count_publishers("predicted_samples") > 0, "predicted_samples")
         lab.wait(self._predicts, "the first prediction")
+
+    def start(self):
+        """Start the node, for the first time or again."""
+        self.node = self.lab.start("model_node", model_file=self._file)
+
+    def told(self):
+        """What was told since the last call of `good`."""
+        return predictions(self.clouds)
 
     def _predicts(self):
         self.send(self.stream.block(resting=True))
@@ -270,3 +285,54 @@ def test_a_stream_that_begins_again_in_a_hold_after_motion(bench):
     bench.send(*(spoilt(b, voltage=np.full(SIZE, 4.0), displacement=np.full(SIZE, 4e-6)) for b in held))
     told = bench.good(bench.stream.blocks(1))
     assert not any(dense for _, dense, _ in told)
+
+
+def asked(bench, name, value):
+    """Whether the node takes a parameter."""
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    return bench.lab.call(SetParameters, "model_node/set_parameters", request).results[0].successful
+
+
+def test_models_many_times_a_second(bench):
+    """On the topic and by parameter, with texts that are no model between them: every block is predicted, and well."""
+    models = bench.lab.node.create_publisher(String, "model", LATCHED)
+    others = [replace(MODEL, provenance={"name": name}) for name in ("one", "other")]
+    files = [str(save(model, bench.lab.folder / f"{k}.yaml")) for k, model in enumerate(others)]
+    sent = []
+    for k in range(30):
+        models.publish(String(data=dumps(others[k % 2]) if k % 3 else "{[" * k))
+        if k % 5 == 0:
+            assert asked(bench, "model_file", files[k % 2])
+        blocks = bench.stream.blocks(2)
+        bench.send(*blocks)
+        sent += blocks
+        time.sleep(0.01)
+    told = bench.good(bench.stream.blocks(1))
+    bench.lab.node.destroy_publisher(models)
+    assert {int(b.index[0]) for b in sent} <= {index for index, *_ in told}
+    assert all(dense and worst < FALSE for _, dense, worst in told)
+
+
+def test_a_storm_of_parameters(bench):
+    pipe = bench.lab.folder / "pipe"
+    os.mkfifo(pipe)
+    wrong = {"model_file": ["", "/dev/zero", "/etc/passwd", str(pipe), "/nowhere", 7, True, [1.0]]}
+    wrong |= {"live_rate": [10.0, float("nan"), "fast"], "nonsense": [1.0], "rms_time": [-1.0]}
+    for name, values in wrong.items():
+        for value in values:
+            assert not asked(bench, name, value), (name, value)
+            assert bench.good(bench.stream.blocks(1))[-1][1]
+
+
+def test_a_killed_model_node_starts_again_in_mid_stream(bench):
+    """Joined in motion: nothing counts until the loops have forgotten."""
+    bench.node.signal(signal.SIGKILL)
+    bench.node.wait()
+    bench.start()
+    told = []
+    bench.send(bench.stream.block())
+    while not any(dense for _, dense, _ in told):
+        told = bench.told()
+        bench.send(bench.stream.block())
+        time.sleep(0.02)
+    assert_flagged(told, told[0][0])

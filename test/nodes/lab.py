@@ -265,7 +265,7 @@ class Lab:
         self.wait(client.service_is_ready, f"the service {service}")
         future = client.call_async(request or kind.Request())
         self.wait(future.done, f"an answer of {service}")
-        self.node.destroy_client(client)
+        self.do(lambda: self.node.destroy_client(client))
         return future.result()
 
     def transition(self, name: str, node: str = "driver_node") -> bool:
@@ -282,7 +282,7 @@ class Lab:
     def forget(self) -> None:
         """Hear nothing more of what was subscribed so far."""
         for subscription in self._heard:
-            self.node.destroy_subscription(subscription)
+            self.do(lambda subscription=subscription: self.node.destroy_subscription(subscription))
         self._heard.clear()
 
     def close(self) -> None:
