@@ -25,6 +25,8 @@ _EXPLAINED = 0.999
 _SURE = 4.0
 _JUMP = 0.3
 _BENT = 0.01
+_SLOW = 20e-3
+"""A drive that turns faster [s] may pass a resonance, behind which a lag of over half a period looks like a lead."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +40,8 @@ class Lag:
     error : float
         Its standard error [s].
     swing : float
-        Usual time between two turning points [s]. What bends the loops (creep, more than two orders of hysteresis)
-        shows as a lag of up to half a per cent of it, never as a lead.
+        Usual time between two turning points [s]. What bends the loops (creep, asymmetry, more than two orders of
+        hysteresis) shows as a lag or a lead of up to one per cent of it.
     """
 
     time: float
@@ -94,10 +96,11 @@ def lag_notice(record: Record) -> list[Notice]:
     if lag is None:
         return []
     samples = f"{abs(lag.time):.3g} s ({abs(lag.time) / record.sample_period:.2g} samples)"
-    if lag.time < -max(_SURE * lag.error, 0.5 * record.sample_period):
+    least = max(_SURE * lag.error, 2.0 * _BENT * lag.swing)
+    if lag.time < -max(least, 0.5 * record.sample_period) and lag.swing > _SLOW:
         text = f"the displacement leads the voltage by {samples}: one channel is shifted in time"
         return [Notice("leads", text, record.phase, severe=True)]
-    if lag.time > max(LATE, _SURE * lag.error, 2.0 * _BENT * lag.swing):
+    if lag.time > max(LATE, least):
         cause = "a slow sensor filter, a channel that is late, or a wrong time base"
         text = f"the displacement follows the voltage by {samples}: {cause}"
         return [Notice("late", text, record.phase)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..record import Experiment, Notice, Record, Samples
 from .channel_defects import channel_defects
-from .lag import lag_notice
+from .lag import lag_notice, lag_of
 from .onset import onset
 from .waveform import phase_name
 
@@ -25,6 +25,7 @@ FAINT = (4e-8, 1e-12)
 _SCALE_MISMATCH = 100.0
 _FREQUENCY_MISMATCH = 0.1
 _MOVING = 0.05
+_LEADS = 4.0
 _SINE = re.compile(r"sine_(\d+(?:\.\d+)?(?:e[+-]?\d+)?)hz")
 
 
@@ -161,7 +162,7 @@ def _polarity_and_lead(moving: list[Record]) -> list[Notice]:
     if falls:
         angle = (angle + 180.0 + 180.0) % 360.0 - 180.0
         notices.append(Notice("polarity", "the displacement falls when the voltage rises", slowest.phase))
-    if angle > 2.0:
+    if angle > _LEADS and lag_of(slowest) is None:
         lead = angle / 360.0 * (1.0 / _fundamental(slowest)[0])
         text = f"the displacement leads the voltage by {angle:.1f}° ({lead:.3g} s): one channel is shifted in time"
         notices.append(Notice("leads", text, slowest.phase, severe=True))

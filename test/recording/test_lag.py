@@ -1,0 +1,65 @@
+"""A lead is a shifted channel; what bends a loop, rings or holds is none."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from piezo_hysteresis.record import Experiment, Record
+from piezo_hysteresis.recording import inspect
+
+PERIOD = 1e-3
+TIME = np.arange(8000) * PERIOD
+
+
+def triangle(amplitudes):
+    return np.repeat(amplitudes, TIME.size // len(amplitudes)) * (1.0 - np.abs(2.0 * np.mod(TIME, 1.0) - 1.0))
+
+
+def loop(voltage, slope, loss, reversal, bend, slant):
+    """Bouc-Wen state with the terms of asymmetric loops, by small steps of the drive."""
+    state, states = 0.0, np.empty(voltage.size)
+    fine = 8
+    for i, (start, stop) in enumerate(zip(voltage[:-1], voltage[1:], strict=True), 1):
+        d = (stop - start) / fine
+        for _ in range(fine):
+            drive = slope * d + bend * d * state + slant * abs(d) * abs(state)
+            state += drive - loss * abs(d) * state - reversal * d * abs(state)
+        states[i] = state
+    states[0] = 0.0
+    return states
+
+
+def told(voltage, displacement, period=PERIOD, phase="triangle"):
+    noise = 1e-9 * np.random.default_rng(0).normal(size=voltage.size)
+    return {n.kind for n in inspect(Experiment((Record(voltage, displacement + noise, period, phase),)))}
+
+
+@pytest.mark.parametrize("amplitudes", [(0.9, 0.9), (0.25, 0.5, 0.7, 0.95), (0.9, 0.6, 0.3, 0.1)])
+@pytest.mark.parametrize(
+    "terms", [(-0.5, 3.0, 0.5, 0.0, 0.0), (0.35, 2.0, 0.3, 0.0, 0.0), (-0.6, 3.5, 1.0, -1.1, -0.8)]
+)
+def test_loops_that_bend_are_no_shifted_channel(amplitudes, terms):
+    voltage = triangle(amplitudes)
+    displacement = 1e-5 * (1.2 * voltage + loop(voltage, *terms))
+    assert not {"leads", "late"} & told(10.0 * voltage, displacement)
+
+
+@pytest.mark.parametrize("shift", [60, 120])
+def test_a_channel_that_is_shifted_by_more_than_its_loops_bend_is_told(shift):
+    voltage = triangle((0.9, 0.9))
+    displacement = 1e-5 * (1.2 * voltage + loop(voltage, -0.5, 3.0, 0.5, 0.0, 0.0))
+    assert "leads" in told(10.0 * voltage[:-shift], displacement[shift:])
+
+
+def test_a_drive_above_the_resonance_does_not_lead():
+    period, resonance = 5e-5, 320.0
+    pole = np.exp(2 * np.pi * resonance * period * (-0.1 + 1j))
+    mode = np.real(np.poly([pole, np.conj(pole)]))
+    voltage = 4.0 * np.sin(2 * np.pi * 400.0 * np.arange(4000) * period)
+    displacement = 1e-6 * lfilter([mode.sum()], mode, np.roll(voltage, 3))
+    assert "leads" not in told(voltage[400:], displacement[400:], period, "sine_400hz")
+
+
+def test_a_staircase_of_block_averages_does_not_lead():
+    voltage = np.repeat([0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0, 5.0, 9.0, 0.0], 200)
+    assert "leads" not in told(voltage, 1e-6 * voltage, 0.1, "staircase")
