@@ -107,7 +107,7 @@ def parameters(text: str, source: str = "parameter file") -> dict[str, dict[str,
     return found
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]
     """Without aliases, as rcl: a few of them in one another stand for a text without end."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:

@@ -108,6 +108,7 @@ class Predictor:
         self.model: Model | None = None
         self._chain: Chain | None = None
         self._warmup: Warmup | None = None
+        self._waiting: Model | None = None
         self._unseen: float | None = None  # travel [V] at which the drive was last unknown
         self._joined_unseen = False
         self._window = max(ZERO_SAMPLES, round(ZERO_TIME / sample_period))
@@ -124,7 +125,7 @@ class Predictor:
     @property
     def is_swapping(self) -> bool:
         """True while a new model is being run over the history."""
-        return self._warmup is not None
+        return self._warmup is not None or self._waiting is not None
 
     @property
     def warming_up(self) -> bool:
@@ -143,6 +144,9 @@ class Predictor:
     def swap(self, model: Model) -> None:
         """Let another model take over as soon as it has been run over the history.
 
+        While one is on its way, the newest of the others waits until that one has taken over: models that come faster
+        than they can be run over the history hold up none.
+
         Raises
         ------
         ModelError
@@ -150,8 +154,11 @@ class Predictor:
         DivergenceError
             If it runs away on the history; the present one goes on.
         """
+        chain = chain_at(model, self.sample_period)
         if self._history.count == 0:
-            self._chain, self.model = chain_at(model, self.sample_period), model
+            self._chain, self.model = chain, model
+        elif self._warmup is not None:
+            self._waiting = model
         else:
             self._warmup = Warmup(model, self._history, self._zero)
             self._warm(PIECE)
@@ -220,7 +227,8 @@ class Predictor:
         return answer
 
     def _begin(self) -> None:
-        newest = self._warmup.model if self._warmup is not None else self.model
+        newest = self._waiting or (self._warmup.model if self._warmup is not None else self.model)
+        self._waiting = None
         self._history = VoltageHistory(self.sample_period)
         self._state: ChainState | None = None
         self._warmup = None
@@ -272,6 +280,9 @@ class Predictor:
             self._squares.popleft()
 
     def _warm(self, values: int) -> None:
+        if self._warmup is None and self._waiting is not None:
+            waiting, self._waiting = self._waiting, None
+            self._warmup = Warmup(waiting, self._history, self._zero)
         if self._warmup is None:
             return
         warmup, self._warmup = self._warmup, None

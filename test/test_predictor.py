@@ -82,6 +82,26 @@ def test_a_model_swapped_in_mid_sine_is_right_at_once() -> None:
     assert np.abs(residual(before)[20_000:]).max() > 0.01 * stroke
 
 
+def test_models_that_come_faster_than_they_warm_up_take_over_in_turn() -> None:
+    voltage = sine(300_000, rest=1000)
+    measured = truth(MODEL, voltage)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage, measured, 5000)
+    end, tail = voltage.size, voltage[1000:31_000]
+    models = [MODEL.with_values({"bouc_wen.p2": 1.0 + k / 1000}) for k in range(tail.size // 500)]
+    taken = []
+    for k, model in enumerate(models):
+        predictor.swap(model)
+        cut = slice(500 * k, 500 * (k + 1))
+        index = (end + 500 * k) % 2**32
+        taken.append(predictor.predict(index, round(index * PERIOD * 1e9), tail[cut], tail[cut] * 1e-6).model)
+    assert len({id(model) for model in taken}) > 3
+    while predictor.is_swapping:
+        end += 500
+        predictor.predict(end + tail.size, round((end + tail.size) * PERIOD * 1e9), tail[:500], tail[:500])
+    assert predictor.model is models[-1]
+
+
 def test_a_swap_near_the_beginning_is_immediate() -> None:
     voltage = sine(3000, rest=1000)
     measured = truth(OTHER, voltage) - 7e-6
