@@ -17,8 +17,9 @@ from ..effects import Arx, BoucWen, Effect, MainsHum
 from ..effects.extent import Extent
 from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ..identification.content import content_of
+from ..identification.dynamics import identify_arx
 from ..identification.fit import Fit, fit, gauge
-from ..identification.linear_start import dynamics_behind, with_dynamics
+from ..identification.linear_start import dynamics_behind, hysteresis_signals, with_dynamics
 from ..identification.normal_equations import Gram, Nuisance, grams
 from ..model import Model
 from ..record import Record
@@ -26,6 +27,10 @@ from .held_out import Score, held_out
 
 Array = NDArray[np.float64]
 
+LINEAR = ("lag", "dynamics")
+"""Families that dynamics of an order high enough can hold."""
+IMITATIONS = 8
+"""Steiglitz-McBride iterations with which dynamics imitate others."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at which a refit has converged."""
 
@@ -268,10 +273,35 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
     evidence = candidate.evidence
     if candidate.name == MainsHum.name:
         evidence = replace(evidence, nuisance=replace(evidence.nuisance, hum_frequency=None))
+    starts = [model]
+    if candidate.effect.family in LINEAR and (absorbed := _absorbed(model, candidate.fit.model, evidence)) is not None:
+        starts.append(absorbed)
+    found = []
+    for start in starts:
+        try:
+            fitted = _joint(start, evidence, max_iterations)
+            found.append(Fitted(fitted.model, score_model(fitted.model, evidence)))
+        except (DivergenceError, ParameterError, ModelError, IdentificationError):
+            continue
+    return min(found, key=lambda f: f.score.cost, default=None)
+
+
+def _absorbed(model: Model, extended: Model, evidence: Evidence) -> Model | None:
+    """The model with dynamics that imitate those of `extended`, which has one more linear effect; None without records.
+
+    A joint fit may have stopped before its G held a mode that it has room for: what G can hold is no missing effect.
+    """
+    broadband, arx = evidence.broadband(), model["arx"]
+    if not broadband or not isinstance(arx, Arx):
+        return None
+    inputs = hysteresis_signals(model, evidence.records, broadband)
+    outputs = extended.simulate(evidence.records)
+    signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
     try:
-        fitted = _joint(model, evidence, max_iterations)
-        return Fitted(fitted.model, score_model(fitted.model, evidence))
-    except (DivergenceError, ParameterError, ModelError, IdentificationError):
+        orders = (arx.array("a").size, arx.array("b").size)
+        found = identify_arx(signals, round(arx["delay"]), model.sample_period, orders, IMITATIONS)
+        return with_dynamics(model, found.arx)
+    except (IdentificationError, ParameterError, DivergenceError):
         return None
 
 

@@ -120,7 +120,8 @@ def diagnose(
     tell("gap", 0.85)
     named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED
     whole = tuple(select_records(shortened(records, FITTED), least.tolist(), fitted)[0])
-    first = _joint(baseline.model, replace(evidence, records=whole))
+    plain = baseline.model if selection.accepted else selection.model  # the search may have found better dynamics
+    first = _joint(plain, replace(evidence, records=whole))
     final_evidence = selection.accepted[-1].best.evidence if named else evidence
     final = _joint(selection.model, replace(final_evidence, records=whole)) if named else first
     chosen = spared or tuple(fitted)
