@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.stage.gcs2.array import GcsArray
+from piezo_hysteresis.stage.gcs2.axis import NEEDED
 from piezo_hysteresis.stage.gcs2.client import Client
 from piezo_hysteresis.stage.gcs2.connection import Connection
 from piezo_hysteresis.stage.gcs2.emulator import answer
@@ -157,7 +158,8 @@ def served(controller):
         yield server
 
 
-MNEMONICS = st.sampled_from(sorted({*Controller(SimulatedStage(sample_period=50e-6))._commands, "ERR?", "MOV", *BYTES}))
+OTHERS = "ERR? MOV HLP? CSV? HPA? *IDN? DRC? DRT DRT? GWD? HDR? OVF? PUN? RTR? SPA SVA? TMN? TMX? WGR WGO? WMS? WSL?"
+MNEMONICS = st.sampled_from([*NEEDED, *OTHERS.split(), *BYTES])
 COMMANDS = st.one_of(
     st.tuples(MNEMONICS, st.lists(WORDS, max_size=6)).map(lambda c: " ".join((c[0], *c[1]))), st.text()
 )
