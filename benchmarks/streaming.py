@@ -3,7 +3,7 @@
 The driver plays sines and slow loops without a pause; this process is the recorder and writes every topic to a bag, in
 which the samples are counted afterwards. Latency counts from the last sample of a block to its residual in the
 recorder's hands. The exit code is 1 where a sample is missing, doubled, or was played at another voltage than was
-commanded.
+commanded, up to 500 kHz; beyond, the highest rate is sought that loses nothing.
 
     python -m benchmarks.streaming --rate 50e3 200e3 --seconds 30
 """
@@ -15,115 +15,38 @@ import os
 import resource
 import tempfile
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import rclpy
-from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
 
 from benchmarks.figures import Cell, Figures, alone
 from benchmarks.simulation import ARX
+from benchmarks.stream_recorder import Command, StreamRecorder
 from examples.demo.processes import Processes
 from piezo_hysteresis.effects import BoucWen
 from piezo_hysteresis.identification.drive import DriveLimits
 from piezo_hysteresis.identification.excitation import sine, triangle
 from piezo_hysteresis.model import Model
 from piezo_hysteresis.model_file import save
-from piezo_hysteresis.nodes.bag_recorder import BagRecorder
 from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import command_to_cloud, from_stamp, values_of
-from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
+from piezo_hysteresis.nodes.conversions import from_stamp
 from piezo_hysteresis.recording.bag import Bag
 
-NAMESPACE = "/bench"
 NODES = ("driver_node", "model_node")
 LONGEST = 500_000
 """Samples of a command at most."""
-PATIENCE = 60.0
-CATCH_UP = 5.0
-"""What the model node may be behind at the end [s]; what comes later counts as lost."""
+PROMISED = 500e3
+"""Rate up to which a lost sample is a failure [Hz]."""
+FASTER = 2.0**0.5
+"""Step of the search for the highest rate."""
 STEP = 20.0 / 2**16
 """Of the 16-bit converter of the simulated stage [V]: the recording holds what was applied."""
-
-
-@dataclass
-class Command:
-    """A waveform that was played, and the index of its first sample."""
-
-    voltage: np.ndarray
-    first: int
-
-
-class Recorder:
-    """The third process: sends waveforms, and records everything.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        For the bag.
-    check : callable
-        Raises where a node has ended.
-    """
-
-    def __init__(self, folder: Path, check: Callable[[], None]) -> None:
-        self._check = check
-        self._node = Node("recorder", namespace=NAMESPACE)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._ended: dict[str, dict[str, str]] = {}
-        self._command = self._node.create_publisher(PointCloud2, "command", COMMAND)
-        self._node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
-        self.bag = BagRecorder(self._node, folder)
-
-    def _on_status(self, status: DiagnosticStatus) -> None:
-        told = values_of(status)
-        if told["state"] in ("refused", "stopped", "done"):
-            self._ended[status.name] = {**told, "reason": status.message}
-
-    def wait(self, done: Callable[[], bool], what: str, timeout: float = PATIENCE) -> None:
-        """Spin until `done`."""
-        end = time.monotonic() + timeout
-        while not done():
-            self._executor.spin_once(timeout_sec=0.02)
-            if time.monotonic() > end:
-                raise TimeoutError(f"{what}: nothing after {timeout:g} s")
-            self._check()
-
-    def pause(self, duration: float) -> None:
-        """Spin for a while [s]."""
-        end = time.monotonic() + duration
-        self.wait(lambda: time.monotonic() > end, "the end of a pause", duration + PATIENCE)
-
-    def play(self, voltage: np.ndarray, sample_period: float, name: str) -> Command:
-        """Have a waveform played to its end."""
-        stamp = self._node.get_clock().now().to_msg()
-        self._command.publish(command_to_cloud(voltage, sample_period, name, stamp))
-        self.wait(lambda: name in self._ended, f"the end of {name}", voltage.size * sample_period + PATIENCE)
-        told = self._ended[name]
-        if told["state"] != "done":
-            raise RuntimeError(f"the driver did not play {name}: {told['reason']}")
-        return Command(voltage, int(told["first_index"]))
-
-    def follow(self, command: Command) -> None:
-        """Spin until the samples of a command have been recorded and the model node had its time to catch up."""
-        last = (command.first + command.voltage.size - 1) % 2**32
-        self.wait(lambda: self.bag.holds(last), "the last sample")
-        caught_up, end = self.bag.counts["samples"], time.monotonic() + CATCH_UP
-        while self.bag.counts["predicted_samples"] < caught_up and time.monotonic() < end:
-            self.pause(0.1)
-
-    def close(self) -> None:
-        """End the bag and leave the graph."""
-        self.bag.close()
-        self._node.destroy_node()
 
 
 def waveform(rate: float, duration: float) -> np.ndarray:
@@ -147,47 +70,67 @@ def memory(pid: int) -> float:
     return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024
 
 
-def stream(rate: float, duration: float, folder: Path) -> tuple[dict[str, Cell], list[str]]:
+def stream(rate: float, duration: float, folder: Path, axes: int = 1) -> tuple[dict[str, Cell], list[str]]:
     """Figures by name, and the promises that were not kept."""
     period = 1.0 / rate
     voltage = waveform(rate, min(duration, LONGEST / rate))
     save(Model((BoucWen(), ARX), period, 10.0, 3e-5), folder / "model.yaml")
     with ExitStack() as stack:
-        processes = stack.enter_context(Processes(NAMESPACE, folder / "log"))
-        processes.start("driver_node", sample_period=f"{period:.12f}", discovery_time=0.1)
-        processes.start("model_node", model_file=folder / "model.yaml")
-        recorder = Recorder(folder / "bag", processes.check)
-        stack.callback(recorder.close)
-        recorder.wait(lambda: recorder.bag.counts["predicted_samples"] > 0, "the first prediction")
-        recorder.pause(2.0)
-        ids = [processes.ids[name] for name in NODES]
-        begin, spent, own = time.monotonic(), [processor_time(i) for i in ids], time.process_time()
-        commands: list[Command] = []
+        executor, recorders, ids = SingleThreadedExecutor(), list[StreamRecorder](), dict[str, list[int]]()
+        for axis in range(axes):
+            processes = stack.enter_context(Processes(f"/bench_{axis}", folder / f"log_{axis}"))
+            processes.start("driver_node", sample_period=f"{period:.12f}", discovery_time=0.1)
+            processes.start("model_node", model_file=folder / "model.yaml")
+            recorder = StreamRecorder(f"/bench_{axis}", folder / f"bag_{axis}", executor, processes.check)
+            stack.callback(recorder.close)
+            recorders.append(recorder)
+            for name in NODES:
+                ids.setdefault(name, []).append(processes.ids[name])
+        for recorder in recorders:
+            recorder.wait(lambda bag=recorder.bag: bag.counts["predicted_samples"] > 0, "the first prediction")
+        recorders[0].pause(2.0)
+        begin, own = time.monotonic(), time.process_time()
+        spent = {name: sum(map(processor_time, ids[name])) for name in NODES}
+        commands: list[list[Command]] = [[] for _ in recorders]
         while time.monotonic() < begin + duration:
-            commands.append(recorder.play(voltage, period, f"stream_{len(commands)}"))
+            name = f"stream_{len(commands[0])}"
+            for recorder in recorders:
+                recorder.send(voltage, period, name)
+            for recorder, played in zip(recorders, commands, strict=True):
+                played.append(recorder.played(voltage, period, name))
         elapsed = time.monotonic() - begin
-        shares = [100 * (processor_time(i) - s) / elapsed for i, s in zip(ids, spent, strict=True)]
+        shares = [100 * (sum(map(processor_time, ids[name])) - spent[name]) / elapsed for name in NODES]
         shares.append(100 * (time.process_time() - own) / elapsed)
-        recorder.follow(commands[-1])
-        sizes = [memory(i) for i in ids] + [resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]
-    figures, failures = count(folder / "bag", commands)
+        for recorder, played in zip(recorders, commands, strict=True):
+            recorder.follow(played[-1])
+        sizes = [max(map(memory, ids[name])) for name in NODES]
+        sizes.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    counted = [count(folder / f"bag_{axis}", commands[axis], f"/bench_{axis}") for axis in range(axes)]
+    figures = {name: _over_axes(name, [one[name] for one, _ in counted]) for name in counted[0][0]}
     names = ("driver", "model node", "recorder")
     figures = {
         "rate, kHz": rate / 1e3,
+        "axes": axes,
         "time, s": elapsed,
         **figures,
         **{f"CPU of {name}, % of a core": share for name, share in zip(names, shares, strict=True)},
-        "CPU of all three, % of a core": sum(shares),
+        "CPU of all, % of a core": sum(shares),
         **{f"memory of {name}, MB": size for name, size in zip(names, sizes, strict=True)},
     }
-    return figures, [f"{rate / 1e3:g} kHz: {failure}" for failure in failures]
+    return figures, [f"{rate / 1e3:g} kHz: {failure}" for _, told in counted for failure in told]
 
 
-def count(bag: Path, commands: list[Command]) -> tuple[dict[str, Cell], list[str]]:
+def _over_axes(name: str, values: list[Cell]) -> Cell:
+    """Latencies of the worst axis, and samples of all."""
+    numbers = [value for value in values if isinstance(value, int | float)]
+    return max(numbers) if name.startswith("latency") else sum(numbers)
+
+
+def count(bag: Path, commands: list[Command], namespace: str) -> tuple[dict[str, Cell], list[str]]:
     """Samples sent, received and predicted, latencies, and what is wrong with them."""
     first, last = commands[0].first, commands[-1].first + commands[-1].voltage.size - 1
     sent = (last - first) % 2**32 + 1
-    topics = {f"{NAMESPACE}/{name}": name for name in ("samples", "predicted_samples")}
+    topics = {f"{namespace}/{name}": name for name in ("samples", "predicted_samples")}
     places: dict[str, list[np.ndarray]] = {name: [] for name in topics.values()}
     voltages, latencies = [], []
     for message in Bag(bag).messages(topics):
@@ -227,29 +170,54 @@ def count(bag: Path, commands: list[Command]) -> tuple[dict[str, Cell], list[str
     }, failures
 
 
+def highest(fastest: float, duration: float) -> tuple[float, float]:
+    """Highest rate that lost nothing, and the lowest that did or could not be set up [Hz]."""
+    rate = fastest
+    while True:
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                _, failed = stream(rate, duration, Path(folder))
+            except (RuntimeError, TimeoutError):
+                failed = ["not played"]
+        if failed:
+            return (rate / FASTER if rate > fastest else 0.0), rate
+        rate *= FASTER
+
+
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
-    parser.add_argument("--rate", type=float, nargs="+", default=[50e3], help="samples per second")
-    parser.add_argument("--seconds", type=float, default=30.0, help="of every rate")
+    parser.add_argument("--rate", type=float, nargs="+", default=[50e3, 200e3, 500e3, 1e6], help="samples per second")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of the first rate; 8 of the others")
+    parser.add_argument("--axes", type=int, default=2, help="at once, at the first rate; 1 leaves it out")
+    parser.add_argument("--no-search", action="store_true", help="do not seek the highest rate")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
-    """One table, a column for every rate."""
+    """A column for every rate, one for several axes, and the highest rate."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    short = min(8.0, options.seconds)
+    cases = [(rate, short if k else options.seconds, 1) for k, rate in enumerate(options.rate)]
+    if options.axes > 1:
+        cases.append((options.rate[0], short, options.axes))
     columns: list[dict[str, Cell]] = []
     failures: list[str] = []
+    tables = []
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
-        for rate in options.rate:
+        for rate, duration, axes in cases:
             with tempfile.TemporaryDirectory() as folder:
-                column, failed = stream(rate, options.seconds, Path(folder))
+                column, failed = stream(rate, duration, Path(folder), axes)
             columns.append(column)
-            failures += failed
+            failures += failed if rate <= PROMISED else []
+        if not options.no_search:
+            held, lost = highest(max(options.rate), short)
+            tables.append(Figures("Highest rate", ("holds, kHz", "does not hold, kHz"), [(held / 1e3, lost / 1e3)]))
     finally:
         rclpy.try_shutdown()
     head, *rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
     heads = (str(head[0]), *(f"{rate:g}" for rate in head[1:]))
-    return [Figures("Streaming: driver → model node → recorder, three processes", heads, rows, tuple(failures))]
+    title = "Streaming: driver → model node → recorder, three processes"
+    return [Figures(title, heads, rows, tuple(failures)), *tables]
 
 
 if __name__ == "__main__":
