@@ -38,8 +38,6 @@ def told(voltage, displacement, period=PERIOD, phase="triangle"):
 @pytest.mark.parametrize(
     "terms", [(-0.5, 3.0, 0.5, 0.0, 0.0), (0.35, 2.0, 0.3, 0.0, 0.0), (-0.6, 3.5, 1.0, -1.1, -0.8)]
 )
-    "terms", [(-0.5, 3.0, 0.5, 0.0, 0.0), (0.35, 2.0, 0.3, 0.0, 0.0), (-0.6, 3.5, 1.0, -1.1, -0.8)]
-)
 def test_loops_that_bend_are_no_shifted_channel(amplitudes, terms):
     voltage = triangle(amplitudes)
     displacement = 1e-5 * (1.2 * voltage + loop(voltage, *terms))
