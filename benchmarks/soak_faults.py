@@ -80,9 +80,8 @@ def kill_recorder(bench: Bench) -> None:
 
 def flood_of_commands(bench: Bench) -> None:
     """Waveforms and set-points without sense, a hundred of each."""
-    command = bench.keeper.node.create_publisher(PointCloud2, "command", COMMAND)
-    ask = bench.keeper.node.create_publisher(Float64, "set_voltage", COMMAND)
-    time.sleep(0.5)
+    command = bench.keeper.publisher(PointCloud2, "command", COMMAND)
+    ask = bench.keeper.publisher(Float64, "set_voltage", COMMAND)
     noise = np.random.default_rng(bench.chance.getrandbits(32))
     for _ in range(100):
         wave = noise.uniform(-2, 12, 200)
@@ -91,22 +90,16 @@ def flood_of_commands(bench: Bench) -> None:
         cloud.header.stamp.nanosec = int(noise.choice([0, 1, 2**32 - 1]))
         command.publish(cloud)
         ask.publish(Float64(data=float(noise.choice([np.nan, -np.inf, 1e300, 10.5, -0.1]))))
-    time.sleep(0.3)
-    bench.keeper.node.destroy_publisher(command)
-    bench.keeper.node.destroy_publisher(ask)
 
 
 def broken_blocks(bench: Bench) -> None:
     """Messages on `samples` that are none."""
-    samples = bench.keeper.node.create_publisher(PointCloud2, "samples", RELIABLE)
-    time.sleep(0.5)
+    samples = bench.keeper.publisher(PointCloud2, "samples", RELIABLE)
     for _ in range(50):
         cloud = command_to_cloud(np.zeros(500), bench.sample_period, "x" * bench.chance.randrange(2000))
         cloud.width = bench.chance.choice([0, 1, 500, 2**32 - 1])
         cloud.header.stamp.nanosec = bench.chance.choice([0, 2**32 - 1])
         samples.publish(cloud)
-    time.sleep(0.3)
-    bench.keeper.node.destroy_publisher(samples)
 
 
 def storm_of_parameters(bench: Bench) -> None:
@@ -123,15 +116,12 @@ def storm_of_parameters(bench: Bench) -> None:
 
 def models_ten_times_a_second(bench: Bench) -> None:
     """Two models in turn on `model`, with texts that are none between them."""
-    models = bench.keeper.node.create_publisher(String, "model", LATCHED)
-    time.sleep(0.3)
+    models = bench.keeper.publisher(String, "model", LATCHED)
     for k in range(21):
         models.publish(String(data=bench.models[k % 2]))
         models.publish(String(data="model: [" * bench.chance.randrange(2000)))
         time.sleep(0.1)
     models.publish(String(data=bench.models[0]))
-    time.sleep(0.3)
-    bench.keeper.node.destroy_publisher(models)
 
 
 def slow_subscriber(bench: Bench) -> None:
@@ -148,13 +138,11 @@ def slow_subscriber(bench: Bench) -> None:
 
 
 def foreign_topics(bench: Bench) -> None:
-    """Two hundred publishers of other names come and go."""
-    node = bench.keeper.node
-    publishers = [node.create_publisher(String, f"/foreign_{k}/samples", 10) for k in range(200)]
-    for publisher in publishers:
-        publisher.publish(String(data="x" * 1000))
-    for publisher in publishers:
-        node.destroy_publisher(publisher)
+    """Two hundred publishers of other names come and go, with the node that has them."""
+    node = Node("foreign")
+    for k in range(200):
+        node.create_publisher(String, f"/foreign_{k}/samples", 10).publish(String(data="x" * 1000))
+    node.destroy_node()
 
 
 def stop(bench: Bench) -> None:

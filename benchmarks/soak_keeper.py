@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
@@ -62,6 +64,7 @@ class Keeper:
         self.node.create_subscription(PointCloud2, "predicted_samples", self._on_predicted, DEEP)
         self.node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
         self._clients: dict[str, Client] = {}
+        self._publishers: dict[str, Publisher] = {}
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
@@ -80,6 +83,13 @@ class Keeper:
             self._clients[name] = self.node.create_client(kind, name)
         self._clients[name].wait_for_service(5.0)
         return self._clients[name]
+
+    def publisher(self, kind: type, name: str, quality: QoSProfile) -> Publisher:
+        """A publisher on a topic, kept for ever, that has had time to be found."""
+        if name not in self._publishers:
+            self._publishers[name] = self.node.create_publisher(kind, name, quality)
+            time.sleep(0.5)
+        return self._publishers[name]
 
     def fate(self, name: str) -> str:
         """State of a command; empty before the driver told one."""

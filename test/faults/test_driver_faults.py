@@ -129,8 +129,7 @@ def test_floods_of_everything_at_once(lab, log):
     np.testing.assert_allclose(so_far.voltage[inside], WAVE[so_far.place()[inside] - first], atol=2e-4)
     assert inside.sum() + so_far.lost >= WAVE.size
     assert driver.is_running
-    for publisher in foreign:
-        lab.node.destroy_publisher(publisher)
+    lab.do(lambda: [lab.node.destroy_publisher(publisher) for publisher in foreign])
     assert len(driver.output) < 100_000
 
 

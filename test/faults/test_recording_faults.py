@@ -59,12 +59,19 @@ def running(shared_lab):
     return shared_lab, samples, Identification(shared_lab, shared_lab.folder / "runs")
 
 
+def at_rest(lab, samples):
+    """Wait for half a second at the safe voltage."""
+    begin = len(samples.blocks)
+    lab.wait(lambda: len(samples.blocks) > begin + 50, "half a second")
+    lab.wait(lambda: all((b.voltage < 1e-3).all() for b in samples.blocks[-50:]), "the safe voltage")
+
+
 def test_a_full_disk_ends_the_run_and_not_the_node(running):
     lab, samples, identification = running
     identification.limit(ENOUGH)
     assert identification.ask("identify").success
     assert "File too large" in identification.await_state("failed").message
-    lab.wait(lambda: all((b.voltage < 1e-3).all() for b in samples.blocks[-50:]), "the safe voltage")
+    at_rest(lab, samples)
     kept = sum(record.size for record in read(identification.newest(), include=("idle", "hold")))
     assert kept * 32 > ENOUGH / 4
     identification.limit(resource.RLIM_INFINITY)
@@ -77,15 +84,18 @@ def test_a_full_disk_ends_the_run_and_not_the_node(running):
 def test_where_nothing_may_be_written_nothing_moves(running):
     """A file where the folder was: also root may not write into it."""
     lab, samples, identification = running
+    at_rest(lab, samples)
     identification.root.rename(identification.root.with_name("moved"))
     identification.root.touch()
     begin = len(samples.blocks)
-    assert identification.ask("identify").success
-    assert str(identification.root) in identification.await_state("failed").message
+    try:
+        assert identification.ask("identify").success
+        assert str(identification.root) in identification.await_state("failed").message
+    finally:
+        identification.root.unlink()
+        identification.root.with_name("moved").rename(identification.root)
     lab.wait(lambda: len(samples.blocks) > begin + 20, "blocks after it")
     assert all(np.ptp(block.voltage) < 1e-3 for block in samples.blocks[begin:])
-    identification.root.unlink()
-    identification.root.with_name("moved").rename(identification.root)
 
 
 def test_parameters_from_outside_choose_no_place(running):

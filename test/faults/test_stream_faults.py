@@ -308,7 +308,7 @@ def test_models_many_times_a_second(bench):
         sent += blocks
         time.sleep(0.01)
     told = bench.good(bench.stream.blocks(1))
-    bench.lab.node.destroy_publisher(models)
+    bench.lab.do(lambda: bench.lab.node.destroy_publisher(models))
     assert {int(b.index[0]) for b in sent} <= {index for index, *_ in told}
     assert all(dense and worst < FALSE for _, dense, worst in told)
 
