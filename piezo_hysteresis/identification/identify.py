@@ -34,6 +34,8 @@ from .three_steps import ThreeSteps, three_steps
 
 ADEQUATE = 3e-4
 """Share of the range below which a residual does not decide: no lab needs better."""
+FEWEST_SAMPLES = 32
+"""Shortest record that can show a loop."""
 HIGHEST_ORDER = 10
 """Highest order of the comparison."""
 
@@ -96,7 +98,14 @@ def identify(
     roles = roles_of(experiment, held_out)
     if not any(roles.contents[i].span > 0.0 for i in roles.fitted):
         raise IdentificationError("identify: the drive does not move in any record; expected loops, steps or noise")
+    longest = max(records[i].size for i in roles.fitted if roles.contents[i].span > 0.0)
+    if longest < FEWEST_SAMPLES:
+        raise IdentificationError(
+            f"identify: got {longest} samples in the longest record that moves, expected {FEWEST_SAMPLES} or more"
+        )
     reach = max(float(np.ptp(r.displacement)) for r in records)
+    if reach == 0.0:
+        raise IdentificationError("identify: the displacement never changes; expected that of a stage that is driven")
     scale_v = voltage_scale or max(float(np.max(np.abs(r.voltage))) for r in records)
     scale_y = displacement_scale or reach
     floors = [max(c.noise, ADEQUATE * reach) for c in roles.contents]

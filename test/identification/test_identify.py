@@ -157,6 +157,13 @@ def test_without_motion_the_error_says_what_is_missing(voltage):
         identify(Experiment((Record(voltage, np.zeros(1000), 1e-3),)))
 
 
+@pytest.mark.parametrize(("size", "gain", "told"), [(1000, 0.0, "never changes"), (5, 1e-6, "got 5 samples in")])
+def test_a_dead_sensor_or_a_few_samples_are_named(size, gain, told):
+    voltage = np.linspace(0.0, 9.0, size)
+    with pytest.raises(IdentificationError, match=told):
+        identify(Experiment((Record(voltage, gain * voltage, 1e-3),)))
+
+
 def test_a_record_that_begins_in_the_middle_counts_from_its_first_full_loop():
     time = 1e-3 * np.arange(6000)
     slow = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=2.0)), 1e-3, 10.0, 1e-5)
