@@ -123,7 +123,7 @@ def test_a_card_that_streams(lab):
     with NiServer(card) as server:
         wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1"}
         wiring |= {"nidaqmx__voltage_input": "ai1", "nidaqmx__lead": 1.5, "sample_period": PERIOD}
-        driven = Driven(lab, "nidaqmx", block_duration=0.05, **wiring)
+        driven = Driven(lab, "nidaqmx", block_duration=0.1, **wiring)
         assert driven.in_force("stage").endswith("Dev1/ao0")
 
         drive = hill(5.0, 9000)
@@ -163,7 +163,7 @@ def emulated_card():
             "stage": "nidaqmx",
             "nidaqmx__voltage_input": "ai1",
             "sample_period": PERIOD,
-            "block_duration": 0.05,
+            "block_duration": 0.2,
             **wiring,
         }
 
