@@ -19,7 +19,7 @@ from ..identification.roles import CARRYING
 from ..model import Model
 from ..record import Experiment, Notice, Record
 from .baseline import start_model
-from .candidates import Evidence, free_numbers, score_model
+from .candidates import Evidence, free_numbers, restart, score_model
 from .diagnosis import Diagnosis, Verdict
 from .few_records import diagnose_few
 from .gap import Gap, measure_gap
@@ -38,6 +38,10 @@ FEWEST = 4
 """Records below which none can be held out and no name is given."""
 SEARCHED, FITTED = 6_000, 50_000
 """Samples of a fast record that take part in the search, and in the last fit."""
+LAST = 25
+"""Linearisations of the last fit."""
+NOISY, WORTHWHILE = 1.1, 0.95
+"""Cost over that of noise from which it is begun anew, and share of it that may be left for another time."""
 FALLS = 0.95
 """Share of the gap on records set aside that may remain after an effect is named."""
 MOVES = 30.0
@@ -123,7 +127,7 @@ def diagnose(
     plain = baseline.model if selection.accepted else selection.model  # the search may have found better dynamics
     first = _joint(plain, replace(evidence, records=whole))
     final_evidence = selection.accepted[-1].best.evidence if named else evidence
-    final = _joint(selection.model, replace(final_evidence, records=whole)) if named else first
+    final = _finished(selection, replace(final_evidence, records=whole), null) if named else first
     chosen = spared or tuple(fitted)
 
     def gap_of(last: Fit, nuisance: Nuisance) -> Gap:
@@ -199,9 +203,21 @@ def _joint(model: Model, evidence: Evidence) -> Fit:
         free_numbers(model, evidence.nuisance),
         floors=evidence.floors.tolist(),
         nuisance=evidence.nuisance,
-        max_iterations=25,
+        max_iterations=LAST,
         tolerance=1e-4,
     )
+
+
+def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:
+    """The last fit, on all samples, begun anew behind new dynamics while that helps."""
+    final = _joint(selection.model, evidence)
+    last = selection.accepted[-1].best
+    while final.cost > NOISY * null:
+        anew = restart(replace(last, effect=final.model[last.name], evidence=evidence, fit=final), LAST).fit
+        if anew is None or anew.cost > WORTHWHILE * final.cost:
+            break
+        final = anew
+    return final
 
 
 def _exact(model: Model) -> Model:

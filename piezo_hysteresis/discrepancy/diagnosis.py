@@ -122,6 +122,20 @@ class Diagnosis:
                 rows[parameter] = {"value": value, "interval_95": interval, "unit": row.unit}
         return rows
 
+    def _gap(self) -> dict[str, Any]:
+        gap = self.gap
+        return {
+            "before": None if gap is None else gap.before,
+            "after": None if gap is None else gap.after,
+            "floor": None if gap is None else gap.floor,
+            "after_interval_95": None if gap is None else list(gap.interval_95),
+            "unseen": False if gap is None else gap.unseen,
+            "per_phase": {
+                f"{p.index:02d}_{p.phase}": {"before": p.before, "after": p.after, "floor": p.floor}
+                for p in (() if gap is None else gap.per_phase)
+            },
+        }
+
     def answer(self, model_file: str = "") -> dict[str, Any]:
         """The answer in its stable, versioned form.
 
@@ -130,26 +144,13 @@ class Diagnosis:
         model_file : str
             Where the extended model was written.
         """
-        gap = self.gap
         return {
             "schema": SCHEMA,
             "verdict": str(self.verdict),
             "reason": self.reason,
             "effects": self.effects(),
             "where": [{"axis": p.axis, "share": round(p.share, 4), "detail": p.detail} for p in self.where],
-            "gap_percent_of_range": None
-            if gap is None
-            else {
-                "before": gap.before,
-                "after": gap.after,
-                "floor": gap.floor,
-                "after_interval_95": list(gap.interval_95),
-                "unseen": gap.unseen,
-                "per_phase": {
-                    f"{p.index:02d}_{p.phase}": {"before": p.before, "after": p.after, "floor": p.floor}
-                    for p in gap.per_phase
-                },
-            },
+            "gap_percent_of_range": self._gap(),
             "rejected": [{"name": r.name, "reason": r.reason} for r in self.rejected],
             "next_experiment": None
             if self.next_experiment is None

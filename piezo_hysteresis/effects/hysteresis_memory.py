@@ -127,7 +127,7 @@ class HysteresisMemoryBlock(Block):
         return x0 - self.virgin * np.clip(x0, -self.radii, self.radii)
 
     def _rest_slopes(self, x0: float) -> Array:
-        return 1.0 - self.virgin * (abs(x0) < self.radii)
+        return np.asarray(1.0 - self.virgin * (abs(x0) < self.radii))
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         y, state = np.empty_like(x), state.copy()
