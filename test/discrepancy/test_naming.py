@@ -115,6 +115,9 @@ def test_severe_damage_forbids_a_verdict():
     assert found.verdict is Verdict.UNKNOWN
     assert notice.message in found.reason
     assert found.answer()["data_quality"][0]["severe"] is True
+    gap = found.answer()["gap_percent_of_range"]
+    assert gap["before"] is None
+    assert gap["per_phase"] == {}
 
 
 def test_a_stage_that_was_not_driven_is_refused():
