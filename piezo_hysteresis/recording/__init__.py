@@ -14,7 +14,7 @@
 ``non_monotonic``     samples that came out of order, or a time that runs back
 ``restart``           the driver was started again within a bag
 ``cut`` ``damaged``   the file ends early, or parts of it cannot be decoded
-``truncated``         a phase whose beginning is not recorded
+``truncated``         a phase whose beginning is not recorded, or that begins on a branch of its loop
 ``history``           a phase before which others were played that are not recorded
 ``moved``             the drive moved in the idle before the first phase
 ``proposed``          names of phases that come from what the drive looks like

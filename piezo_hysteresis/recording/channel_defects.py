@@ -69,14 +69,16 @@ def _clipped_voltage(record: Record) -> list[Notice]:
     """Voltage that stands at its extreme while the displacement goes on and comes back: its recording is cut off."""
     y, u = record.displacement, record.voltage
     samples = 0
+    direction = np.sign(np.dot(u - u.mean(), y - y.mean()) or 1.0)
+    returned = _RETURN * float(np.ptp(y))
     for rail, sign in ((u.max(), 1.0), (u.min(), -1.0)):
         runs = _runs_of_equal(np.where(u == rail, rail, np.arange(u.size)), 5)
         for a, b in runs.tolist():
-            way = sign * y[a:b] * np.sign(np.dot(u - u.mean(), y - y.mean()) or 1.0)
+            way = sign * direction * y[a:b]
             rise = way - np.linspace(way[0], way[-1], way.size)
             # a stage that rings after a step also goes on and comes back, but ends far from where it was, or swings
             # about its level; a turning point that the recording lacks is one arc over the whole run
-            returns = way.max() - max(way[0], way[-1]) > max(_RETURN * np.ptp(y), abs(way[0] - way[-1]))
+            returns = way.max() - max(way[0], way[-1]) > max(returned, abs(way[0] - way[-1]))
             if returns and rise.mean() > _ARC * rise.max():
                 samples += b - a
     if not samples:

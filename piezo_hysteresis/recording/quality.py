@@ -76,7 +76,8 @@ def _gain(experiment: Experiment, gain: float) -> list[Notice]:
     if not GAIN_RANGE[0] <= gain <= GAIN_RANGE[1]:
         text = f"displacement per volt {gain:.2g} m/V, expected 0.1 nm/V to 300 µm/V{_likely(gain, GAIN_RANGE)}"
         return [Notice("units", text)]
-    noise = min(float(np.median(np.abs(np.diff(r.displacement, 3)))) / 3.0 if r.size > 8 else 0.0 for r in experiment)
+    parts = [r.displacement[_excerpt(r)] for r in experiment if r.size > 8]
+    noise = min((float(np.median(np.abs(np.diff(y, 3)))) / 3.0 for y in parts), default=0.0)
     if gain < FAINT[0] and 0.0 < noise < FAINT[1]:
         text = f"displacement per volt {gain:.2g} m/V with a noise of {noise:.1g} m: a unit may be off by 1e+3"
         return [Notice("units", text)]
