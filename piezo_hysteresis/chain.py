@@ -110,6 +110,8 @@ class Chain:
         ]
         self.labels = tuple(label for label, _ in parts)
         self.blocks = tuple(block for _, block in parts)
+        self.channels = frozenset(b.channel for b in self.blocks if isinstance(b, ChannelBlock))
+        """Names of the extra channels that are used."""
 
     def rest(self, voltage: float, time: float = 0.0) -> ChainState:
         """State of a stage settled at `voltage` [V]; `time` is that of the first sample [s]."""
@@ -165,11 +167,16 @@ class Chain:
             With effect, sample and time of the first runaway.
         """
         y = np.empty(u.size)
+        copy = not (u.flags.c_contiguous and u.flags.writeable)  # another array type would compile the kernels anew
         for start in range(0, u.size, BLOCK):
             part = slice(start, start + BLOCK)
-            now = {name: c[part].copy() for name, c in (channels or {}).items()}
-            y[part], state = self._run(u[part].copy(), state, now, start)
+            here = u[part].copy() if copy else u[part]
+            y[part], state = self._run(here, state, self.channels_in(channels, part), start)
         return y, state
+
+    def channels_in(self, channels: Channels | None, part: slice) -> Channels:
+        """Copies of the channels that are used, for some of the samples."""
+        return {name: c[part].copy() for name, c in (channels or {}).items() if name in self.channels}
 
     def _run(self, u: Array, state: ChainState, channels: Channels, first: int) -> tuple[Array, ChainState]:
         states, inputs, x = [], [], u

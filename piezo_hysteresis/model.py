@@ -45,7 +45,7 @@ def samples(values: ArrayLike, name: str) -> Array:
 def channels_of(record: Record) -> Channels:
     """The extra channels of a record, by name."""
     named = {"other_displacement": record.other_displacement, "temperature": record.temperature}
-    return {name: np.array(values) for name, values in named.items() if values is not None}
+    return {name: values for name, values in named.items() if values is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,8 +245,7 @@ class Model:
             channels = channels_of(record)
             for start in range(0, record.size, block):
                 part = slice(start, min(start + block, record.size))
-                now = {name: c[part].copy() for name, c in channels.items()}
-                u = np.array(record.voltage[part])
+                now, u = chain.channels_in(channels, part), record.voltage[part].copy()
                 y, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
                 if index is not None:
                     yield index, part, y, slopes
