@@ -53,8 +53,6 @@ def stall(name: str, longest: float) -> Callable[[Bench], None]:
 def kill_driver(bench: Bench) -> None:
     """SIGKILL; the next driver must start at once."""
     bench.soaked.kill("driver_node")
-    time.sleep(0.3)  # what was sent still arrives
-    bench.keeper.begin_anew()
     bench.soaked.start("driver_node")
 
 
@@ -67,13 +65,11 @@ def kill_model(bench: Bench) -> None:
 
 def kill_recorder(bench: Bench) -> None:
     """SIGKILL of the recorder; all that is older than a second must be in the bag."""
-    old = bench.keeper.newest
-    time.sleep(1.0)
-    bag = bench.soaked.recording
+    bag, killed = bench.soaked.recording, time.monotonic()
     bench.soaked.kill("recorder")
-    lost = bench.keeper.missing(bag, old)
+    lost = bench.keeper.missing(bag, killed)
     if lost > 0:
-        bench.keeper.break_promise(f"{lost} samples older than a second are not in {bag}")
+        bench.keeper.break_promise(f"{lost} blocks recorded more than a second ago are not in {bag}")
     bench.soaked.forget(bag)
     bench.soaked.start("recorder")
 

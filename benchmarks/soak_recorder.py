@@ -1,13 +1,17 @@
 """A recorder of its own process, so that it can be killed: every topic of the axis into the bag given.
 
+Twenty times a second it notes in BAG.told, unbuffered, the time and how many blocks of samples it has recorded.
+
 python -m benchmarks.soak_recorder BAG --ros-args …
 """
 
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 
+import numpy as np
 from rclpy.node import Node
 
 from piezo_hysteresis.nodes.bag_recorder import BagRecorder
@@ -20,6 +24,11 @@ class Recorder(Node):
     def __init__(self) -> None:
         super().__init__("recorder")
         self.bag = BagRecorder(self, Path(sys.argv[1]))
+        self._told = Path(sys.argv[1] + ".told").open("wb", buffering=0)  # noqa: SIM115
+        self.create_timer(0.05, self._tell)
+
+    def _tell(self) -> None:
+        self._told.write(np.array([time.monotonic(), self.bag.counts["samples"]]).tobytes())
 
 
 if __name__ == "__main__":
