@@ -14,7 +14,7 @@ from ..identification.delay import identify_delay
 from ..identification.dynamics import delay_of
 from ..identification.hysteresis import fit_hysteresis
 from ..identification.identify import identify
-from ..identification.linear_start import dynamics_behind, hysteresis_signals, with_dynamics
+from ..identification.linear_start import dynamics_behind, follower, hysteresis_signals, with_dynamics
 from ..identification.roles import roles_of
 from ..model import Model
 from ..record import Experiment, Record
@@ -50,4 +50,7 @@ def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
     frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=max(1, delay))), period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or delay_of(hysteresis_signals(start, records, broadband))
-    return with_dynamics(start, dynamics_behind(start, records, broadband, delay, ORDERS).arx)
+    try:
+        return with_dynamics(start, dynamics_behind(start, records, broadband, delay, ORDERS).arx)
+    except IdentificationError:  # noise without low frequencies, or behind narrow plays, leaves the dc gain open
+        return start.with_effect(follower(start, delay, ORDERS))

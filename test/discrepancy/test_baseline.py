@@ -1,0 +1,22 @@
+"""The baseline begins wherever there are loops, whatever the broadband records show."""
+
+import numpy as np
+
+from piezo_hysteresis.discrepancy.baseline import start_model
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.identification.linear_start import dynamics_of
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Record
+
+PERIOD = 1e-4
+
+
+def test_noise_that_leaves_the_sign_of_the_gain_open_still_gives_a_start():
+    stage = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=2.0)), PERIOD, 10.0, 1e-5)
+    time = PERIOD * np.arange(20_000)
+    voltage = (1.0 + 4.0 * np.floor(time)) * (1.0 - np.abs(2.0 * np.mod(time, 1.0) - 1.0))
+    loops = Record(voltage, stage.simulate(Record(voltage, time, PERIOD))[0], PERIOD, "triangle")
+    noise = np.random.default_rng(0).normal(size=20_000)
+    backwards = Record(5.0 + noise, -1e-6 * np.roll(noise, 2), PERIOD, "noise")
+    start = start_model((loops, backwards), (0, 1))
+    assert dynamics_of(start).dc_gain > 0.0
