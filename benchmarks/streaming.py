@@ -170,18 +170,22 @@ def count(bag: Path, commands: list[Command], namespace: str) -> tuple[dict[str,
     }, failures
 
 
-def highest(fastest: float, duration: float) -> tuple[float, float]:
-    """Highest rate that lost nothing, and the lowest that did or could not be set up [Hz]."""
-    rate = fastest
+def tried(rate: float, duration: float, axes: int = 1) -> tuple[dict[str, Cell] | None, list[str]]:
+    """`stream` in a folder of its own; no figures where it could not be played to its end."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            return stream(rate, duration, Path(folder), axes)
+        except (RuntimeError, TimeoutError) as error:
+            return None, [f"{rate / 1e3:g} kHz: {error}"]
+
+
+def highest(held: float, duration: float) -> tuple[float, float]:
+    """Highest rate that holds, from one that does, and the next one, that does not [Hz]."""
     while True:
-        with tempfile.TemporaryDirectory() as folder:
-            try:
-                _, failed = stream(rate, duration, Path(folder))
-            except (RuntimeError, TimeoutError):
-                failed = ["not played"]
+        _, failed = tried(held * FASTER, duration)
         if failed:
-            return (rate / FASTER if rate > fastest else 0.0), rate
-        rate *= FASTER
+            return held, held * FASTER
+        held *= FASTER
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -201,21 +205,22 @@ def run(options: argparse.Namespace) -> list[Figures]:
         cases.append((options.rate[0], short, options.axes))
     columns: list[dict[str, Cell]] = []
     failures: list[str] = []
-    tables = []
+    held, tables = 0.0, []
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         for rate, duration, axes in cases:
-            with tempfile.TemporaryDirectory() as folder:
-                column, failed = stream(rate, duration, Path(folder), axes)
-            columns.append(column)
+            column, failed = tried(rate, duration, axes)
+            columns += [] if column is None else [column]
             failures += failed if rate <= PROMISED else []
-        if not options.no_search:
-            held, lost = highest(max(options.rate), short)
-            tables.append(Figures("Highest rate", ("holds, kHz", "does not hold, kHz"), [(held / 1e3, lost / 1e3)]))
+            held = held if failed else max(held, rate)
+        if held and not options.no_search:
+            found = tuple(rate / 1e3 for rate in highest(held, short))
+            tables.append(Figures("Highest rate", ("holds, kHz", "does not hold, kHz"), [found]))
     finally:
         rclpy.try_shutdown()
-    head, *rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
-    heads = (str(head[0]), *(f"{rate:g}" for rate in head[1:]))
+    names = list(columns[0]) if columns else ["rate, kHz"]
+    (_, *rates), *rows = [(name, *(column[name] for column in columns)) for name in names]
+    heads = (names[0], *(f"{rate:g}" for rate in rates))
     title = "Streaming: driver → model node → recorder, three processes"
     return [Figures(title, heads, rows, tuple(failures)), *tables]
 
