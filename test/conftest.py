@@ -1,4 +1,4 @@
-"""Two processes share the tests; one of them has all that start nodes, so that these have the other core to themselves."""
+"""Two processes share the tests; one of them has all that start nodes, and these the other core."""
 
 import pytest
 
