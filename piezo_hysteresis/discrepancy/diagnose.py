@@ -135,11 +135,11 @@ def diagnose(
         return measure_gap(models, records, chosen, least.tolist(), span, nuisances, bool(spared))
 
     gap = gap_of(final, final_evidence.nuisance)
-    falls = gap.after < FALLS * gap.before
+    falls = not named or gap.after < FALLS * gap.before
     if named and not falls:
         named, final, gap = False, first, gap_of(first, evidence.nuisance)
     tell("next experiment", 0.95)
-    verdict, reason = _verdict(selection, named, falls)
+    verdict, reason = _verdict(selection, named, falls, gap)
     return Diagnosis(
         verdict=verdict,
         reason=reason,
@@ -231,14 +231,14 @@ def _exact(model: Model) -> Model:
     return model if Offset.name in model else model.with_effect(Offset())
 
 
-def _verdict(selection: Selection, named: bool, falls: bool) -> tuple[Verdict, str]:
+def _verdict(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Verdict, str]:
     if named:
         names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
         closed = selection.explained(selection.score)
         rest = (
             "what remains is at the floor"
-            if selection.score.excess <= ADEQUATE
-            else f"a gap of {np.sqrt(selection.score.excess):.1f} floors remains unexplained"
+            if gap.after <= np.sqrt(ADEQUATE) * gap.floor
+            else f"a gap of {gap.after / gap.floor:.1f} floors remains unexplained"
         )
         return Verdict.NAMED, f"The model misses {names}: {100 * closed:.0f} % of the gap is explained; {rest}."
     if selection.score.excess <= ADEQUATE and not selection.accepted:

@@ -23,6 +23,8 @@ LEAST_GAIN = 0.15
 """Least gain in mean ln max(1, R²) for which an effect is accepted."""
 KEEPS = (0.8, 0.5)
 """Share of V beyond noise that may remain after the first accepted effect, and after further ones."""
+MANY = 8
+"""Records from which the worst one is left out of the explained fraction."""
 NAMED = 0.6
 """Explained fraction of the gap from which a family is named."""
 REFITS = 6
@@ -126,9 +128,13 @@ class Selection:
         return tuple(s for s in self.steps if s.accepted)
 
     def explained(self, score: Score) -> float:
-        """Share X of the gap of the baseline that a score has closed, 0 to 1."""
-        first = self.steps[0].before.excess if self.steps else self.score.excess
-        return explained(first, score.excess, self.null)
+        """Share X of the gap of the baseline that a score has closed, 0 to 1; the worst record does not decide."""
+        first = self.steps[0].before if self.steps else self.score
+        kept = np.arange(score.ratios.size)
+        if kept.size >= MANY and first.ratios.size == kept.size:
+            kept = np.delete(kept, int(np.argmax(score.ratios)))
+        before, after = (float(np.mean(s.ratios[kept] ** 2)) for s in (first, score))
+        return explained(before, after, self.null)
 
 
 def explained(before: float, after: float, null: float) -> float:
