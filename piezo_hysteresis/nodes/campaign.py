@@ -112,6 +112,7 @@ def _play(driver: DriverLink, recorder: BagRecorder, phase: Phase, told: Progres
     # a device that plays from its memory is silent meanwhile
     longest_silence = PATIENCE + 2.0 * phase.duration
     deadline = time.monotonic() + PATIENCE
+    played: float | None = None
     while driver.state != "done":
         if driver.state in ("refused", "stopped"):
             raise StageError(f"phase '{phase.name}' was {driver.state}: {driver.reason}")
@@ -123,4 +124,8 @@ def _play(driver: DriverLink, recorder: BagRecorder, phase: Phase, told: Progres
             raise StageError(f"phase '{phase.name}': no samples for {longest_silence:g} s; is the driver alive?")
         if recorder.failure is not None:
             raise recorder.failure
+        if played is None and driver.state == "playing" and recorder.holds(driver.first_index + phase.voltage.size):
+            played = time.monotonic()
+        if played is not None and time.monotonic() > played + PATIENCE:
+            raise StageError(f"phase '{phase.name}' was played, but never told to be done; do others flood 'command'?")
         yield told

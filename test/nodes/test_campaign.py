@@ -20,17 +20,22 @@ pytestmark = pytest.mark.nodes
 PERIOD = 1e-3
 
 
-def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, monkeypatch):
+@pytest.fixture
+def stage(monkeypatch):
+    """A stage that notes what becomes of it, driven as a device."""
     stage = Witness(PERIOD, 1e6)
     monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", back_ends.BackEnd((), lambda *_: stage, is_device=True))
+    return stage
+
+
+def begun(lab, voltage):
+    """A driver, the link to it, and the campaign of one phase, as a function that carries it on and returns its end."""
     node = lab.add(DriverNode, discovery_time=0.0)
     lab.do(node.begin)
     link = lab.do(lambda: DriverLink(lab.node, "driver_node"))
     lab.wait(lambda: not link.missing, "the driver")
-    samples = lab.streaming()
-    voltage = np.concatenate((np.zeros(100), np.full(60_000, 0.1), np.zeros(100)))
-    path = lab.folder / "run"
-    job = campaign(lab.node, link, lambda limits: Protocol("long", limits, (Phase("long", voltage, PERIOD),)), path)
+    phase, path = Phase("long", voltage, PERIOD), lab.folder / "run"
+    job = campaign(lab.node, link, lambda limits: Protocol("long", limits, (phase,)), path)
 
     def step():
         try:
@@ -38,14 +43,37 @@ def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, monkeypatch):
         except StageError as error:
             return error
 
-    def ended():
+    def carry_on():
         time.sleep(0.02)
-        if samples.newest.phase[-1] == 1 and (samples.phase == 1).sum() > 1000:
-            stage.exchange = lambda block: 1 / 0
         told = lab.do(step)
         return told if isinstance(told, StageError) else None
+
+    return link, carry_on
+
+
+def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, stage):
+    samples = lab.samples()
+    _, carry_on = begun(lab, np.concatenate((np.zeros(100), np.full(60_000, 0.1), np.zeros(100))))
+
+    def ended():
+        if samples.blocks and samples.newest.phase[-1] == 1 and (samples.phase == 1).sum() > 1000:
+            stage.exchange = lambda block: 1 / 0
+        return carry_on()
 
     told = lab.wait(ended, "the end of the campaign")
     assert "phase 'long': a configured 'driver_node' in / is gone" in str(told)
     assert stage.made_safe == 1
-    assert {record.phase for record in read(path)} == {"long"}
+    assert {record.phase for record in read(lab.folder / "run")} == {"long"}
+
+
+def test_a_word_that_is_lost_is_not_waited_for_without_limit(lab, stage, monkeypatch):
+    monkeypatch.setattr("piezo_hysteresis.nodes.campaign.PATIENCE", 5.0)
+    link, carry_on = begun(lab, np.zeros(200))
+
+    def ended():
+        if link.state == "done":
+            link.state = "playing"  # as where a flood of others' refusals has pushed the word out
+        return carry_on()
+
+    assert "never told to be done" in str(lab.wait(ended, "the end of the campaign"))
+    assert {record.phase for record in read(lab.folder / "run")} == {"long"}
