@@ -24,7 +24,7 @@ LEAST_GAIN = 0.15
 KEEPS = (0.8, 0.5)
 """Share of V beyond noise that may remain after the first accepted effect, and after further ones."""
 MANY = 8
-"""Records from which the worst one is left out of the explained fraction."""
+"""Records from which the worst one has no say in what an effect explains."""
 NAMED = 0.6
 """Explained fraction of the gap from which a family is named."""
 REFITS = 6
@@ -130,11 +130,16 @@ class Selection:
     def explained(self, score: Score) -> float:
         """Share X of the gap of the baseline that a score has closed, 0 to 1; the worst record does not decide."""
         first = self.steps[0].before if self.steps else self.score
-        kept = np.arange(score.ratios.size)
-        if kept.size >= MANY and first.ratios.size == kept.size:
-            kept = np.delete(kept, int(np.argmax(score.ratios)))
-        before, after = (float(np.mean(s.ratios[kept] ** 2)) for s in (first, score))
-        return explained(before, after, self.null)
+        return explained(*_typical(first, score), self.null)
+
+
+def _typical(before: Score, after: Score) -> tuple[float, float]:
+    """V of two models without the record that the second describes worst, where there are many."""
+    kept = np.arange(after.ratios.size)
+    if kept.size >= MANY and before.ratios.size == kept.size:
+        kept = np.delete(kept, int(np.argmax(after.ratios)))
+    first, second = (float(np.mean(s.ratios[kept] ** 2)) for s in (before, after))
+    return first, second
 
 
 def explained(before: float, after: float, null: float) -> float:
@@ -297,16 +302,16 @@ def _refitted(model: Model, candidates: Sequence[Candidate], before: Score, tell
 
 def _settled(candidate: Candidate, before: Score) -> Candidate:
     """The refit to its end, and begun anew while that closes much of what is left."""
-    candidate = proceed(candidate, LATER)
     for _ in range(RESTARTS):
-        gain = before.cost - candidate.score.cost
-        if candidate.score.excess <= ADEQUATE or gain < 0.5 * LEAST_GAIN:
+        assert candidate.fit is not None
+        cost = candidate.fit.cost
+        candidate = proceed(candidate, LATER)
+        if candidate.score.excess <= ADEQUATE or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:
             break
-        anew = restart(candidate, FIRST)
-        assert anew.fit is not None and candidate.fit is not None
-        if anew.fit.cost > WORTHWHILE * candidate.fit.cost:
+        candidate = restart(candidate, FIRST)
+        assert candidate.fit is not None
+        if candidate.fit.cost > WORTHWHILE * cost:
             break
-        candidate = proceed(anew, LATER)
     return candidate
 
 
