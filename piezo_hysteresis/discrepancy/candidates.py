@@ -31,6 +31,10 @@ LINEAR = ("lag", "dynamics")
 """Families that dynamics of an order high enough can hold."""
 IMITATIONS = 8
 """Steiglitz-McBride iterations with which dynamics imitate others."""
+PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
+"""Periods of the mains in a record that tells its amplitude, sample period in periods, and records."""
+STEADY = 0.3
+"""Least ratio of the quartiles of that amplitude."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at which a refit has converged."""
 
@@ -284,6 +288,28 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
         except (DivergenceError, ParameterError, ModelError, IdentificationError):
             continue
     return min(found, key=lambda f: f.score.cost, default=None)
+
+
+def is_steady(candidate: Candidate) -> bool:
+    """Whether a hum has about one amplitude in all records: mains does not care what the drive does."""
+    assert candidate.fit is not None
+    evidence, lines = candidate.evidence, 2 * candidate.evidence.nuisance.harmonics
+    frequency = evidence.nuisance.hum_frequency or 0.0
+    amplitudes = np.array(
+        [
+            np.hypot(found[-lines::2], found[1 - lines :: 2])
+            for record, floor, found in zip(evidence.records, evidence.floors, candidate.fit.nuisances, strict=True)
+            if np.isfinite(floor)
+            and found.size >= lines
+            and record.duration * frequency >= PERIODS
+            and record.sample_period * frequency <= RESOLVED
+        ]
+    ).reshape(-1, lines // 2)
+    if len(amplitudes) < FEWEST:
+        return True
+    strongest = amplitudes[:, int(np.argmax(np.median(amplitudes, axis=0)))]
+    low, high = np.quantile(strongest, (0.25, 0.75))
+    return bool(low > STEADY * high)
 
 
 def _absorbed(model: Model, extended: Model, evidence: Evidence) -> Model | None:

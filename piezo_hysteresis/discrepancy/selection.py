@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects import CATALOGUE, Effect
+from ..effects import CATALOGUE, Effect, MainsHum
 from ..model import Model
-from .candidates import Candidate, Evidence, Fitted, alikeness, proceed, refit, restart, screen, without
+from .candidates import Candidate, Evidence, Fitted, alikeness, is_steady, proceed, refit, restart, screen, without
 from .held_out import Score
 
 Progress = Callable[[str, float], None]
@@ -245,6 +245,9 @@ def _turn(
     if accepted and _may_be_off(best):
         accepted = False
         rejected.append(Rejection(best.name, "all its numbers could as well be off"))
+    if accepted and best.name == MainsHum.name and not is_steady(best):
+        accepted = False
+        rejected.append(Rejection(best.name, "its amplitude follows the drive from record to record"))
     for candidate in refits:
         if candidate.name == best.name:
             continue
