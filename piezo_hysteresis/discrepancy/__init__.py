@@ -1,6 +1,6 @@
 """The gap finder: where a model is wrong, which physical effect is missing, and the gap after adding it.
 
-`noise_floor` (what no model can explain) → `localise` (where) → `candidates` (score test, joint refit) → `selection`
+`noise_floor` (what no model can explain) → `localise` (where) → `candidates` (score test) → `refit` → `selection`
 (add, repeat, stop) → `gap` (before, after, on unseen records) → `next_experiment`. `diagnose` runs them all.
 """
 

@@ -1,4 +1,4 @@
-"""Candidates for the missing effect: a projected score test of the whole catalogue, then joint refits of the best.
+"""Candidates for the missing effect: a projected score test of the whole catalogue.
 
 A residual is not a signature: the signature of an effect counts only as far as nothing in the present model can imitate
 it. So residual and sensitivities are projected off everything the model can still adjust, which the inner products of
@@ -13,30 +13,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import Arx, BoucWen, Effect, MainsHum
+from ..effects import BoucWen, Effect, MainsHum
 from ..effects.extent import Extent
-from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
+from ..errors import DivergenceError, ModelError, ParameterError
 from ..identification.content import content_of
-from ..identification.dynamics import identify_arx
-from ..identification.fit import Fit, fit, gauge
-from ..identification.linear_start import dynamics_behind, hysteresis_signals, with_dynamics
+from ..identification.fit import Fit, gauge
 from ..identification.normal_equations import Gram, Nuisance, grams
 from ..model import Model
 from ..record import Record
 from .held_out import Score, held_out
 
 Array = NDArray[np.float64]
-
-LINEAR = ("lag", "dynamics")
-"""Families that dynamics of an order high enough can hold."""
-IMITATIONS = 8
-"""Steiglitz-McBride iterations with which dynamics imitate others."""
-PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
-"""Periods of the mains in a record that tells its amplitude, sample period in periods, and records."""
-STEADY = 0.3
-"""Least ratio of the quartiles of that amplitude."""
-TOLERANCE = 1e-3
-"""Relative decrease of the cost at which a refit has converged."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -103,14 +90,6 @@ class Candidate:
     def name(self) -> str:
         """Identifier of the effect."""
         return self.effect.name
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Fitted:
-    """A fitted model and its score."""
-
-    model: Model
-    score: Score
 
 
 def free_numbers(model: Model, nuisance: Nuisance) -> list[str]:
@@ -222,125 +201,6 @@ def _screen_moves(model: Model, evidence: Evidence, base: list[str], moves: list
         )
         for k, effect in enumerate(usable)
     ]
-
-
-def refit(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
-    """Fit the model with the candidate jointly, from its start; None where that diverges."""
-    return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
-
-
-def proceed(candidate: Candidate, max_iterations: int) -> Candidate:
-    """The refit carried on from where it stopped; itself where it had converged."""
-    assert candidate.fit is not None
-    if candidate.fit.converged:
-        return candidate
-    return _refitted(candidate.fit.model, candidate, max_iterations) or candidate
-
-
-def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
-    try:
-        result = _joint(model, candidate.evidence, max_iterations)
-        score = score_model(result.model, candidate.evidence)
-    except (DivergenceError, ParameterError, ModelError, IdentificationError):
-        return None
-    return replace(candidate, effect=result.model[candidate.name], score=score, fit=result)
-
-
-def restart(candidate: Candidate, max_iterations: int) -> Candidate:
-    """The refit once more behind dynamics found anew; itself where that is no better.
-
-    The dynamics of the model before were bent by the effect it lacked; from there a joint fit has a long way to go.
-    """
-    evidence, fitted = candidate.evidence, candidate.fit
-    assert fitted is not None
-    broadband = evidence.broadband()
-    if not broadband or not isinstance(arx := fitted.model["arx"], Arx):
-        return candidate
-    orders = (arx.array("a").size, arx.array("b").size)
-    try:
-        found = dynamics_behind(fitted.model, evidence.records, broadband, round(arx["delay"]), orders)
-        anew = _refitted(with_dynamics(fitted.model, found.arx), candidate, max_iterations)
-    except (DivergenceError, ParameterError, ModelError, IdentificationError):
-        return candidate
-    if anew is None or anew.fit is None or anew.fit.cost >= fitted.cost:
-        return candidate
-    return anew
-
-
-def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
-    """The candidate's model without its effect, all else fitted on; None where that diverges.
-
-    What this has gained over the model before belongs to dynamics and hysteresis, and to no effect.
-    """
-    assert candidate.fit is not None
-    model = candidate.fit.model.without(candidate.name)
-    evidence = candidate.evidence
-    if candidate.name == MainsHum.name:
-        evidence = replace(evidence, nuisance=replace(evidence.nuisance, hum_frequency=None))
-    starts = [model]
-    if candidate.effect.family in LINEAR and (absorbed := _absorbed(model, candidate.fit.model, evidence)) is not None:
-        starts.append(absorbed)
-    found = []
-    for start in starts:
-        try:
-            fitted = _joint(start, evidence, max_iterations)
-            found.append(Fitted(fitted.model, score_model(fitted.model, evidence)))
-        except (DivergenceError, ParameterError, ModelError, IdentificationError):
-            continue
-    return min(found, key=lambda f: f.score.cost, default=None)
-
-
-def is_steady(candidate: Candidate) -> bool:
-    """Whether a hum has about one amplitude in all records: mains does not care what the drive does."""
-    assert candidate.fit is not None
-    evidence, lines = candidate.evidence, 2 * candidate.evidence.nuisance.harmonics
-    frequency = evidence.nuisance.hum_frequency or 0.0
-    amplitudes = np.array(
-        [
-            np.hypot(found[-lines::2], found[1 - lines :: 2])
-            for record, floor, found in zip(evidence.records, evidence.floors, candidate.fit.nuisances, strict=True)
-            if np.isfinite(floor)
-            and found.size >= lines
-            and record.duration * frequency >= PERIODS
-            and record.sample_period * frequency <= RESOLVED
-        ]
-    ).reshape(-1, lines // 2)
-    if len(amplitudes) < FEWEST:
-        return True
-    strongest = amplitudes[:, int(np.argmax(np.median(amplitudes, axis=0)))]
-    low, high = np.quantile(strongest, (0.25, 0.75))
-    return bool(low > STEADY * high)
-
-
-def _absorbed(model: Model, extended: Model, evidence: Evidence) -> Model | None:
-    """The model with dynamics that imitate those of `extended`, which has one more linear effect; None without records.
-
-    A joint fit may have stopped before its G held a mode that it has room for: what G can hold is no missing effect.
-    """
-    broadband, arx = evidence.broadband(), model["arx"]
-    if not broadband or not isinstance(arx, Arx):
-        return None
-    inputs = hysteresis_signals(model, evidence.records, broadband)
-    outputs = extended.simulate(evidence.records)
-    signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
-    try:
-        orders = (arx.array("a").size, arx.array("b").size)
-        found = identify_arx(signals, round(arx["delay"]), model.sample_period, orders, IMITATIONS)
-        return with_dynamics(model, found.arx)
-    except (IdentificationError, ParameterError, DivergenceError):
-        return None
-
-
-def _joint(model: Model, evidence: Evidence, max_iterations: int) -> Fit:
-    return fit(
-        model,
-        evidence.records,
-        free_numbers(model, evidence.nuisance),
-        floors=evidence.floors.tolist(),
-        nuisance=evidence.nuisance,
-        max_iterations=max_iterations,
-        tolerance=TOLERANCE,
-    )
 
 
 def alikeness(first: Candidate, second: Candidate, model: Model) -> float:

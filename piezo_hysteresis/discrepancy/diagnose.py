@@ -19,7 +19,7 @@ from ..identification.roles import CARRYING
 from ..model import Model
 from ..record import Experiment, Notice, Record
 from .baseline import start_model
-from .candidates import Evidence, free_numbers, restart, score_model
+from .candidates import Evidence, free_numbers, score_model
 from .diagnosis import Diagnosis, Verdict
 from .few_records import diagnose_few
 from .gap import Gap, measure_gap
@@ -27,6 +27,7 @@ from .localise import localise
 from .next_experiment import NextExperiment, propose
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
+from .refit import restart
 from .sampling import at_period, common_period, shortened, slowed
 from .selection import ADEQUATE, NAMED, Selection, select
 from .split import reporting

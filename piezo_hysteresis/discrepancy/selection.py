@@ -12,8 +12,9 @@ import numpy as np
 
 from ..effects import CATALOGUE, Effect, MainsHum
 from ..model import Model
-from .candidates import Candidate, Evidence, Fitted, alikeness, is_steady, proceed, refit, restart, screen, without
+from .candidates import Candidate, Evidence, alikeness, screen
 from .held_out import Score
+from .refit import Fitted, is_steady, proceed, refit, restart, without
 
 Progress = Callable[[str, float], None]
 
