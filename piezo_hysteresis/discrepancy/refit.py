@@ -27,6 +27,8 @@ PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Periods of the mains in a record that tells its amplitude, sample period in periods, and records."""
 STEADY = 0.3
 """Least ratio of the quartiles of that amplitude."""
+SEEN = 0.5
+"""Change in units of the floor."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at which a refit has converged."""
 
@@ -103,6 +105,17 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
         except (DivergenceError, ParameterError, ModelError, IdentificationError):
             continue
     return min(found, key=lambda f: f.score.cost, default=None)
+
+
+def is_seen(candidate: Candidate) -> bool:
+    """Whether the effect changes any record by so much as could be seen; hum, which is free per record, has own rules."""
+    assert candidate.fit is not None
+    evidence, model = candidate.evidence, candidate.fit.model
+    with_it, without_it = model.simulate(evidence.records), model.without(candidate.name).simulate(evidence.records)
+    return candidate.name == MainsHum.name or any(
+        np.std(first - second) > SEEN * floor
+        for first, second, floor in zip(with_it, without_it, evidence.floors, strict=True)
+    )
 
 
 def is_steady(candidate: Candidate) -> bool:

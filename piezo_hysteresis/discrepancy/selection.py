@@ -14,7 +14,7 @@ from ..effects import CATALOGUE, Effect, MainsHum
 from ..model import Model
 from .candidates import Candidate, Evidence, alikeness, screen
 from .held_out import Score
-from .refit import Fitted, is_steady, proceed, refit, restart, without
+from .refit import Fitted, is_seen, is_steady, proceed, refit, restart, without
 
 Progress = Callable[[str, float], None]
 
@@ -246,6 +246,9 @@ def _turn(
     if accepted and _may_be_off(best):
         accepted = False
         rejected.append(Rejection(best.name, "all its numbers could as well be off"))
+    if accepted and not is_seen(best):
+        accepted = False
+        rejected.append(Rejection(best.name, "changes no record by as much as half its floor"))
     if accepted and best.name == MainsHum.name and not is_steady(best):
         accepted = False
         rejected.append(Rejection(best.name, "its amplitude follows the drive from record to record"))
