@@ -108,7 +108,7 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
 
 
 def is_seen(candidate: Candidate) -> bool:
-    """Whether the effect changes any record by so much as could be seen; hum, free per record, has a rule of its own."""
+    """Whether the effect changes any record by so much as could be seen; hum, free per record, has its own rule."""
     assert candidate.fit is not None
     evidence, model = candidate.evidence, candidate.fit.model
     with_it, without_it = model.simulate(evidence.records), model.without(candidate.name).simulate(evidence.records)
