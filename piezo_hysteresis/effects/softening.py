@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from ..parameter import Parameter
 from .effect import Place, Term
+from .extent import Extent
+
+FOUND_BY = (0.01, 0.03, 0.1)
+"""Sizes of k3 at which a search begins: a sharp resonance that moves by its width is far from linear in it."""
 
 
 class Softening(Term):
@@ -30,6 +36,11 @@ class Softening(Term):
     signature = "a resonance that moves with amplitude: large chirps across it; statically a sensor cubic"
     source = "Duffing oscillator on the modal coordinate"
     parameters = (
-        Parameter("k2", "k2", "1", 0.0, -0.2, 0.2, "change of stiffness with |x|", "Duffing", 0.0, 0.02),
-        Parameter("k3", "k3", "1", 0.0, -0.2, 0.2, "change of stiffness with x²", "Duffing", 0.0, 0.02),
+        Parameter("k2", "k2", "1", 0.0, -0.5, 0.5, "change of stiffness with |x|", "Duffing", 0.0, 0.02),
+        Parameter("k3", "k3", "1", 0.0, -1.0, 1.0, "change of stiffness with x²", "Duffing", 0.0, 0.02),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Switched off, and of several sizes of either sign."""
+        return (cls(), *(cls(k3=sign * size) for size in FOUND_BY for sign in (-1.0, 1.0)))
