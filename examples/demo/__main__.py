@@ -35,6 +35,8 @@ NAMESPACE = "/demo"
 LIMITS = DriveLimits()
 PATIENCE = 600.0
 """Longest wait for a campaign or a fit [s]."""
+signalled: list[int] = []
+"""Signals that asked the demo to end."""
 
 
 class Demo:
@@ -154,6 +156,12 @@ class Demo:
             self.say("the identified model had taken it in already: its residual was at the noise before the search")
 
 
+def interrupt(number: int, frame: object) -> None:
+    """End like Ctrl-C, the nodes first; rclpy may turn what is raised here into an error of its own."""
+    signalled.append(number)
+    raise KeyboardInterrupt
+
+
 def main() -> int:
     """Run the demo; 0 when it went through, whatever the verdict."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -174,7 +182,7 @@ def main() -> int:
 
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     for ending in (signal.SIGINT, signal.SIGTERM):  # also where a shell has told it to ignore them
-        signal.signal(ending, signal.default_int_handler)
+        signal.signal(ending, interrupt)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     demo = Demo(folder)
     with ExitStack() as stack:
@@ -191,7 +199,5 @@ def main() -> int:
 if __name__ == "__main__":
     try:
         sys.exit(main())
-    except KeyboardInterrupt:
-        sys.exit("demo: interrupted; the nodes have ended")
-    except (RuntimeError, TimeoutError) as error:
-        sys.exit(f"demo: {error}")
+    except (KeyboardInterrupt, RuntimeError, TimeoutError) as error:
+        sys.exit("demo: interrupted; the nodes have ended" if signalled else f"demo: {error}")

@@ -28,6 +28,7 @@ class Identification:
 
     def __init__(self, lab, root):
         self.lab, self.root, self.statuses = lab, root, lab.listen(DiagnosticStatus, "status", LATCHED)
+        root.mkdir(exist_ok=True)
         self.process = lab.start(NODE, experiment_root=str(root))
         lab.wait(lambda: self.ask("plan").success, "the driver's limits")
 
