@@ -27,7 +27,7 @@ pytestmark = pytest.mark.nodes
 
 NODE = "identification_node"
 PERIOD = 1e-4
-DRIVER = {"sample_period": PERIOD, "simulated__seed": 1}
+DRIVER = {"sample_period": PERIOD, "block_duration": 0.02, "simulated__seed": 1}
 PLANT = PlantParameters()
 NOISE = PLANT.sensor.noise * PLANT.full_stroke
 

@@ -208,6 +208,6 @@ class Calls:
                 left = lacking()
             if left <= 0:
                 return
-            if time.monotonic() + left > due:
+            if time.monotonic() + left > due or self._ended.is_set():
                 raise CardError(*error)
             self._ended.wait(left)
