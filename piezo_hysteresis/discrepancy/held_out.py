@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 
 RIDGE = 1e-9
 """Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
-REFINEMENTS = 2
 FARTHEST = 100.0
 """How far leaving a record out may raise its R² over that of the fit to all: beyond, nothing is linear any more."""
 
@@ -96,13 +95,9 @@ def held_out(
 
 
 def _solve(matrices: Array, rights: Array, scale: Array) -> Array:
-    """Solutions (r, q) of r normal equations; what is undetermined stays at zero.
-
-    A ridge keeps them solvable, and steps of refinement take its pull out of every direction above it.
-    """
-    scaled, right = matrices * np.outer(scale, scale), (scale * rights)[..., None]
-    inverse = np.linalg.inv(scaled + RIDGE * scale.size * np.eye(scale.size))
-    found = inverse @ right
-    for _ in range(REFINEMENTS):
-        found += inverse @ (right - scaled @ found)
-    return np.asarray(scale * found[..., 0])
+    """Solutions (r, q) of r normal equations; what is undetermined stays at zero."""
+    values, vectors = np.linalg.eigh(matrices * np.outer(scale, scale))
+    known = values > RIDGE * np.maximum(values[:, -1:], 1e-300)
+    along = np.einsum("rjk,rj->rk", vectors, scale * rights)
+    parts = np.divide(along, values, out=np.zeros_like(along), where=known)
+    return np.asarray(scale * np.einsum("rjk,rk->rj", vectors, parts))
