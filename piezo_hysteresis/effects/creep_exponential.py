@@ -34,7 +34,7 @@ class CreepExponential(Effect):
     signature = "grows after each change of level and ends after some τ, unlike logarithmic creep"
     source = "Croft, Shed, Devasia 2001, Kelvin-Voigt creep"
     parameters = (
-        Parameter("c", "c_k", "1", (0.0, 0.0), -0.2, 0.2, "final share of each relaxation", "Croft 2001", 0.0, 0.01),
+        Parameter("c", "c_k", "1", (0.0, 0.0), 0.0, 0.2, "final share of each relaxation", "Croft 2001", 0.0, 0.01),
         Parameter("tau", "τ_k", "s", (0.3, 10.0), 1e-4, 1e5, "time constants", "Croft 2001", scale=1.0),
     )
 
