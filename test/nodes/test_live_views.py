@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rclpy
+import yaml
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -33,7 +35,7 @@ PERIOD = 1e-3
 def published():
     """One message of every live topic with several fields, from the publishers of the nodes themselves."""
     context = rclpy.Context()
-    rclpy.init(context=context, domain_id=61)
+    rclpy.init(context=context, domain_id=101)
     node = LifecycleNode("live_views", namespace="/stage_x", context=context)
     node.declare_parameter("live_rate", 50.0)
     driver, model = DriverTopics(node, "stage", PERIOD, 50.0), ModelTopics(node)
@@ -119,3 +121,21 @@ def test_every_panel_of_foxglove_is_in_its_layout():
         return [tree] if isinstance(tree, str) else leaves(tree["first"]) + leaves(tree["second"])
 
     assert sorted(leaves(layout["layout"])) == sorted(layout["configById"])
+
+
+def test_a_recorder_that_follows_the_file_hears_every_topic_and_misses_nothing():
+    profiles = yaml.safe_load((CONFIG / "record_qos.yaml").read_text())
+    assert {name for name, (_, quality) in TOPICS.items() if not is_live(quality)} <= {n[1:] for n in profiles}
+    assert "/command" in profiles
+    for name, profile in profiles.items():
+        quality = TOPICS[name[1:]][1]
+        assert profile["history"] == "keep_last"
+        assert profile["depth"] >= 10 * quality.depth or profile["durability"] == "transient_local"
+        assert profile["reliability"] == "reliable"
+        latched = quality.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        assert profile["durability"] == ("transient_local" if latched else "volatile")
+
+
+def is_live(quality):
+    """Scalars for the eye, and what goes without latching: the recorder's own depth will do."""
+    return quality.depth == 10 and quality.durability != DurabilityPolicy.TRANSIENT_LOCAL
