@@ -65,8 +65,8 @@ class TimeBase:
         return self._index + -int((self._steady - steady) // self._real_period)
 
     def stamp(self, index: int) -> int:
-        """Stamp of a sample [ns]."""
-        return self._stamp + round((index - self._index) * self.sample_period * _NANO)
+        """Stamp of a sample [ns]; not below zero, where a simulated clock has just begun."""
+        return max(0, self._stamp + round((index - self._index) * self.sample_period * _NANO))
 
     def follow(self, index: int, steady: float, node: int) -> float:
         """Anchor anew at `index` if the node's clock, read together with the steady one, has jumped.
@@ -79,7 +79,9 @@ class TimeBase:
         jump = node - round(steady * _NANO) - self._offset
         if abs(jump) <= self.tolerance * _NANO:
             return 0.0
-        self._anchor(index, self.due(index), self.stamp(index) + jump)
+        self._anchor(
+            index, self.due(index), self._stamp + round((index - self._index) * self.sample_period * _NANO) + jump
+        )
         self._offset += jump
         return jump / _NANO
 

@@ -28,8 +28,8 @@ def stage(monkeypatch):
     return stage
 
 
-def begun(lab, voltage):
-    """A driver, the link to it, and the campaign of one phase, as a function that carries it on and returns its end."""
+def begun(lab, voltage, before=lambda link: None):
+    """The campaign of one phase with a driver, as a function that calls `before`, carries it on and returns its end."""
     node = lab.add(DriverNode, discovery_time=0.0)
     lab.do(node.begin)
     link = lab.do(lambda: DriverLink(lab.node, "driver_node"))
@@ -38,22 +38,23 @@ def begun(lab, voltage):
     job = campaign(lab.node, link, lambda limits: Protocol("long", limits, (phase,)), path)
 
     def step():
+        before(link)
         try:
             return next(job)
-        except StageError as error:
+        except (StageError, StopIteration) as error:
             return error
 
     def carry_on():
         time.sleep(0.02)
         told = lab.do(step)
-        return told if isinstance(told, StageError) else None
+        return told if isinstance(told, Exception) else None
 
-    return link, carry_on
+    return carry_on
 
 
 def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, stage):
     samples = lab.samples()
-    _, carry_on = begun(lab, np.concatenate((np.zeros(100), np.full(60_000, 0.1), np.zeros(100))))
+    carry_on = begun(lab, np.concatenate((np.zeros(100), np.full(60_000, 0.1), np.zeros(100))))
 
     def ended():
         if samples.blocks and samples.newest.phase[-1] == 1 and (samples.phase == 1).sum() > 1000:
@@ -68,12 +69,11 @@ def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, stage):
 
 def test_a_word_that_is_lost_is_not_waited_for_without_limit(lab, stage, monkeypatch):
     monkeypatch.setattr("piezo_hysteresis.nodes.campaign.PATIENCE", 5.0)
-    link, carry_on = begun(lab, np.zeros(200))
 
-    def ended():
+    def unheard(link):
         if link.state == "done":
             link.state = "playing"  # as where a flood of others' refusals has pushed the word out
-        return carry_on()
 
-    assert "never told to be done" in str(lab.wait(ended, "the end of the campaign"))
+    told = lab.wait(begun(lab, np.zeros(200), unheard), "the end of the campaign")
+    assert "never told to be done" in str(told)
     assert {record.phase for record in read(lab.folder / "run")} == {"long"}
