@@ -263,6 +263,7 @@ class Lab:
         """Answer of a service."""
         client = self.node.create_client(kind, service)
         self.wait(client.service_is_ready, f"the service {service}")
+        time.sleep(0.1)  # until the node has found this client too: its answer would be lost
         future = client.call_async(request or kind.Request())
         self.wait(future.done, f"an answer of {service}")
         self.do(lambda: self.node.destroy_client(client))
