@@ -264,8 +264,17 @@ class Lab:
         client = self.node.create_client(kind, service)
         self.wait(client.service_is_ready, f"the service {service}")
         time.sleep(0.1)  # until the node has found this client too: its answer would be lost
-        future = client.call_async(request or kind.Request())
-        self.wait(future.done, f"an answer of {service}")
+        futures = [client.call_async(request or kind.Request())]
+        asked = time.monotonic()
+
+        def answered() -> Any:
+            if time.monotonic() > asked + 10.0 * len(
+                futures
+            ):  # a node that had not found this client yet answers nobody
+                futures.append(client.call_async(request or kind.Request()))
+            return next((future for future in futures if future.done()), None)
+
+        future = self.wait(answered, f"an answer of {service}")
         self.do(lambda: self.node.destroy_client(client))
         return future.result()
 
@@ -274,7 +283,8 @@ class Lab:
         request = ChangeState.Request()
         request.transition.label = name
         request.transition.id = _TRANSITIONS[name]
-        return self.call(ChangeState, f"{node}/change_state", request).success
+        done = self.call(ChangeState, f"{node}/change_state", request).success
+        return done or self.state(node) == _REACHED.get(name)
 
     def state(self, node: str = "driver_node") -> str:
         """State of a lifecycle node."""
@@ -304,6 +314,7 @@ class Lab:
 
 
 _TRANSITIONS = {"configure": 1, "cleanup": 2, "activate": 3, "deactivate": 4}
+_REACHED = {"configure": "inactive", "cleanup": "unconfigured", "activate": "active", "deactivate": "inactive"}
 
 
 def _command(executable: str) -> list[str]:
