@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from ..kernel import kernel
 from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
+from .extent import Extent
 from .held_block import HeldBlock
+
+FOUND_BY = (0.001, 0.002, 0.005, 0.01)
+"""Half widths at which a search begins, in ranges of the drive."""
 
 
 class Backlash(Effect):
@@ -25,6 +31,11 @@ class Backlash(Effect):
     signature = "a small-signal gain that drops below b; ARX fits at two noise amplitudes disagree"
     source = "play operator; 0.1–1 % of range"
     parameters = (Parameter("b", "b", "V", 0.0, 0.0, 1e3, "half width of the play", "play operator", 0.0, 0.02),)
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Off, and of several widths: a play wider than the steps of a noise does not act as its slope at 0 tells."""
+        return cls(), *(cls(b=share * extent.span) for share in FOUND_BY)
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         return BacklashBlock(self["b"])
