@@ -11,7 +11,8 @@ from .diagnosis import Diagnosis, Verdict
 from .gap import Gap, measure_gap
 from .localise import Place, localise
 from .noise_floor import floors, noise_floors, stroke
-from .selection import Selection, select
+from .selection import select
+from .steps import Selection
 
 __all__ = [
     "Diagnosis",

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from ..effects import Arx, BoucWen
-from ..errors import IdentificationError
+from ..effects import Arx, BoucWen, Offset, PublishedBoucWen
+from ..errors import IdentificationError, ModelError
 from ..identification.delay import identify_delay
 from ..identification.dynamics import delay_of
 from ..identification.hysteresis import fit_hysteresis
@@ -54,3 +54,19 @@ def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
         return with_dynamics(start, dynamics_behind(start, records, broadband, delay, ORDERS).arx)
     except IdentificationError:  # noise without low frequencies, or behind narrow plays, leaves the dc gain open
         return start.with_effect(follower(start, delay, ORDERS))
+
+
+def exact(model: Model) -> Model:
+    """The model with the exact loop, which the terms of the catalogue join, and with a sensor zero."""
+    if PublishedBoucWen.name in model:
+        published = model[PublishedBoucWen.name]
+        if published["n"] != 1.0:
+            raise ModelError(f"diagnose: got published_bouc_wen.n = {published['n']:g}, expected 1")
+        values = {n: v for n, v in published.values.items() if n != "n"}
+        model = model.without(PublishedBoucWen.name).with_effect(BoucWen(**values))
+    return with_zero(model)
+
+
+def with_zero(model: Model) -> Model:
+    """The model with a sensor zero."""
+    return model if Offset.name in model else model.with_effect(Offset())

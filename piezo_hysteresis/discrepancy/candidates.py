@@ -8,63 +8,20 @@ it. So residual and sensitivities are projected off everything the model can sti
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import BoucWen, Effect, MainsHum
-from ..effects.extent import Extent
 from ..errors import DivergenceError, ModelError, ParameterError
-from ..identification.content import content_of
 from ..identification.fit import Fit, gauge
 from ..identification.normal_equations import Gram, Nuisance, grams
 from ..model import Model
-from ..record import Record
+from .evidence import Evidence
 from .held_out import Score, held_out
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Evidence:
-    """Records that fit and choose, with their floors, and what is free in each of them.
-
-    Parameters
-    ----------
-    records : tuple of Record
-        In experiment order.
-    floors : (r,) ndarray
-        Floor of every record [m]; infinite where a record only carries the state of the stage.
-    nuisance : Nuisance
-        Free per record.
-    extent : Extent
-        What the records span.
-    alone : tuple of int
-        Records whose kind has no other; they are never left out.
-    """
-
-    records: tuple[Record, ...]
-    floors: Array
-    nuisance: Nuisance
-    extent: Extent
-    alone: tuple[int, ...] = ()
-
-    def broadband(self) -> list[int]:
-        """Records whose drive determines linear dynamics."""
-        return [
-            i
-            for i, (r, f) in enumerate(zip(self.records, self.floors, strict=True))
-            if np.isfinite(f) and r.sample_period < 1.001 * self.extent.fastest_period and content_of(r).is_broadband
-        ]
-
-    def with_peaks(self, peaks: tuple[float, ...]) -> Evidence:
-        """With the frequencies at which the residual stands out [Hz]."""
-        return replace(self, extent=replace(self.extent, peaks=peaks))
-
-    def with_hum(self, frequency: float) -> Evidence:
-        """With mains hum of its own amplitude and phase in every record."""
-        return replace(self, nuisance=replace(self.nuisance, hum_frequency=frequency))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -101,9 +58,14 @@ def free_numbers(model: Model, nuisance: Nuisance) -> list[str]:
             names.append(name)
     skipped = {"offset.y0", "offset.settling"} if nuisance.offset else set()
     skipped |= {f"{MainsHum.name}.f"}
-    if BoucWen.name in model and model[BoucWen.name]["A"] == 0.0:  # a loop that is switched off stays so
+    if loop_is_off(model):  # and stays so
         skipped |= {f"{BoucWen.name}.{n}" for n in ("A", "beta", "gamma")}
     return [n for n in names if n not in skipped]
+
+
+def loop_is_off(model: Model) -> bool:
+    """Whether the model has a loop that takes no part."""
+    return BoucWen.name in model and model[BoucWen.name]["A"] == 0.0
 
 
 def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:

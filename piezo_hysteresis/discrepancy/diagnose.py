@@ -8,29 +8,29 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import CATALOGUE, Effect, Offset, PublishedBoucWen
-from ..effects.bouc_wen import BoucWen
-from ..effects.extent import Extent
-from ..errors import IdentificationError, ModelError
+from ..effects import CATALOGUE, Effect
+from ..errors import IdentificationError
 from ..identification.carried import select as select_records
-from ..identification.fit import Fit, fit
+from ..identification.fit import Fit
 from ..identification.normal_equations import Nuisance, residuals
 from ..identification.roles import CARRYING
 from ..model import Model
-from ..record import Experiment, Notice, Record
-from .baseline import start_model
-from .candidates import Evidence, free_numbers, score_model
+from ..record import Experiment, Notice
+from .baseline import exact, start_model
+from .candidates import score_model
 from .diagnosis import Diagnosis, Verdict
+from .evidence import Evidence, extent_of, peaks_of
 from .few_records import diagnose_few
 from .gap import Gap, measure_gap
 from .localise import localise
-from .next_experiment import NextExperiment, propose
+from .next_experiment import decide
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
-from .refit import restart
+from .refit import joint, restart
 from .sampling import at_period, common_period, shortened, slowed
-from .selection import ADEQUATE, NAMED, Selection, select
+from .selection import ADEQUATE, NAMED, select
 from .split import reporting
+from .steps import Selection
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -39,14 +39,12 @@ FEWEST = 4
 """Records below which none can be held out and no name is given."""
 SEARCHED, FITTED = 6_000, 50_000
 """Samples of a fast record that take part in the search, and in the last fit."""
-LAST = 25
-"""Linearisations of the last fit."""
+LAST, PRECISE = 25, 1e-4
+"""Linearisations of the last fit, and relative decrease of the cost at which it has converged."""
 NOISY, WORTHWHILE = 1.1, 0.95
 """Cost over that of noise from which it is begun anew, and share of it that may be left for another time."""
 FALLS = 0.95
 """Share of the gap on records set aside that may remain after an effect is named."""
-MOVES = 30.0
-"""Power over noise from which the spectrum of the displacement counts as motion."""
 IDLE = ("idle", "hold", *CARRYING)
 """Phases that only bring the stage from one state to another."""
 
@@ -94,7 +92,7 @@ def diagnose(
     if severe:
         return _undecided(experiment, model, severe)
     if len(moving) < FEWEST:
-        return diagnose_few(experiment, model, moving, extent_of, effects, tell)
+        return diagnose_few(experiment, model, moving, effects, tell)
 
     tell("baseline", 0.0)
     spared = reporting(records, usable)
@@ -102,12 +100,11 @@ def diagnose(
     noise, least, span = noise_floors(records), floors(records), stroke(records)
     period = model.sample_period if model is not None else common_period(records)
     records = tuple(at_period(r, period) for r in records)
-    start = model or start_model(records, fitted)
-    start = _exact(start)
+    start = exact(model or start_model(records, fitted))
     kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
     evidence = Evidence(tuple(kept), np.array(sizes), Nuisance(), extent_of([records[i] for i in usable], start))
     tell("baseline, jointly", 0.25)
-    baseline = _joint(start, evidence)
+    baseline = joint(start, evidence, LAST, PRECISE)
     score = score_model(baseline.model, evidence)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
 
@@ -126,7 +123,7 @@ def diagnose(
     named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED
     whole = tuple(select_records(shortened(records, FITTED), least.tolist(), fitted)[0])
     plain = baseline.model if selection.accepted else selection.model  # the search may have found better dynamics
-    first = _joint(plain, replace(evidence, records=whole))
+    first = joint(plain, replace(evidence, records=whole), LAST, PRECISE)
     final_evidence = selection.accepted[-1].best.evidence if named else evidence
     final = _finished(selection, replace(final_evidence, records=whole), null) if named else first
     chosen = spared or tuple(fitted)
@@ -150,68 +147,14 @@ def diagnose(
         fit=final,
         where=where,
         gap=gap,
-        next_experiment=_next(selection, evidence),
+        next_experiment=decide(selection, evidence),
         notices=(*experiment.notices, *beyond_reach([records[i] for i in usable])),
-    )
-
-
-def extent_of(records: list[Record], model: Model) -> Extent:
-    """What the records span."""
-    return Extent(
-        voltage_min=min(float(r.voltage.min()) for r in records),
-        voltage_max=max(float(r.voltage.max()) for r in records),
-        max_slew=max(float(np.abs(np.diff(r.voltage)).max(initial=0.0)) / r.sample_period for r in records),
-        voltage_scale=model.voltage_scale,
-        displacement_scale=model.displacement_scale,
-        fastest_period=min(r.sample_period for r in records),
-        duration=max(r.start_time + r.duration for r in records) - min(r.start_time for r in records),
-        longest_record=max(r.duration for r in records),
-    )
-
-
-def peaks_of(records: list[Record], left: list[Array], most: int = 3) -> tuple[float, ...]:
-    """Frequencies at which the residual stands out of the displacement most [Hz]: seeds for a resonance.
-
-    Only where the stage moves well above the noise, which is read off the top of the band.
-    """
-    period = min(r.sample_period for r in records)
-    grid = np.geomspace(20.0, 0.45 / period, 200)
-    power, reach, lines = np.zeros(grid.size), np.zeros(grid.size), np.zeros(grid.size)
-    for record, e in zip(records, left, strict=True):
-        if record.sample_period > 1.001 * period or e.size < 256:
-            continue
-        window = np.hanning(e.size)
-        index = np.searchsorted(grid, np.fft.rfftfreq(e.size, record.sample_period))
-        inside = (index > 0) & (index < grid.size)
-        lines += np.bincount(index[inside], minlength=grid.size)
-        for total, signal in ((power, e), (reach, record.displacement)):
-            spectrum = np.abs(np.fft.rfft(window * (signal - signal.mean()))) ** 2 / e.size
-            total += np.bincount(index[inside], spectrum[inside], grid.size)
-    held = lines > 0
-    if held.sum() < 8:
-        return ()
-    frequency, power, reach = grid[held], power[held] / lines[held], reach[held] / lines[held]
-    noise = float(np.median(power[frequency > 0.3 / period]))
-    ratio = np.where(reach > MOVES * noise, np.maximum(power - noise, 0.0) / reach, 0.0)
-    tops = 1 + np.flatnonzero((ratio[1:-1] > ratio[:-2]) & (ratio[1:-1] >= ratio[2:]))
-    return tuple(float(frequency[k]) for k in tops[np.argsort(-ratio[tops])][:most])
-
-
-def _joint(model: Model, evidence: Evidence) -> Fit:
-    return fit(
-        model,
-        evidence.records,
-        free_numbers(model, evidence.nuisance),
-        floors=evidence.floors.tolist(),
-        nuisance=evidence.nuisance,
-        max_iterations=LAST,
-        tolerance=1e-4,
     )
 
 
 def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:
     """The last fit, on all samples, begun anew behind new dynamics while that helps."""
-    final = _joint(selection.model, evidence)
+    final = joint(selection.model, evidence, LAST, PRECISE)
     last = selection.accepted[-1].best
     while final.cost > NOISY * null:
         anew = restart(replace(last, effect=final.model[last.name], evidence=evidence, fit=final), LAST).fit
@@ -219,17 +162,6 @@ def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:
             break
         final = anew
     return final
-
-
-def _exact(model: Model) -> Model:
-    """The model with the exact loop, which the terms of the catalogue join, and with a sensor zero."""
-    if PublishedBoucWen.name in model:
-        published = model[PublishedBoucWen.name]
-        if published["n"] != 1.0:
-            raise ModelError(f"diagnose: got published_bouc_wen.n = {published['n']:g}, expected 1")
-        values = {n: v for n, v in published.values.items() if n != "n"}
-        model = model.without(PublishedBoucWen.name).with_effect(BoucWen(**values))
-    return model if Offset.name in model else model.with_effect(Offset())
 
 
 def _verdict(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Verdict, str]:
@@ -253,17 +185,6 @@ def _verdict(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[
         share = 100 * selection.explained(closest.score)
         told = f"; closest is {closest.effect.public_name()}, which explains {share:.0f} %"
     return Verdict.UNKNOWN, f"The model misses an effect that the catalogue does not explain{told}."
-
-
-def _next(selection: Selection, evidence: Evidence) -> NextExperiment | None:
-    """For the first accepted effect that has a rival."""
-    for step in selection.accepted:
-        mine = step.best
-        others = [r for r in step.rivals if r.effect.public_name() != mine.effect.public_name()]
-        if others and mine.fit is not None and others[0].fit is not None:
-            pair = (mine.effect.public_name(), others[0].effect.public_name())
-            return propose(mine.fit.model, others[0].fit.model, pair, evidence)
-    return None
 
 
 def _undecided(experiment: Experiment, model: Model | None, severe: list[Notice]) -> Diagnosis:

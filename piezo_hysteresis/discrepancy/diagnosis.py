@@ -12,7 +12,7 @@ from ..record import Notice
 from .gap import Gap
 from .localise import Place
 from .next_experiment import NextExperiment
-from .selection import Rejection, Selection
+from .steps import Rejection, Selection
 
 SCHEMA = 1
 

@@ -11,27 +11,31 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects import BoucWen, Effect, HysteresisMemory, Offset
-from ..effects.extent import Extent
-from ..identification.fit import Fit, fit
+from ..effects import BoucWen, Effect, HysteresisMemory
 from ..identification.identify import identify
 from ..identification.leading_step import step_length
 from ..identification.normal_equations import Nuisance, residuals
 from ..model import Model
 from ..record import Experiment, Record
-from .candidates import Candidate, Evidence, free_numbers, score_model
+from .baseline import with_zero
+from .candidates import Candidate, loop_is_off, score_model
 from .diagnosis import Diagnosis, Verdict
+from .evidence import Evidence, extent_of
 from .gap import measure_gap
 from .localise import localise
-from .next_experiment import NextExperiment, propose
+from .next_experiment import decide
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
-from .selection import ADEQUATE, Selection, Step, explained, select
+from .refit import joint
+from .selection import ADEQUATE, select
+from .steps import Selection, Step, explained
 
 BLOCKS = 16
 """Blocks into which the records are cut, about."""
 FEWEST = 256
 """Samples of a block at least."""
+LAST, PRECISE = 25, 1e-6
+"""Linearisations of a fit, and relative decrease of the cost at which it has converged."""
 
 Progress = Callable[[str, float], None]
 
@@ -40,7 +44,6 @@ def diagnose_few(
     experiment: Experiment,
     model: Model | None,
     used: Collection[int],
-    extent: Callable[[list[Record], Model], Extent],
     effects: Collection[type[Effect]],
     tell: Progress,
 ) -> Diagnosis:
@@ -54,8 +57,6 @@ def diagnose_few(
         Where to begin; identified from the experiment where None.
     used : collection of int
         Indices of the records in which the drive moves.
-    extent : callable
-        What records span, for the starts of the search.
     effects : collection of Effect classes
         The library to choose from.
     tell : callable
@@ -71,22 +72,22 @@ def diagnose_few(
     weights = np.array([np.inf if k is None else least[k] for k in origin])
     runs = sum(not r.continues for r in records)
     jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
-    span = extent([records[i] for i in used], start)
+    span = extent_of([records[i] for i in used], start)
     evidence = Evidence(tuple(blocks), weights, Nuisance(offset=runs > 1), span, jumps)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in used]))
-    baseline = _joint(_zeroed(state), evidence)
+    baseline = joint(with_zero(state), evidence, LAST, PRECISE)
     before = score_model(baseline.model, evidence)
     steps: list[Step] = []
     now, score = baseline, before
     if HysteresisMemory.name in start and HysteresisMemory.name not in state:
-        now = _joint(_zeroed(start), evidence)
+        now = joint(with_zero(start), evidence, LAST, PRECISE)
         score = score_model(now.model, evidence)
         memory = Candidate(now.model[HysteresisMemory.name], evidence, score, now)
         steps.append(Step(before, memory, True, (), ()))
     tell("where", 0.45)
     left = residuals(baseline.model, records, Nuisance(offset=True))
     where = localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])
-    fitting = [e for e in effects if not (_loop_is_off(now.model) and e.host == BoucWen.name)]
+    fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == BoucWen.name)]
     found = select(now.model, evidence, score, null, fitting, lambda word, part: tell(word, 0.5 + 0.4 * part))
     selection = Selection(baseline.model, found.model, found.score, (*steps, *found.steps), null)
     final_evidence = found.accepted[-1].best.evidence if found.accepted else evidence
@@ -122,7 +123,7 @@ def diagnose_few(
         fit=final,
         where=where,
         gap=gap,
-        next_experiment=_next(selection, evidence),
+        next_experiment=decide(selection, evidence),
         notices=(*experiment.notices, *lacking),
     )
 
@@ -152,27 +153,3 @@ def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Re
         blocks += [cuts[0], *(replace(c, initial_voltage=None) for c in cuts[1:])]
         origin += [index] * len(cuts)
     return blocks, origin
-
-
-def _zeroed(model: Model) -> Model:
-    return model if Offset.name in model else model.with_effect(Offset())
-
-
-def _loop_is_off(model: Model) -> bool:
-    return BoucWen.name in model and model[BoucWen.name]["A"] == 0.0
-
-
-def _joint(model: Model, evidence: Evidence) -> Fit:
-    free = free_numbers(model, evidence.nuisance)
-    return fit(
-        model, evidence.records, free, floors=evidence.floors.tolist(), nuisance=evidence.nuisance, max_iterations=25
-    )
-
-
-def _next(selection: Selection, evidence: Evidence) -> NextExperiment | None:
-    for step in selection.accepted:
-        others = [r for r in step.rivals if r.effect.public_name() != step.best.effect.public_name()]
-        if others and step.best.fit is not None and others[0].fit is not None:
-            pair = (step.best.effect.public_name(), others[0].effect.public_name())
-            return propose(step.best.fit.model, others[0].fit.model, pair, evidence)
-    return None

@@ -13,7 +13,9 @@ from ..identification.fit import gauge
 from ..identification.normal_equations import grams
 from ..model import Model
 from ..record import Record
-from .candidates import Evidence, free_numbers, weighted_sum
+from .candidates import free_numbers, weighted_sum
+from .evidence import Evidence
+from .steps import Selection
 
 Array = NDArray[np.float64]
 
@@ -110,3 +112,14 @@ def propose(first: Model, second: Model, names: tuple[str, str], evidence: Evide
         if power > best.power:
             best = NextExperiment(name, names, power)
     return best
+
+
+def decide(selection: Selection, evidence: Evidence) -> NextExperiment | None:
+    """For the first accepted effect that has a rival."""
+    for step in selection.accepted:
+        mine = step.best
+        others = [r for r in step.rivals if r.effect.public_name() != mine.effect.public_name()]
+        if others and mine.fit is not None and others[0].fit is not None:
+            pair = (mine.effect.public_name(), others[0].effect.public_name())
+            return propose(mine.fit.model, others[0].fit.model, pair, evidence)
+    return None

@@ -16,7 +16,8 @@ from ..identification.dynamics import identify_arx
 from ..identification.fit import Fit, fit
 from ..identification.linear_start import dynamics_behind, hysteresis_signals, with_dynamics
 from ..model import Model
-from .candidates import Candidate, Evidence, free_numbers, score_model
+from .candidates import Candidate, free_numbers, score_model
+from .evidence import Evidence
 from .held_out import Score
 
 LINEAR = ("lag", "dynamics")
@@ -41,6 +42,36 @@ class Fitted:
     score: Score
 
 
+def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
+    """All free numbers of a model fitted to the evidence at once.
+
+    Parameters
+    ----------
+    model : Model
+        Where to begin.
+    evidence : Evidence
+        Records, floors, and what is free in each record.
+    max_iterations : int
+        Linearisations.
+    tolerance : float
+        Relative decrease of the cost at which the fit has converged.
+
+    Raises
+    ------
+    DivergenceError, ParameterError, ModelError, IdentificationError
+        As `fit` does.
+    """
+    return fit(
+        model,
+        evidence.records,
+        free_numbers(model, evidence.nuisance),
+        floors=evidence.floors.tolist(),
+        nuisance=evidence.nuisance,
+        max_iterations=max_iterations,
+        tolerance=tolerance,
+    )
+
+
 def refit(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
     """Fit the model with the candidate jointly, from its start; None where that diverges."""
     return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
@@ -56,7 +87,7 @@ def proceed(candidate: Candidate, max_iterations: int) -> Candidate:
 
 def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
     try:
-        result = _joint(model, candidate.evidence, max_iterations)
+        result = joint(model, candidate.evidence, max_iterations)
         score = score_model(result.model, candidate.evidence)
     except (DivergenceError, ParameterError, ModelError, IdentificationError):
         return None
@@ -100,7 +131,7 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
     found = []
     for start in starts:
         try:
-            fitted = _joint(start, evidence, max_iterations)
+            fitted = joint(start, evidence, max_iterations)
             found.append(Fitted(fitted.model, score_model(fitted.model, evidence)))
         except (DivergenceError, ParameterError, ModelError, IdentificationError):
             continue
@@ -157,15 +188,3 @@ def _absorbed(model: Model, extended: Model, evidence: Evidence) -> Model | None
         return with_dynamics(model, found.arx)
     except (IdentificationError, ParameterError, DivergenceError):
         return None
-
-
-def _joint(model: Model, evidence: Evidence, max_iterations: int) -> Fit:
-    return fit(
-        model,
-        evidence.records,
-        free_numbers(model, evidence.nuisance),
-        floors=evidence.floors.tolist(),
-        nuisance=evidence.nuisance,
-        max_iterations=max_iterations,
-        tolerance=TOLERANCE,
-    )

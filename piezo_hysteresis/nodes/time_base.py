@@ -66,7 +66,7 @@ class TimeBase:
 
     def stamp(self, index: int) -> int:
         """Stamp of a sample [ns]; not below zero, where a simulated clock has just begun."""
-        return max(0, self._stamp + round((index - self._index) * self.sample_period * _NANO))
+        return max(0, self._stamp_at(index))
 
     def follow(self, index: int, steady: float, node: int) -> float:
         """Anchor anew at `index` if the node's clock, read together with the steady one, has jumped.
@@ -79,9 +79,7 @@ class TimeBase:
         jump = node - round(steady * _NANO) - self._offset
         if abs(jump) <= self.tolerance * _NANO:
             return 0.0
-        self._anchor(
-            index, self.due(index), self._stamp + round((index - self._index) * self.sample_period * _NANO) + jump
-        )
+        self._anchor(index, self.due(index), self._stamp_at(index) + jump)
         self._offset += jump
         return jump / _NANO
 
@@ -97,8 +95,11 @@ class TimeBase:
         """
         delay = steady - self.due(index)
         moved = round(delay * _NANO) if self._real_period == self.sample_period else 0
-        self._anchor(index, steady, self.stamp(index) + moved)
+        self._anchor(index, steady, self._stamp_at(index) + moved)
         return delay
+
+    def _stamp_at(self, index: int) -> int:
+        return self._stamp + round((index - self._index) * self.sample_period * _NANO)
 
     def _anchor(self, index: int, steady: float, stamp: int) -> None:
         self._index, self._steady, self._stamp = index, steady, stamp

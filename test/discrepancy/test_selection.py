@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from piezo_hysteresis.discrepancy.held_out import Score
-from piezo_hysteresis.discrepancy.selection import ADEQUATE, Selection, explained, select
+from piezo_hysteresis.discrepancy.selection import ADEQUATE, select
+from piezo_hysteresis.discrepancy.steps import Selection, explained
 
 
 @given(null=st.floats(0.1, 1.5), gap=st.floats(1.0, 1e4), share=st.floats(0.0, 1.0))

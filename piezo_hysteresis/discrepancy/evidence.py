@@ -1,0 +1,103 @@
+"""`Evidence`: the records that fit and choose, and what they span."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.extent import Extent
+from ..identification.content import content_of
+from ..identification.normal_equations import Nuisance
+from ..model import Model
+from ..record import Record
+
+Array = NDArray[np.float64]
+
+MOVES = 30.0
+"""Power over noise from which the spectrum of the displacement counts as motion."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Evidence:
+    """Records that fit and choose, with their floors, and what is free in each of them.
+
+    Parameters
+    ----------
+    records : tuple of Record
+        In experiment order.
+    floors : (r,) ndarray
+        Floor of every record [m]; infinite where a record only carries the state of the stage.
+    nuisance : Nuisance
+        Free per record.
+    extent : Extent
+        What the records span.
+    alone : tuple of int
+        Records whose kind has no other; they are never left out.
+    """
+
+    records: tuple[Record, ...]
+    floors: Array
+    nuisance: Nuisance
+    extent: Extent
+    alone: tuple[int, ...] = ()
+
+    def broadband(self) -> list[int]:
+        """Records whose drive determines linear dynamics."""
+        return [
+            i
+            for i, (r, f) in enumerate(zip(self.records, self.floors, strict=True))
+            if np.isfinite(f) and r.sample_period < 1.001 * self.extent.fastest_period and content_of(r).is_broadband
+        ]
+
+    def with_peaks(self, peaks: tuple[float, ...]) -> Evidence:
+        """With the frequencies at which the residual stands out [Hz]."""
+        return replace(self, extent=replace(self.extent, peaks=peaks))
+
+    def with_hum(self, frequency: float) -> Evidence:
+        """With mains hum of its own amplitude and phase in every record."""
+        return replace(self, nuisance=replace(self.nuisance, hum_frequency=frequency))
+
+
+def extent_of(records: Sequence[Record], model: Model) -> Extent:
+    """What the records span."""
+    return Extent(
+        voltage_min=min(float(r.voltage.min()) for r in records),
+        voltage_max=max(float(r.voltage.max()) for r in records),
+        max_slew=max(float(np.abs(np.diff(r.voltage)).max(initial=0.0)) / r.sample_period for r in records),
+        voltage_scale=model.voltage_scale,
+        displacement_scale=model.displacement_scale,
+        fastest_period=min(r.sample_period for r in records),
+        duration=max(r.start_time + r.duration for r in records) - min(r.start_time for r in records),
+        longest_record=max(r.duration for r in records),
+    )
+
+
+def peaks_of(records: Sequence[Record], left: Sequence[Array], most: int = 3) -> tuple[float, ...]:
+    """Frequencies at which the residual stands out of the displacement most [Hz]: seeds for a resonance.
+
+    Only where the stage moves well above the noise, which is read off the top of the band.
+    """
+    period = min(r.sample_period for r in records)
+    grid = np.geomspace(20.0, 0.45 / period, 200)
+    power, reach, lines = np.zeros(grid.size), np.zeros(grid.size), np.zeros(grid.size)
+    for record, e in zip(records, left, strict=True):
+        if record.sample_period > 1.001 * period or e.size < 256:
+            continue
+        window = np.hanning(e.size)
+        index = np.searchsorted(grid, np.fft.rfftfreq(e.size, record.sample_period))
+        inside = (index > 0) & (index < grid.size)
+        lines += np.bincount(index[inside], minlength=grid.size)
+        for total, signal in ((power, e), (reach, record.displacement)):
+            spectrum = np.abs(np.fft.rfft(window * (signal - signal.mean()))) ** 2 / e.size
+            total += np.bincount(index[inside], spectrum[inside], grid.size)
+    held = lines > 0
+    if held.sum() < 8:
+        return ()
+    frequency, power, reach = grid[held], power[held] / lines[held], reach[held] / lines[held]
+    noise = float(np.median(power[frequency > 0.3 / period]))
+    ratio = np.where(reach > MOVES * noise, np.maximum(power - noise, 0.0) / reach, 0.0)
+    tops = 1 + np.flatnonzero((ratio[1:-1] > ratio[:-2]) & (ratio[1:-1] >= ratio[2:]))
+    return tuple(float(frequency[k]) for k in tops[np.argsort(-ratio[tops])][:most])
