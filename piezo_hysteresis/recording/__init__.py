@@ -18,6 +18,7 @@
 ``history``           a phase before which others were played that are not recorded
 ``moved``             the drive moved in the idle before the first phase
 ``proposed``          names of phases that come from what the drive looks like
+``averaged``          a recording too long for the memory, averaged on reading
 ``columns`` ``held``  how channels were found in a file of other software, and paired
 ``time_base``         times that are uneven, overlap, or are those of reception
 ====================  ==========================================================================================
@@ -73,7 +74,7 @@ def read(
     rows: tuple[int | None, int | None] | None = None,
     phases: str | Sequence[tuple[float, str]] | None = None,
     include: Sequence[str] = (),
-    average: int = 1,
+    average: int | None = None,
     decimate: Mapping[str, int] | None = None,
 ) -> Experiment:
     """Read a recording, whatever its format, or several of one stage as one experiment.
@@ -124,12 +125,8 @@ def read(
 
 def _one(place: Path, chosen: Format, layout: Layout) -> Experiment:
     """The experiment of one path, what its records claim about their beginning checked."""
-    experiment = chosen.read(place, layout if chosen.averages else replace(layout, average=1))
+    experiment = chosen.read(place, layout)
     records = experiment.records
-    if layout.average > 1 and not chosen.averages:
-        records = tuple(r.decimate(layout.average) for r in records if r.size >= layout.average)
-        if not records:
-            raise RecordingError(f"{place}: average: got {layout.average}, expected fewer samples than a phase has")
     if records[0].continues:  # what it continues is not here
         records = (replace(records[0], continues=False, truncated=True), *records[1:])
     if layout.initial_voltage is not None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from ..errors import RecordingError
 from ..record import Experiment, Notice, Record
 from .damage import naming
+from .intake import averaged_notice
 from .layout import CHANNELS, LABELS, Layout
 from .table import resolve, table_records
 from .text_cells import Dialect, read_cells
@@ -40,12 +41,15 @@ class Csv:
             places = found.columns
             numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
             words = {name: at for name, (at, _) in places.items() if name in LABELS}
-            columns, marks, bad = read_cells(path, dialect, numbers, words, layout)
-            channels = {name: layout.in_si(name, values, places[name][1]) for name, values in columns.items()}
-            records, notices = table_records(channels, marks, layout.after_reading(), truncated=layout.passes_over)
+            cells = read_cells(path, dialect, numbers, words, layout)
+            channels = {name: layout.in_si(name, values, places[name][1]) for name, values in cells.columns.items()}
+            rest = layout.after_reading(cells.average)
+            records, notices = table_records(channels, cells.marks, rest, truncated=layout.passes_over)
             notices += found.notices
-            if bad:
-                notices.append(Notice("not_a_number", f"{bad} cells are empty or no number"))
+            if layout.average is None and cells.average > 1:
+                notices.append(averaged_notice(cells.average, records[0].sample_period))
+            if cells.bad:
+                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or no number"))
             return Experiment(tuple(records), str(path), tuple(notices))
 
     def write(self, experiment: Experiment, path: Path) -> None:

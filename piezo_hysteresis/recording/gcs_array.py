@@ -8,6 +8,7 @@ from pathlib import Path
 from ..errors import RecordingError
 from ..record import Experiment, Notice
 from .damage import naming
+from .intake import averaged_notice
 from .layout import CHANNELS, Layout
 from .table import resolve, table_records
 from .text_cells import BLOCK_BYTES, Dialect, decoded, read_cells
@@ -45,21 +46,23 @@ class GcsArray:
             separator = int(header.get("SEPARATOR", "32"))
             dialect = Dialect(None if separator in (9, 32) else chr(separator), False, skipped, (), width)
             numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
-            values, _, bad = read_cells(path, dialect, numbers, {}, layout)
+            cells = read_cells(path, dialect, numbers, {}, layout)
             units = {"voltage": "V", "displacement": "um", "other_displacement": "um", "time": "s"}
-            channels = {name: layout.in_si(name, column, units.get(name)) for name, column in values.items()}
+            channels = {name: layout.in_si(name, column, units.get(name)) for name, column in cells.columns.items()}
             period = layout.sample_period or float(header.get("SAMPLE_TIME", "nan"))
-            rest = layout.with_period(period if period > 0 else None).after_reading()
+            rest = layout.with_period(period if period > 0 else None).after_reading(cells.average)
             records, notices = table_records(channels, [], rest, truncated=layout.passes_over)
             said = ", ".join(f"{name} = '{titles[at]}'" for name, at in numbers.items())
             notices.append(Notice("columns", f"columns taken: {said}; positions without a unit in um"))
             declared = int(header.get("NDATA", "-1"))
-            if declared >= 0 and layout.rows is None and layout.average == 1 and channels["voltage"].size != declared:
+            if declared >= 0 and layout.rows is None and cells.average == 1 and channels["voltage"].size != declared:
                 notices.append(
                     Notice("cut", f"got {channels['voltage'].size} rows of the {declared} that the header declares")
                 )
-            if bad:
-                notices.append(Notice("not_a_number", f"{bad} cells are empty or no number"))
+            if layout.average is None and cells.average > 1:
+                notices.append(averaged_notice(cells.average, records[0].sample_period))
+            if cells.bad:
+                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or no number"))
             return Experiment(tuple(records), str(path), tuple(notices))
 
 

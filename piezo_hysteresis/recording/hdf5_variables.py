@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from ..record import Samples
 from .intake import Intake
 from .layout import Layout
 
@@ -72,8 +71,8 @@ class Hdf5Variables(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
-    def samples(self, name: str, column: int | None, layout: Layout) -> Samples:
-        """A vector, or a column of a matrix; only the rows that a layout keeps are read.
+    def samples(self, name: str, column: int | None, layout: Layout) -> Intake:
+        """The one column of a vector, or a column of a matrix; only the rows that a layout keeps are read.
 
         Parameters
         ----------
@@ -104,7 +103,7 @@ class Hdf5Variables(Mapping[str, NDArray[Any]]):
             intake.add(np.empty((_ROWS, 1)) if skipped else np.asarray(dataset[tuple(index)], np.float64)[:, None])
             if intake.is_full:
                 break
-        return intake.column(0)
+        return intake
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         dataset = self._numbers(name)

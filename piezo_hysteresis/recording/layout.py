@@ -43,8 +43,9 @@ class Layout:
         first samples, and without `initial_voltage`, a record is `truncated`.
     phases : str or sequence of (float, str), optional
         Name of the only phase, or start time [s] and name of each one, instead of what the data propose.
-    average : int
-        Samples averaged into one while they are read, so that a large file fits into memory.
+    average : int, optional
+        Samples averaged into one while they are read. Default 1, and in a recording that is too long for the memory
+        as few as it takes; 1 keeps every sample, or refuses.
     include : sequence of str
         Phases to keep that are otherwise left out: ``idle``, ``hold``.
 
@@ -62,7 +63,7 @@ class Layout:
     rows: tuple[int | None, int | None] | None = None
     phases: str | Sequence[tuple[float, str]] | None = None
     include: Sequence[str] = ()
-    average: int = 1
+    average: int | None = None
 
     def __post_init__(self) -> None:
         known = (*CHANNELS, *LABELS)
@@ -75,7 +76,7 @@ class Layout:
             raise RecordingError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
         if self.initial_voltage is not None and not math.isfinite(self.initial_voltage):
             raise RecordingError(f"initial_voltage: got {self.initial_voltage!r} V, expected a finite voltage")
-        if self.average < 1:
+        if self.average is not None and self.average < 1:
             raise RecordingError(f"average: got {self.average}, expected a whole number of samples, 1 or more")
         columns = {k: int(c) if isinstance(c, str) and c.isdigit() else c for k, c in self.columns.items()}
         for name, column in columns.items():
@@ -97,13 +98,15 @@ class Layout:
             return 0, None
         return start or 0, stop
 
-    def after_reading(self) -> Layout:
-        """What is left to do of it once `from_the_beginning` and `average` have been applied."""
+    def after_reading(self, average: int) -> Layout:
+        """What is left to do once `from_the_beginning` has been applied and `average` samples became one."""
         rows = None if self.rows is None or self.from_the_beginning != (0, None) else self.rows
-        period = None if self.sample_period is None else self.sample_period * self.average
-        if rows is not None and self.average > 1:
-            raise RecordingError(f"rows: got {self.rows} with an average, expected rows counted from the beginning")
-        return replace(self, rows=rows, sample_period=period)
+        period = None if self.sample_period is None else self.sample_period * average
+        if rows is not None and average > 1:
+            raise RecordingError(
+                f"rows: got {self.rows} of a recording that is averaged, expected rows counted from the beginning"
+            )
+        return replace(self, rows=rows, sample_period=period, average=average)
 
     def part(self, size: int) -> slice:
         """`rows` as a slice of a record of `size` samples."""

@@ -12,17 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from ..record import Experiment, Notice, Record, Samples
+from ..record import Experiment, Notice, Record
 from .damage import naming
 from .guess import guess_notice, guessed, guessed_period, unit_in
 from .hdf5_variables import Hdf5Variables, is_hdf5
-from .intake import Intake
+from .intake import Intake, averaged_notice
 from .layout import CHANNELS, LABELS, Layout
 from .mat5_sizes import check_sizes
 from .table import table_records
 
 _PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
 _STRUCT = "phase_"
+_ROWS = 1 << 20
 
 Variables = Mapping[str, NDArray[Any]]
 
@@ -122,17 +123,20 @@ def _records(
         if channel not in places:
             raise RecordingError(f"got {_listed(variables)}, expected {given[channel]}; name it by columns")
     units = {c: unit_in(place, c) for c, place in places.items() if c in CHANNELS}
-    columns = {c: layout.in_si(c, _channel(variables, places[c], layout), units[c]) for c in CHANNELS if c in places}
+    intakes = {c: _channel(variables, places[c], layout) for c in CHANNELS if c in places}
+    columns = {c: layout.in_si(c, intake.column(0), units[c]) for c, intake in intakes.items()}
     sizes = {name: values.size for name, values in columns.items()}
     if len(set(sizes.values())) > 1:
         raise RecordingError(f"got channels of {sizes} samples, expected equal lengths")
-    records, notices = table_records(
-        columns, [(0, labels)], layout.after_reading(), before, truncated=layout.passes_over
-    )
+    average = intakes["voltage"].factor
+    rest = layout.after_reading(average)
+    records, notices = table_records(columns, [(0, labels)], rest, before, truncated=layout.passes_over)
+    if layout.average is None and average > 1:
+        notices.append(averaged_notice(average, records[0].sample_period, labels.get("phase", "")))
     return records, [*notices, *guess_notice(guess, units)]
 
 
-def _channel(variables: Variables, place: str, layout: Layout) -> Samples:
+def _channel(variables: Variables, place: str, layout: Layout) -> Intake:
     match = _PLACE.fullmatch(place)
     name, number = (match["name"], match["column"]) if match else (place, None)
     if name not in variables:
@@ -148,8 +152,10 @@ def _channel(variables: Variables, place: str, layout: Layout) -> Samples:
     if column is None and values.size != max(values.shape, default=1):
         raise RecordingError(f"{place}: got shape {values.shape}, expected a vector; choose a column as {place}[1]")
     intake = Intake.of(1, layout)
-    intake.add((values.ravel() if column is None else values[:, column]).astype(np.float64, copy=False)[:, None])
-    return intake.column(0)
+    whole = values.ravel() if column is None else values[:, column]
+    for first in range(0, whole.size, _ROWS):
+        intake.add(whole[first : first + _ROWS].astype(np.float64, copy=False)[:, None])
+    return intake
 
 
 def _label(value: NDArray[Any], place: str) -> str:

@@ -116,7 +116,7 @@ def table_records(
     marks : sequence of Mark
         Where records begin, and their labels; empty for a table in one piece without any.
     layout : Layout
-        Its `rows`, `phases`, `sample_period` apply.
+        Its `rows`, `phases`, `sample_period` apply; its `average` has been applied.
     before : sequence of Record
         Records of tables that come before.
     truncated : bool
@@ -162,7 +162,7 @@ def _stretch(
     phase = labels.get("phase") or "record"
     time = columns.get("time")
     labelled_period = _number(labels, "sample_period")
-    period = layout.sample_period or (labelled_period and labelled_period * layout.average)
+    period = layout.sample_period or (labelled_period and labelled_period * (layout.average or 1))
     notices: list[Notice] = []
     breaks: dict[int, int] = {}
     if time is not None and (time.size > 1 or period is None):

@@ -93,6 +93,20 @@ class Dialect:
         return float(np.sum(numeric)) / len(body), width, cls(delimiter, comma, first, header, width)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Cells:
+    """What was read of a text file."""
+
+    columns: dict[str, Samples]
+    """The numbers, each of shape (n,); NaN where a cell is empty or no number."""
+    marks: list[tuple[int, dict[str, str]]]
+    """The words and the first row kept at which they are those; empty without words."""
+    bad: int
+    """Cells that are no number."""
+    average: int
+    """Rows that were averaged into one."""
+
+
 def decoded(block: bytes) -> str:
     """Text in UTF-8, or else in the Latin-1 of older instruments."""
     try:
@@ -103,7 +117,7 @@ def decoded(block: bytes) -> str:
 
 def read_cells(
     path: Path, dialect: Dialect, numbers: Mapping[str, int], words: Mapping[str, int], layout: Layout
-) -> tuple[dict[str, Samples], list[tuple[int, dict[str, str]]], int]:
+) -> Cells:
     """Read columns of a text file.
 
     Parameters
@@ -116,15 +130,6 @@ def read_cells(
         Name of every column to read to its position, counted from 0.
     layout : Layout
         Its `rows`, where they count from the beginning, and its `average` apply before anything is kept.
-
-    Returns
-    -------
-    columns : dict of str to (n,) ndarray
-        The `numbers`; NaN where a cell is empty or no number.
-    marks : list of (int, dict)
-        The `words` and the first row kept at which they are those; empty without words.
-    bad : int
-        Cells that are no number.
 
     Raises
     ------
@@ -152,7 +157,7 @@ def read_cells(
         if intake.is_full:
             break
     columns = {name: intake.column(at) for at, name in enumerate(numbers)}
-    return columns, [(intake.kept_row(row), labels) for row, labels in marks], bad
+    return Cells(columns, [(intake.kept_row(row), labels) for row, labels in marks], bad, intake.factor)
 
 
 def _line_blocks(path: Path, skipped: int) -> Iterator[list[str]]:
