@@ -69,7 +69,8 @@ def _differs(record: Record, factor: int) -> bool:
 def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
     """Every record with about `most` samples: slow ones averaged, fast ones cut where the beginning stands for all.
 
-    A record that another one continues is not cut, and neither is one whose drive changes on its way.
+    A record that another one continues is not cut, and neither is one whose drive changes on its way. One that moves
+    the dynamics is not averaged: at a longer period the model knows them as a lag only.
 
     Parameters
     ----------
@@ -80,9 +81,13 @@ def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
     """
     followed = [*(r.continues for r in records[1:]), False]
     return tuple(
-        r[:most] if r.size > most and not goes_on and _is_alike(r, most) else _averaged(r, r.size // most)
+        r[:most] if r.size > most and not goes_on and _is_alike(r, most) else _thinned(r, most)
         for r, goes_on in zip(records, followed, strict=True)
     )
+
+
+def _thinned(record: Record, most: int) -> Record:
+    return _averaged(record, record.size // most) if content_of(record).is_slow else record
 
 
 def _is_alike(record: Record, most: int) -> bool:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from ..parameter import Parameter
 from .block import Block
 from .effect import Effect, Place, Setting
+from .extent import Extent
 from .pole import PoleBlock
+
+FOUND_BY = (1e-5, 2e-5, 5e-5)
+"""Time constants at which a search begins [s]."""
 
 
 class AmplifierBandwidth(Effect):
@@ -24,6 +30,11 @@ class AmplifierBandwidth(Effect):
     signature = "lag growing with frequency at every amplitude; below one sample not separable from the other lags"
     source = "R·C of amplifier and actuator, 15–60 µs"
     parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-2, "time constant R·C", "R·C", 0.0, 2e-5),)
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Off, and of several sizes: what stands behind the pole is no linear system."""
+        return cls(), *(cls(tau=tau) for tau in FOUND_BY)
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         return PoleBlock("amplifier_bandwidth.tau", self["tau"], 1, setting.sample_period)

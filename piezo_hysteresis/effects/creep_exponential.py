@@ -14,6 +14,9 @@ from .extent import Extent
 from .linear_block import AddedBlock
 from .pole import PoleBlock
 
+FASTEST = 5e-3
+"""Time constant below which a relaxation is no creep but dynamics [s]."""
+
 
 class CreepExponential(Effect):
     """Relaxations added to the response: the classical creep model of spring and damper pairs.
@@ -35,13 +38,14 @@ class CreepExponential(Effect):
     source = "Croft, Shed, Devasia 2001, Kelvin-Voigt creep"
     parameters = (
         Parameter("c", "c_k", "1", (0.0, 0.0), 0.0, 0.2, "final share of each relaxation", "Croft 2001", 0.0, 0.01),
-        Parameter("tau", "τ_k", "s", (0.3, 10.0), 1e-4, 1e5, "time constants", "Croft 2001", scale=1.0),
+        Parameter("tau", "τ_k", "s", (0.3, 10.0), FASTEST, 1e5, "time constants", "Croft 2001", scale=1.0),
     )
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         longest = extent.longest_record
-        return tuple(cls(tau=(share * longest, 20.0 * share * longest)) for share in (0.001, 0.01, 0.1))
+        begin = (max(FASTEST, share * longest) for share in (0.001, 0.01, 0.1))
+        return tuple(cls(tau=(tau, 20.0 * tau)) for tau in begin)
 
     def check(self) -> None:
         if self.array("c").size != self.array("tau").size:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from ..parameter import Parameter
 from .effect import Place, Term
+from .extent import Extent
+
+FOUND_BY = (1.3, 1.7)
+"""Exponents at which a search begins."""
 
 
 class HysteresisExponent(Term):
@@ -27,3 +33,8 @@ class HysteresisExponent(Term):
     signature = "loop shape that changes with amplitude, at four amplitudes or more"
     source = "paper, Eq. (2), general n; Ismail et al. 2009"
     parameters = (Parameter("n", "n", "1", 1.0, 1.0, 4.0, "exponent of the loss", "paper, Eq. (2)", 1.0, 0.2),)
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Off, and of several sizes."""
+        return cls(), *(cls(n=n) for n in FOUND_BY)

@@ -8,6 +8,9 @@ from ..parameter import Parameter
 from .effect import Place, Term
 from .extent import Extent
 
+FOUND_BY = (-0.03, 0.03)
+"""Sizes k at which a search begins."""
+
 
 class RateDependentHysteresis(Term):
     """Loop slope A that depends on the speed of the normalised drive.
@@ -42,4 +45,5 @@ class RateDependentHysteresis(Term):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        return cls(a=0.5), cls(a=0.1)
+        """Off, and of a size of either sign: with it the exponent counts, which is nothing at k = 0."""
+        return cls(a=0.5), cls(a=0.1), *(cls(k=k, a=a) for k in FOUND_BY for a in (0.3, 0.1, -0.1))
