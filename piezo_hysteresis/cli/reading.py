@@ -50,8 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--average",
         metavar="N",
         type=int,
-        default=1,
-        help="average N samples into one everywhere, while reading: for files too large for the memory",
+        help="average N samples into one while reading; default: none, or as few as a recording of more than 16.8 "
+        "million samples takes; 1 keeps every one, up to 67 million",
     )
     group.add_argument(
         "--decimate",

@@ -27,8 +27,6 @@ class Csv:
     `other_displacement_m` and `temperature_K`. Numbers are written in full, so that reading gives the same ones.
     """
 
-    averages = True
-
     def recognises(self, path: Path) -> bool:
         """True for the endings of text tables."""
         return path.is_file() and path.suffix.lower() in _ENDINGS

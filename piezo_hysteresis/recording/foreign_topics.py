@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from ..errors import RecordingError
 from ..record import Notice, Record, Samples
 from .bag import Bag
+from .column import PIECE, Column
 from .finite import finite_records
+from .intake import Intake, averaged_notice
 from .layout import CHANNELS, Layout
 from .phases import labelled
 from .time_base import TimeBase
@@ -53,15 +56,15 @@ class Place(NamedTuple):
 class _Series:
     """Values of one channel and the time of the message of each."""
 
-    times: list[Samples] = field(default_factory=list)
-    values: list[Samples] = field(default_factory=list)
+    times: Column = field(default_factory=partial(Column, np.float64))
+    values: Column = field(default_factory=partial(Column, np.float64))
 
     def add(self, time: float, values: NDArray[np.float64], period: float) -> None:
-        self.times.append(np.asarray(time + period * np.arange(values.size)))
-        self.values.append(values)
+        self.times.extend(np.asarray(time + period * np.arange(values.size)))
+        self.values.extend(values)
 
     def arrays(self) -> tuple[Samples, Samples]:
-        return np.concatenate(self.times), np.concatenate(self.values)
+        return self.times.array(), self.values.array()
 
 
 def read_topics(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]:
@@ -82,19 +85,33 @@ def read_topics(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]:
     if not {"voltage", "displacement"} <= places.keys():
         raise RecordingError(f"columns: got {', '.join(layout.columns)}, expected voltage and displacement")
     series, stamped = _series(bag, places, layout.sample_period or 0.0)
-    time, _ = series["displacement"].arrays()
-    first = max(float(s.times[0][0]) for s in series.values())
-    used = time >= first
-    time = time[used]
-    channels = {}
-    for name, own in series.items():
-        times, values = own.arrays()
-        if places[name].topic == places["displacement"].topic and values.size == used.size:
-            newest = values[used]
-        else:
-            newest = values[np.searchsorted(times, time, "right") - 1]
-        channels[name] = layout.in_si(name, newest)
-    return _records(channels, time, len({p.topic for p in places.values()}) > 1, stamped, layout)
+    intake = _paired(series, places, layout)
+    channels = {name: layout.in_si(name, intake.column(at)) for at, name in enumerate(series, 1)}
+    held = len({p.topic for p in places.values()}) > 1
+    truncated = bool(layout.rows and layout.rows[0]) and layout.initial_voltage is None
+    records, notices = _records(
+        channels, intake.column(0), held, stamped, layout.after_reading(intake.factor), truncated
+    )
+    if layout.average is None and intake.factor > 1:
+        notices.append(averaged_notice(intake.factor, records[0].sample_period))
+    return records, notices
+
+
+def _paired(series: dict[str, _Series], places: dict[str, Place], layout: Layout) -> Intake:
+    """The times of the displacement, and the newest value of every channel then, in columns."""
+    arrays = {name: own.arrays() for name, own in series.items()}
+    time = arrays["displacement"][0]
+    begun = max(float(times[0]) for times, _ in arrays.values())
+    intake = Intake.of(1 + len(arrays), layout)
+    for first in range(0, time.size, PIECE):
+        part = np.arange(first, min(first + PIECE, time.size))
+        part = part[time[part] >= begun]
+        columns = [time[part]]
+        for name, (times, values) in arrays.items():
+            same = places[name].topic == places["displacement"].topic and values.size == time.size
+            columns.append(values[part if same else np.searchsorted(times, time[part], "right") - 1])
+        intake.add(np.stack(columns, axis=1))
+    return intake
 
 
 def _series(bag: Bag, places: dict[str, Place], period: float) -> tuple[dict[str, _Series], bool]:
@@ -130,11 +147,13 @@ def _series(bag: Bag, places: dict[str, Place], period: float) -> tuple[dict[str
 
 
 def _records(
-    channels: dict[str, Samples], time: Samples, held: bool, stamped: bool, layout: Layout
+    channels: dict[str, Samples], time: Samples, held: bool, stamped: bool, layout: Layout, truncated: bool
 ) -> tuple[list[Record], list[Notice]]:
     if time.size < 2:
         raise RecordingError(f"got {time.size} samples after the first value of every channel, expected two or more")
-    base = TimeBase.of(time)
+    part = layout.part(time.size)
+    channels = {name: values[part] for name, values in channels.items()}
+    base = TimeBase.of(time[part])
     notices = base.notices()
     if held:
         notices.append(
@@ -143,6 +162,6 @@ def _records(
     if not stamped:
         notices.append(Notice("time_base", "messages carry no stamps: their times of reception are used"))
     breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
-    parts, told = finite_records(channels, layout.sample_period or base.period, breaks)
+    parts, told = finite_records(channels, layout.sample_period or base.period, breaks, truncated=truncated)
     records, proposed = labelled(parts, layout.phases)
     return records, [*notices, *told, *proposed]

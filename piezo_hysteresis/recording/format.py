@@ -12,9 +12,6 @@ from .layout import Layout
 class Format(Protocol):
     """One way in which experiments lie on disk."""
 
-    averages: bool
-    """True if `Layout.average` is applied while reading, before samples are kept."""
-
     def recognises(self, path: Path) -> bool:
         """True if the file or folder looks like this format."""
 

@@ -23,8 +23,6 @@ class GcsArray:
     a position, other than a commanded or target one, is the displacement [µm].
     """
 
-    averages = True
-
     def recognises(self, path: Path) -> bool:
         """True where the first block holds the end of a GCS header."""
         if not path.is_file():

@@ -16,7 +16,7 @@ from .layout import Layout
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _LARGEST_EXPANSION = 1100
-_ROWS = 1 << 20
+_ROWS = 1 << 18
 
 
 def is_hdf5(path: Path) -> bool:

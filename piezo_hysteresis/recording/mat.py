@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
@@ -18,14 +16,13 @@ from .guess import guess_notice, guessed, guessed_period, unit_in
 from .hdf5_variables import Hdf5Variables, is_hdf5
 from .intake import Intake, averaged_notice
 from .layout import CHANNELS, LABELS, Layout
-from .mat5_sizes import check_sizes
+from .mat5_variables import Mat5Variables
 from .table import table_records
 
 _PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
 _STRUCT = "phase_"
-_ROWS = 1 << 20
 
-Variables = Mapping[str, NDArray[Any]]
+Variables = Hdf5Variables | Mat5Variables
 
 
 class Mat:
@@ -36,15 +33,13 @@ class Mat:
     of a struct, ``"y[2]"`` for a column of a matrix, counted from 1 as in MATLAB.
     """
 
-    averages = True
-
     def recognises(self, path: Path) -> bool:
         """True for the ending .mat."""
         return path.is_file() and path.suffix.lower() == ".mat"
 
     def read(self, path: Path, layout: Layout) -> Experiment:
         """The structs in order of their numbers, or the variables as one record."""
-        with naming(path, "a MAT file"), _opened(path, layout) as variables:
+        with naming(path, "a MAT file"), (Hdf5Variables if is_hdf5(path) else Mat5Variables)(path) as variables:
             structs = sorted({name.partition(".")[0] for name in variables if re.match(_STRUCT + r"\d+\.", name)})
             records: list[Record] = []
             notices: list[Notice] = []
@@ -76,33 +71,6 @@ class Mat:
             if path.exists():
                 raise RecordingError("exists already; choose another name")
             io.savemat(path, structs, oned_as="column")
-
-
-def _opened(path: Path, layout: Layout) -> AbstractContextManager[Variables]:
-    """Dotted name to array, of every variable and field that may matter."""
-    if is_hdf5(path):
-        return Hdf5Variables(path)
-    from scipy import io  # slow to import, and only needed here
-
-    check_sizes(path)
-    named = {re.split(r"[.\[]", str(place))[0] for place in layout.columns.values()}
-    held = [name for name, _, _ in io.whosmat(path)]
-    wanted = [name for name in held if name in named or name in (*CHANNELS, *LABELS) or guessed_period([name])]
-    wanted += [name for name in held if re.fullmatch(_STRUCT + r"\d+", name)]
-    found = {channel for channel in CHANNELS if channel in layout.columns or channel in held}
-    if not {"voltage", "displacement"} <= found and not any(name.startswith(_STRUCT) for name in wanted):
-        wanted = held  # of other software: whatever it calls them
-    flat: dict[str, NDArray[Any]] = {}
-    _flatten("", io.loadmat(path, simplify_cells=True, variable_names=wanted), flat)
-    return nullcontext(flat)
-
-
-def _flatten(prefix: str, content: Mapping[str, Any], flat: dict[str, NDArray[Any]]) -> None:
-    for name, value in content.items():
-        if isinstance(value, dict):
-            _flatten(f"{prefix}{name}.", value, flat)
-        elif not name.startswith("__"):
-            flat[prefix + name] = np.asarray(value)
 
 
 def _records(
@@ -142,20 +110,7 @@ def _channel(variables: Variables, place: str, layout: Layout) -> Intake:
     if name not in variables:
         raise RecordingError(f"got {_listed(variables)}, expected {place}")
     column = None if number is None else int(number) - 1
-    if isinstance(variables, Hdf5Variables):
-        return variables.samples(name, column, layout)
-    values = variables[name]
-    if values.dtype.kind not in "fiub":
-        raise RecordingError(f"{place}: got {values.dtype}, expected real numbers")
-    if column is not None and (values.ndim != 2 or column >= values.shape[1]):
-        raise RecordingError(f"{place}: got shape {values.shape}, expected a matrix with that column")
-    if column is None and values.size != max(values.shape, default=1):
-        raise RecordingError(f"{place}: got shape {values.shape}, expected a vector; choose a column as {place}[1]")
-    intake = Intake.of(1, layout)
-    whole = values.ravel() if column is None else values[:, column]
-    for first in range(0, whole.size, _ROWS):
-        intake.add(whole[first : first + _ROWS].astype(np.float64, copy=False)[:, None])
-    return intake
+    return variables.samples(name, column, layout)
 
 
 def _label(value: NDArray[Any], place: str) -> str:

@@ -10,8 +10,12 @@ from typing import BinaryIO
 
 from ..errors import RecordingError
 
-_HEADER = 128
-_MATRIX, _COMPRESSED, _INT32 = 14, 15, 5
+HEADER = 128
+MATRIX, COMPRESSED = 14, 15
+ORDERS = {b"IM": "<", b"MI": ">"}
+"""Last bytes of the header to the order of bytes behind it."""
+
+_INT32 = 5
 _LARGEST_EXPANSION = 1100
 _DEEPEST = 20
 
@@ -26,7 +30,7 @@ def check_sizes(path: Path) -> None:
     """
     size = path.stat().st_size
     with path.open("rb") as file:
-        order = {b"IM": "<", b"MI": ">"}.get(file.read(_HEADER)[126:])
+        order = ORDERS.get(file.read(HEADER)[126:])
         if order is None:
             raise RecordingError("got other first bytes than those of a MATLAB 5 file")
         while file.tell() + 8 <= size:
@@ -34,16 +38,16 @@ def check_sizes(path: Path) -> None:
             after = file.tell() + length
             if after > size:
                 raise RecordingError(f"a variable declares {length} bytes, {size - file.tell()} are left")
-            if kind == _COMPRESSED:
-                inflated = _Inflated(file, length)
+            if kind == COMPRESSED:
+                inflated = Inflated(file, length)
                 _Elements(inflated, order).check(_LARGEST_EXPANSION * length, 0)
-            elif kind == _MATRIX:
+            elif kind == MATRIX:
                 file.seek(-8, 1)
                 _Elements(file, order).check(length + 8, 0)
             file.seek(after)
 
 
-class _Inflated:
+class Inflated:
     """Bytes of one compressed variable, a little at a time."""
 
     def __init__(self, file: BinaryIO, length: int) -> None:
@@ -68,7 +72,7 @@ class _Inflated:
 class _Elements:
     """Elements in a stream: tag, bytes, padding to eight."""
 
-    def __init__(self, stream: BinaryIO | _Inflated, order: str) -> None:
+    def __init__(self, stream: BinaryIO | Inflated, order: str) -> None:
         self._stream, self._order = stream, order
 
     def check(self, room: int, depth: int) -> int:
@@ -82,7 +86,7 @@ class _Elements:
         padded = length + -length % 8
         if length > room - 8 or depth > _DEEPEST:
             raise RecordingError(f"an element declares {length} bytes, {room - 8} are left")
-        if kind == _MATRIX and length:
+        if kind == MATRIX and length:
             self._check_matrix(length, depth)
         else:
             self._skip(padded)

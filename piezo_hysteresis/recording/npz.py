@@ -33,8 +33,6 @@ class Npz:
     `Layout.columns` names them for a channel. Pickled objects are refused.
     """
 
-    averages = True
-
     def recognises(self, path: Path) -> bool:
         """True for an .npz file or a folder that holds one."""
         return path.suffix == ".npz" if path.is_file() else any(path.glob("*.npz"))

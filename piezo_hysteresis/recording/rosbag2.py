@@ -15,6 +15,7 @@ from .block import TYPE, Block, typestore
 from .damage import naming
 from .finite import finite_records
 from .foreign_topics import read_topics
+from .intake import averaged_notice, shared_averages
 from .layout import Layout
 from .phase_topic import STRING, PhaseNames
 from .phases import labelled
@@ -41,8 +42,6 @@ class Rosbag2:
     exactly. So is one whose beginning is not in the bag.
     """
 
-    averages = False
-
     def recognises(self, path: Path) -> bool:
         """True for a storage file or a folder with one."""
         files = [path] if path.is_file() else path.iterdir()
@@ -55,6 +54,8 @@ class Rosbag2:
             if any(str(place).startswith("/") for place in layout.columns.values()):
                 records, notices = read_topics(bag, layout)
             else:
+                if layout.rows is not None:
+                    raise RecordingError(f"rows: got {layout.rows} of a bag of phases, expected none; piezo import it")
                 records, notices = _read_samples(bag, layout)
             return Experiment(tuple(records), str(path), (*bag.notices, *notices))
 
@@ -151,18 +152,21 @@ def _read_samples(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]
         )
     (space, stream), *_ = streams.items()
     stretches, told = stream.stretches(split_phases=layout.phases is None)
-    records, more = _records(stretches, names.get(space, PhaseNames()), layout)
+    averages = shared_averages([s.size for s in stretches], layout.average)
+    records, more = _records(stretches, averages, names.get(space, PhaseNames()), layout)
     return records, [*notices, *told, *more]
 
 
-def _records(stretches: list[Stretch], names: PhaseNames, layout: Layout) -> tuple[list[Record], list[Notice]]:
+def _records(
+    stretches: list[Stretch], averages: list[int], names: PhaseNames, layout: Layout
+) -> tuple[list[Record], list[Notice]]:
     unlabelled = layout.phases is not None or (not names and all(s.phase == 0 for s in stretches))
     records: list[Record] = []
     notices: list[Notice] = []
     moving = _MOVED * max(_travel(stretch) for stretch in stretches)
     before: Stretch | None = None
     kept = excited = False
-    for stretch in stretches:
+    for stretch, average in zip(stretches, averages, strict=True):
         if stretch.first:
             before, kept, excited = None, False, False
         name = "record" if unlabelled else _name(stretch, names, notices)
@@ -183,11 +187,18 @@ def _records(stretches: list[Stretch], names: PhaseNames, layout: Layout) -> tup
             begins = stretch.phase == 0 if stretch.first else stretch.lost == 0
             if excited and not kept:
                 notices.append(Notice("history", "begins after phases that are not recorded: taken as settled", name))
+            slow = stretch.averaged(average)
+            if not slow.size:
+                text = f"its {stretch.size} samples are fewer than the {average} to be averaged: left out"
+                notices.append(Notice("averaged", text, name))
+                continue
+            if layout.average is None and average > 1:
+                notices.append(averaged_notice(average, slow.sample_period, name))
             parts, told = finite_records(
-                stretch.channels,
-                stretch.sample_period,
-                stretch.breaks,
-                stretch.pauses,
+                slow.channels,
+                slow.sample_period,
+                slow.breaks,
+                slow.pauses,
                 phase=name,
                 start_time=stretch.start_time,
                 continues=kept,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import RecordError
 from ..record import Notice
 from .block import Block
+from .column import Column, changes
 from .stretch import Stretch
 from .time_base import round_period
 
@@ -39,7 +39,7 @@ class _Run:
 
 
 class SampleStream:
-    """Collects blocks; memory grows with the samples only.
+    """Collects blocks; a long recording lies in temporary files (`Column`).
 
     Losses, repetitions and reordering are recognised by the running index, which wraps at 2³². An index that jumps back
     while time goes on means that the driver was started again.
@@ -52,8 +52,9 @@ class SampleStream:
 
     def __init__(self, sample_period: float | None = None) -> None:
         self._given_period = sample_period
-        self._channels: dict[str, array[float]] = {}
-        self._index, self._phase = array("I"), array("I")
+        self._channels: dict[str, Column] = {}
+        self._index, self._phase = Column(np.uint32), Column(np.uint32)
+        self._next = 0
         self._starts: list[int] = []
         self._times_ns: list[int] = []
         self._periods: list[float] = []
@@ -69,15 +70,16 @@ class SampleStream:
     def add(self, block: Block, received_ns: int) -> None:
         """Append a block in the order of arrival; channels that other blocks have are filled with NaN."""
         begin, n = self.size, block.phase.size
-        first = self._index[-1] + 1 if begin else 0
-        index = block.index if block.index is not None else (first + np.arange(n, dtype=np.int64)).astype(np.uint32)
-        self._index.frombytes(index.tobytes())
-        self._phase.frombytes(block.phase.tobytes())
+        follows = (self._next + np.arange(n, dtype=np.int64)).astype(np.uint32)
+        index = follows if block.index is None else block.index
+        self._next = int(index[-1]) + 1
+        self._index.extend(index)
+        self._phase.extend(block.phase)
         for name in self._channels.keys() | block.channels.keys():
             if name not in self._channels:
-                self._channels[name] = array("d", [np.nan]) * begin
-            values = block.channels[name] if name in block.channels else np.full(n, np.nan)
-            self._channels[name].frombytes(values.tobytes())
+                self._channels[name] = Column(np.float64)
+                self._channels[name].fill(np.nan, begin)
+            self._channels[name].extend(block.channels[name] if name in block.channels else np.full(n, np.nan))
         time = block.time
         period = self._given_period or np.nan
         if self._given_period is None and time is not None and n > 1 and np.isfinite(time).all():
@@ -145,9 +147,9 @@ class SampleStream:
 
     def _runs(self) -> list[_Run]:
         periods = self._block_periods()
-        index = np.frombuffer(self._index, np.uint32)
+        index = self._index.array()
         other = np.abs(np.diff(periods)) > PERIOD_TOLERANCE * periods[1:]
-        jumps = np.flatnonzero(np.diff(index) != 1) + 1
+        jumps = changes(index, 1)
         edges = np.unique(np.concatenate(([0], jumps, np.array(self._starts, np.int64)[1:][other], [index.size])))
         runs: list[_Run] = []
         for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
@@ -182,12 +184,10 @@ class SampleStream:
         lost = [0] + [start - _end(earlier) for start, earlier in zip(starts[1:], pieces, strict=False)]
         pausing = self._after_pause if self._tells_pauses(pieces) else set()
         offsets = [0, *accumulate(b - a for _, a, b in pieces)]
-        channels = {
-            name: _gathered(np.frombuffer(column, np.float64), pieces) for name, column in self._channels.items()
-        }
-        phase = _gathered(np.frombuffer(self._phase, np.uint32), pieces)
-        changes = (np.flatnonzero(np.diff(phase)) + 1).tolist() if split_phases else []
-        for i, j in zip([0, *changes], [*changes, phase.size], strict=True):
+        channels = {name: _gathered(column.array(), pieces) for name, column in self._channels.items()}
+        phase = _gathered(self._phase.array(), pieces)
+        edges = changes(phase, 0).tolist() if split_phases else []
+        for i, j in zip([0, *edges], [*edges, phase.size], strict=True):
             piece = bisect_right(offsets, i) - 1
             inside = range(piece + 1, bisect_left(offsets, j))
             within = i - offsets[piece]
@@ -236,5 +236,9 @@ def _swept(pieces: list[tuple[int, int, int]]) -> tuple[list[tuple[int, int, int
 
 
 def _gathered(values: NDArray[Any], pieces: list[tuple[int, int, int]]) -> NDArray[Any]:
-    parts = [values[a:b] for _, a, b in pieces]
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+    if len(pieces) == 1:
+        return values[pieces[0][1] : pieces[0][2]]
+    gathered = Column(values.dtype)
+    for _, a, b in pieces:
+        gathered.extend(values[a:b])
+    return gathered.array()

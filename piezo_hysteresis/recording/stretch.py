@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ..record import Samples
+from .column import PIECE
+from .intake import Intake
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,3 +37,30 @@ class Stretch:
     def size(self) -> int:
         """Number of samples."""
         return self.channels["voltage"].size
+
+    def averaged(self, average: int) -> Stretch:
+        """The same with `average` samples in one, never across missing ones; incomplete last groups are dropped."""
+        if average == 1:
+            return self
+        holes = sorted({**self.breaks, **self.pauses}.items())
+        edges = [0, *(at for at, _ in holes), self.size]
+        starts = np.cumsum([0, *((b - a) // average for a, b in itertools.pairwise(edges))]).tolist()
+        moved = dict(zip([at for at, _ in holes], starts[1:], strict=False))
+        channels = {
+            name: np.concatenate([_averaged(values[a:b], average) for a, b in itertools.pairwise(edges)])
+            for name, values in self.channels.items()
+        }
+        return replace(
+            self,
+            channels=channels,
+            sample_period=self.sample_period * average,
+            breaks={moved[at]: max(1, round(lost / average)) for at, lost in self.breaks.items()},
+            pauses={moved[at]: max(1, round(lost / average)) for at, lost in self.pauses.items()},
+        )
+
+
+def _averaged(values: Samples, average: int) -> Samples:
+    intake = Intake(1, average=average)
+    for first in range(0, values.size, PIECE):
+        intake.add(values[first : first + PIECE, None])
+    return intake.column(0)

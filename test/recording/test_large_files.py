@@ -1,12 +1,18 @@
-"""Large files: what is not wanted is never kept, and what is averaged is averaged on the way."""
+"""Large files: what is not wanted is never kept, and what is too long is averaged on the way, in bounded memory."""
+
+import sys
 
 import h5py
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy import io
 
 from piezo_hysteresis.errors import RecordingError
-from piezo_hysteresis.recording import intake, read
+from piezo_hysteresis.recording import column, intake, read
+from piezo_hysteresis.recording.intake import Intake, shared_averages
+from test.recording import long_recordings
 
 PERIOD = 1e-4
 ROWS = 60_000
@@ -57,12 +63,98 @@ def test_a_part_is_the_same_as_that_part_of_the_whole(source):
         read(path, rows=(70_000, 80_000), **layout, **OPTIONS)
 
 
-def test_more_than_the_memory_is_meant_to_hold_is_refused_with_the_way_out(source, monkeypatch):
+def test_every_sample_of_more_than_the_memory_is_meant_to_hold_is_refused_with_the_way_out(source, monkeypatch):
     path, layout = source
     monkeypatch.setattr(intake, "MOST", 50_000)
-    with pytest.raises(RecordingError, match=r"more than 50000 samples.*rows, or average"):
-        read(path, **layout, **OPTIONS)
+    with pytest.raises(RecordingError, match=r"more than 50000 samples.*rows, or a larger average"):
+        read(path, average=1, **layout, **OPTIONS)
     assert read(path, average=2, **layout, **OPTIONS).size == ROWS // 2
+
+
+def test_a_long_recording_is_averaged_by_as_little_as_it_takes_and_this_is_told(source, monkeypatch):
+    path, layout = source
+    (whole,) = read(path, average=4, **layout, **OPTIONS)
+    monkeypatch.setattr(intake, "ENOUGH", 20_000)
+    experiment = read(path, **layout, **OPTIONS)
+    assert [n.kind for n in experiment.notices if n.kind == "averaged"] == ["averaged"]
+    (record,) = experiment
+    assert record.sample_period == pytest.approx(4 * PERIOD)
+    np.testing.assert_allclose(record.voltage, whole.voltage, rtol=1e-12)
+    np.testing.assert_allclose(record.displacement, whole.displacement, rtol=1e-12)
+
+
+@given(
+    sizes=st.lists(st.integers(0, 70), max_size=30),
+    average=st.one_of(st.none(), st.integers(1, 9)),
+    start=st.integers(0, 50),
+    length=st.one_of(st.none(), st.integers(0, 300)),
+)
+def test_pieces_of_any_size_come_to_the_same_as_all_at_once(sizes, average, start, length):
+    values = np.random.default_rng(1).normal(size=(sum(sizes), 2))
+    stop = None if length is None else start + length
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(intake, "ENOUGH", 16)
+        taken = Intake(2, start, stop, average)
+        for part in np.split(values, np.cumsum(sizes)[:-1] if sizes else []):
+            taken.add(part)
+    kept = values[start:stop]
+    assert taken.rows == len(values)
+    if average is None:
+        assert taken.factor == max(1, 2 ** int(np.ceil(np.log2(max(1, len(kept)) / 16.0)))) or len(kept) % 16
+        assert len(kept) // taken.factor <= 16
+    means = kept[: len(kept) // taken.factor * taken.factor].reshape(-1, taken.factor, 2).mean(axis=1)
+    if len(means):
+        np.testing.assert_allclose(np.stack((taken.column(0), taken.column(1)), axis=1), means, atol=1e-12)
+
+
+@given(sizes=st.lists(st.integers(1, 10_000), min_size=1, max_size=12), enough=st.integers(100, 30_000))
+def test_the_longest_phases_give_way_first(sizes, enough):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(intake, "ENOUGH", enough)
+        averages = shared_averages(sizes, None)
+    assert sum(n // a for n, a in zip(sizes, averages, strict=True)) <= enough
+    most = max(n // a for n, a in zip(sizes, averages, strict=True))
+    assert all(2 * (n // a + 1) > most for n, a in zip(sizes, averages, strict=True) if a > 1)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit is one of Linux")
+@pytest.mark.parametrize("kind", ["csv", "npz", "mat5", "mat73", "bag"])
+def test_memory_does_not_grow_with_the_file(kind, tmp_path):
+    """Ten pieces in the room in which every sample of them does not fit."""
+    (tmp_path / "short").mkdir()
+    short = long_recordings.write(tmp_path / "short", kind, long_recordings.PIECE)
+    path = long_recordings.write(tmp_path, kind, 10 * long_recordings.PIECE)
+    size, period, mean = long_recordings.read_within(80_000_000, path, short, enough=1 << 18)
+    assert size == 10 * long_recordings.PIECE // 8
+    assert period == pytest.approx(8 * long_recordings.PERIOD)
+    assert mean == pytest.approx(5.0, abs=1e-5)
+    if kind in ("npz", "bag"):
+        assert "more than the memory holds" in long_recordings.read_within(80_000_000, path, short, average=1)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", ["csv", "npz", "mat5", "mat73", "bag"])
+def test_several_gigabytes_are_read_within_two(kind, tmp_path):
+    rows = {"csv": 160_000_000, "mat5": 200_000_000, "npz": 260_000_000, "mat73": 260_000_000, "bag": 130_000_000}[kind]
+    (tmp_path / "short").mkdir()
+    short = long_recordings.write(tmp_path / "short", kind, long_recordings.PIECE)
+    path = long_recordings.write(tmp_path, kind, rows)
+    size, period, mean = long_recordings.read_within(2_000_000_000, path, short)
+    assert (1 << 23) <= size <= (1 << 24)
+    assert size * period == pytest.approx(rows * long_recordings.PERIOD, rel=1e-6)
+    assert mean == pytest.approx(5.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("enough", [300, 1 << 24])
+def test_a_column_is_the_same_in_memory_and_on_disk(enough, monkeypatch):
+    monkeypatch.setattr(column, "ENOUGH", enough)
+    values = np.random.default_rng(2).normal(size=5_000)
+    own = column.Column(np.float64)
+    own.fill(0.5, 100)
+    for part in np.split(values, [17, 400, 401, 3_000]):
+        own.extend(part)
+        assert own.array().size == len(own)
+    np.testing.assert_array_equal(own.array(), np.concatenate((np.full(100, 0.5), values)))
 
 
 def test_the_times_and_labels_of_a_table_are_averaged_with_it(tmp_path):
