@@ -8,18 +8,22 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..effects import CATALOGUE, Effect, MainsHum
 from ..model import Model
 from .candidates import Candidate, alikeness, screen
 from .evidence import Evidence
 from .held_out import Score
 from .refit import is_seen, is_steady, proceed, refit, restart, without
-from .steps import Rejection, Selection, Step
+from .steps import MANY, Rejection, Selection, Step
 
 Progress = Callable[[str, float], None]
 
 ADEQUATE = 1.5
 """Mean R² up to which nothing is missing beyond noise."""
+ALONE = 4.0
+"""Residual in floors up to which one record alone asks for no further effect."""
 LEAST_GAIN = 0.15
 """Least gain in mean ln max(1, R²) for which an effect is accepted."""
 KEEPS = (0.8, 0.5)
@@ -30,6 +34,8 @@ REFITS = 6
 """Candidates that are refitted jointly."""
 HOPELESS = 0.02
 """Linearised gain below which an effect that is not among the first two is not refitted."""
+HOPELESS_BESIDE = 0.6
+"""Share of the gain of a best at the floor by which another one may lie behind it and still be refitted."""
 AGAIN = 3
 """Refits that begin once more behind dynamics found anew."""
 RESTARTS = 4
@@ -75,7 +81,7 @@ def select(
         Called with a word and the fraction done.
     """
     baseline, steps, accepted = model, list[Step](), 0
-    while score.excess > ADEQUATE and len(steps) < MOST_TURNS and accepted < MOST:
+    while not _is_enough(score, accepted) and len(steps) < MOST_TURNS and accepted < MOST:
         step = _turn(model, evidence, score, null, effects, KEEPS[min(accepted, 1)], progress)
         if step is None:
             break
@@ -90,6 +96,15 @@ def select(
             break
     model, score = _pruned(model, score, steps)
     return Selection(baseline, model, score, tuple(steps), null)
+
+
+def _is_enough(score: Score, accepted: int) -> bool:
+    """Whether nothing more is looked for: for one record that is a little off, no second name is forced."""
+    if score.excess <= ADEQUATE:
+        return True
+    worst = int(np.argmax(score.ratios))
+    others = np.delete(score.ratios, worst)
+    return bool(accepted and others.size >= MANY and np.mean(others**2) <= ADEQUATE and score.ratios[worst] <= ALONE)
 
 
 def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score]:
@@ -164,7 +179,7 @@ def _turn(
     rejected += [
         Rejection(c.name, f"score test: at most {max(0.0, before.cost - c.score.cost):.2f} of held-out gain")
         for c in screened
-        if c.name not in {r.name for r in likely}
+        if c.name not in {r.name for r in refits}
     ]
     if gain < LEAST_GAIN or left > keeps:
         reason = f"closest, but a held-out gain of {gain:.2f} and {left:.2f} of V beyond noise left do not suffice"
@@ -189,22 +204,37 @@ def _may_be_off(candidate: Candidate) -> bool:
 
 def _refitted(model: Model, candidates: Sequence[Candidate], before: Score, tell: Progress) -> list[Candidate]:
     """Joint refits, best first: a few linearisations of all, dynamics anew for the leaders, the best to the end."""
-    refits = []
+    refits: list[Candidate] = []
     for k, candidate in enumerate(candidates):
+        if refits and _is_far_behind(candidate, refits[0], before):
+            continue
         tell(f"refit with {candidate.name}", (k + 1) / (len(candidates) + 2))
         result = refit(model, candidate, FIRST)
         if result is not None:
-            refits.append(result)
+            refits = sorted([*refits, result], key=lambda c: c.score.cost)
     if not refits:
         return []
     tell("dynamics anew", 0.8)
-    refits.sort(key=lambda c: c.score.cost)
-    field = sorted([*(restart(c, FIRST) for c in refits[:AGAIN]), *refits[AGAIN:]], key=lambda c: c.score.cost)
+    leader = restart(refits[0], FIRST)
+    field = [
+        leader,
+        *(
+            c if k >= AGAIN or _is_far_behind(c, leader, before) else restart(c, FIRST)
+            for k, c in enumerate(refits[1:], 1)
+        ),
+    ]
+    field.sort(key=lambda c: c.score.cost)
     tell(f"refit with {field[0].name}", 0.9)
     best = _settled(field[0], before)
     reach = best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
     rest = [_settled(c, before) if c.score.cost < reach and k < AGAIN else c for k, c in enumerate(field[1:], 1)]
     return sorted([best, *rest], key=lambda c: c.score.cost)
+
+
+def _is_far_behind(candidate: Candidate, best: Candidate, before: Score) -> bool:
+    """Whether the best is at the floor and the other by so much short of it that it is no rival."""
+    gain = before.cost - best.score.cost
+    return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > HOPELESS_BESIDE * gain
 
 
 def _settled(candidate: Candidate, before: Score) -> Candidate:
