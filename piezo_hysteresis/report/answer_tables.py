@@ -31,6 +31,7 @@ def where_table(answer: Mapping[str, Any]) -> Table | None:
     rows = tuple(
         (place["axis"].replace("_", " "), f"{100 * place['share']:.0f} %", place["detail"])
         for place in answer.get("where", ())
+        if place["detail"]
     )
     note = "Share of the power of the residual, before anything was added."
     return Table("Where the residual sits", ("axis", "share", "detail"), rows, note, frozenset({1})) if rows else None

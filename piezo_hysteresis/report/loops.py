@@ -17,6 +17,8 @@ from .thinning import thinned
 
 Array = NDArray[np.float64]
 
+CLOSED = 0.25
+"""Distance of the ends of a loop, over its height, beyond which it is none."""
 PANELS = 6
 """Most loops in one figure."""
 
@@ -58,6 +60,12 @@ def _closed(u: Array, first: int, last: int, index: int) -> Cycle:
     return Cycle(index, slice(start, stop), float(u[peak] - level))
 
 
+def _closes(record: Record, cycle: Cycle) -> bool:
+    """False where the stage comes from elsewhere: the first way of a record, with its transient, is no loop."""
+    y = record.displacement[cycle.part]
+    return abs(float(y[-1] - y[0])) < CLOSED * float(np.ptp(y))
+
+
 def opening(voltage: Array, displacement: Array) -> float:
     """Width of a loop halfway up, in % of its height; NaN where a branch has too few samples there."""
     peak = int(np.argmax(voltage))
@@ -78,7 +86,7 @@ def loops_by_amplitude(comparison: Comparison) -> Drawing | None:
     sines = [row for row in _sines(comparison) if row[0] <= 10.0]
     slow += [index for _, index in sines[:1]]
     slow = slow or [int(np.argmax([float(np.ptp(r.voltage)) for r in comparison.experiment]))]
-    found = [c for i in slow for c in cycles(comparison.experiment[i], i)]
+    found = [c for i in slow for c in cycles(comparison.experiment[i], i) if _closes(comparison.experiment[i], c)]
     if not found:
         return None
     largest = max(c.swing for c in found)

@@ -49,7 +49,7 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
         ("name", "symbol", "value", "95 %", "unit", "bounds", "meaning"),
         tuple(rows),
         note if "arx" in model else "",
-        frozenset({2, 3}),
+        frozenset({2, 3, 5}),
     )
 
 

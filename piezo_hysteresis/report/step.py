@@ -75,5 +75,5 @@ def _draw(axis: Axes, measured: StepResponse, predicted: StepResponse | None, en
     axis.errorbar(scale * time, mean, bars, label="measured ± 2σ", elinewidth=0.8, **style)
     if predicted is not None:
         upto = min(end, predicted.mean.size)
-        axis.plot(scale * time[:upto], 1e6 * predicted.mean[:upto], label="predicted", **PREDICTED)
+        axis.plot(scale * time[:upto], 1e6 * predicted.mean[:upto], label="predicted", zorder=3, **PREDICTED)
     axis.set_xlabel(f"time since the edge [{unit}]")

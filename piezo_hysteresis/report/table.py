@@ -34,7 +34,8 @@ class Table:
         """The table as HTML that can be reached and scrolled by keyboard."""
 
         def cell(column: int, text: str, tag: str, more: str = "") -> str:
-            style = ' class="n"' if column in self.numeric else ""
+            several = ", " in text  # coefficients: one number a line would do, one line for all would not
+            style = f' class="{"several" if several else "n"}"' if column in self.numeric else ""
             return f"<{tag}{more}{style}>{escape(text)}</{tag}>"
 
         head = "".join(cell(i, text, "th", ' scope="col"') for i, text in enumerate(self.header))

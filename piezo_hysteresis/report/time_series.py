@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
@@ -94,6 +95,7 @@ def time_series(comparison: Comparison) -> Drawing:
                 bottom.axhline(sign * 1e9 * comparison.floors[index], **FLOOR)
             data |= {f"predicted_m_{record.phase}": predicted[at], f"residual_time_s_{record.phase}": time[e_at]}
             data[f"residual_m_{record.phase}"] = e[e_at]
+        bottom.xaxis.set_major_locator(MaxNLocator(4))  # the numbers of a late window are long
         bottom.set_xlabel(f"time in phase [{unit}]")
         if column == 0:
             upper.set_ylabel("y [µm]")
