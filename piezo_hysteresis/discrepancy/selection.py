@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from ..effects import CATALOGUE, Effect, MainsHum
 from ..model import Model
@@ -16,7 +17,7 @@ from .candidates import Candidate, alikeness, screen
 from .evidence import Evidence
 from .held_out import Score
 from .refit import is_seen, is_steady, proceed, refit, restart, without
-from .steps import MANY, Rejection, Selection, Step
+from .steps import MANY, Rejection, Selection, Step, typical
 
 Progress = Callable[[str, float], None]
 
@@ -150,14 +151,12 @@ def _turn(
     gain = before.cost - best.score.cost
     left = _left(best.score, before, null)
     accepted = gain >= LEAST_GAIN and left <= keeps
-    renewed = None
     alone = without(best, LATER) if accepted else None
     if alone is not None:
         owed = alone.score.cost - best.score.cost
         accepted = owed >= LEAST_GAIN and _left(best.score, alone.score, null) <= keeps
         if not accepted:
             rejected.append(Rejection(best.name, f"gains {owed:.2f} over the model fitted anew without it"))
-            renewed = alone if before.cost - alone.score.cost > 0.5 * LEAST_GAIN else None
     if accepted and _may_be_off(best):
         accepted = False
         rejected.append(Rejection(best.name, "all its numbers could as well be off"))
@@ -167,6 +166,8 @@ def _turn(
     if accepted and best.name == MainsHum.name and not is_steady(best):
         accepted = False
         rejected.append(Rejection(best.name, "its amplitude follows the drive from record to record"))
+    better = alone is not None and before.cost - alone.score.cost > 0.5 * LEAST_GAIN
+    renewed = alone if better and not accepted else None
     for candidate in refits:
         if candidate.name == best.name:
             continue
@@ -188,18 +189,28 @@ def _turn(
 
 
 def _left(after: Score, before: Score, null: float) -> float:
-    """Share of V beyond noise that is left."""
-    return max(0.0, after.excess - null) / max(before.excess - null, 1e-12)
+    """Share of V beyond noise that is left; the worst record does not decide."""
+    first, second = typical(before, after)
+    return max(0.0, second - null) / max(first - null, 1e-12)
 
 
 def _may_be_off(candidate: Candidate) -> bool:
-    """Whether every number of the effect could as well have its off value."""
+    """Whether the numbers of the effect could as well all have their off value: Wald's test, the others held.
+
+    A time constant or an exponent has no off value; while it is held, its correlation with a size blurs nothing.
+    """
     fitted = candidate.fit
     assert fitted is not None
-    own = [n for n in fitted.names if n.startswith(f"{candidate.name}.") and fitted.model.row(n).off is not None]
-    return bool(own) and all(
-        abs(fitted.values[n] - (fitted.model.row(n).off or 0.0)) < 1.96 * fitted.standard_errors[n] for n in own
-    )
+    own = [n for n in fitted.names if n.startswith(f"{candidate.name}.")]
+    sizes = [n for n in own if fitted.model.row(n).off is not None]
+    if not sizes:
+        return False
+    at = [fitted.names.index(n) for n in (*sizes, *(n for n in own if n not in sizes))]
+    covariance, k = fitted.covariance[np.ix_(at, at)], len(sizes)
+    held = covariance[k:, k:]
+    spread = covariance[:k, :k] - covariance[:k, k:] @ np.linalg.pinv(held, hermitian=True) @ covariance[k:, :k]
+    off = np.array([fitted.values[n] - (fitted.model.row(n).off or 0.0) for n in sizes])
+    return bool(off @ np.linalg.pinv(spread, hermitian=True) @ off < chi2.ppf(0.95, k))
 
 
 def _refitted(model: Model, candidates: Sequence[Candidate], before: Score, tell: Progress) -> list[Candidate]:

@@ -95,10 +95,10 @@ class Selection:
     def explained(self, score: Score) -> float:
         """Share X of the gap of the baseline that a score has closed, 0 to 1; the worst record does not decide."""
         first = self.steps[0].before if self.steps else self.score
-        return explained(*_typical(first, score), self.null)
+        return explained(*typical(first, score), self.null)
 
 
-def _typical(before: Score, after: Score) -> tuple[float, float]:
+def typical(before: Score, after: Score) -> tuple[float, float]:
     """V of two models without the record that the second describes worst, where there are many."""
     kept = np.arange(after.ratios.size)
     if kept.size >= MANY and before.ratios.size == kept.size:
