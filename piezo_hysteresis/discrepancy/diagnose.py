@@ -19,7 +19,7 @@ from ..record import Experiment, Notice
 from .baseline import exact, start_model
 from .candidates import score_model
 from .diagnosis import Diagnosis, Verdict
-from .evidence import Evidence, extent_of, peaks_of
+from .evidence import Evidence, extent_of
 from .few_records import diagnose_few
 from .gap import Gap, measure_gap
 from .localise import localise
@@ -113,7 +113,7 @@ def diagnose(
     where = localise([records[i] for i in usable], [left[i] for i in usable], [least[i] for i in usable])
     selection = select(
         baseline.model,
-        evidence.with_peaks(peaks_of([records[i] for i in fitted], [left[i] for i in fitted])),
+        evidence,
         score,
         null,
         effects,

@@ -52,8 +52,10 @@ class Evidence:
             if np.isfinite(f) and r.sample_period < 1.001 * self.extent.fastest_period and content_of(r).is_broadband
         ]
 
-    def with_peaks(self, peaks: tuple[float, ...]) -> Evidence:
-        """With the frequencies at which the residual stands out [Hz]."""
+    def with_peaks(self, left: Sequence[Array]) -> Evidence:
+        """With the frequencies at which the residuals `left` of the records stand out."""
+        counted = [i for i, floor in enumerate(self.floors) if np.isfinite(floor)]
+        peaks = peaks_of([self.records[i] for i in counted], [left[i] for i in counted])
         return replace(self, extent=replace(self.extent, peaks=peaks))
 
     def with_hum(self, frequency: float) -> Evidence:

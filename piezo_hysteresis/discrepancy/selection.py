@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..effects import CATALOGUE, Effect, MainsHum
+from ..identification.normal_equations import residuals
 from ..model import Model
 from .candidates import Candidate, alikeness, screen
 from .evidence import Evidence
@@ -140,6 +141,7 @@ def _turn(
             progress(word, fraction)
 
     tell("score test of the catalogue", 0.0)
+    evidence = evidence.with_peaks(residuals(model, evidence.records, evidence.nuisance))
     present = {e.public_name() for e in model.effects}
     screened = screen(model, evidence, [e for e in effects if e.public_name() not in present])
     likely = [c for k, c in enumerate(screened[:REFITS]) if k < 2 or before.cost - c.score.cost > HOPELESS]
