@@ -68,6 +68,9 @@ class Hdf5Variables(Mapping[str, NDArray[Any]]):
     def __iter__(self) -> Iterator[str]:
         return (name.replace("/", ".") for name in self._names if not name.startswith("#"))
 
+    def __contains__(self, name: object) -> bool:
+        return name in set(self)  # a mapping would read it to see
+
     def __len__(self) -> int:
         return sum(1 for _ in self)
 

@@ -76,6 +76,9 @@ class Mat5Variables(Mapping[str, NDArray[Any]]):
                 self._fields[name] = list(self._variable(name))
             yield from self._fields[name]
 
+    def __contains__(self, name: object) -> bool:
+        return name in set(self)  # a mapping would read it to see
+
     def __len__(self) -> int:
         return sum(1 for _ in self)
 

@@ -169,7 +169,8 @@ def _records(
     for stretch, average in zip(stretches, averages, strict=True):
         if stretch.first:
             before, kept, excited = None, False, False
-        name = "record" if unlabelled else _name(stretch, names, notices)
+        slow = stretch.averaged(average)
+        name = "record" if unlabelled else _name(slow if slow.size else stretch, names, notices)
         moves = _travel(stretch) > moving
         left_out = name in (IDLE, HOLD) and name not in layout.include and not (name == HOLD and moves and kept)
         if missing := stretch.lost + sum(stretch.breaks.values()):
@@ -187,7 +188,6 @@ def _records(
             begins = stretch.phase == 0 if stretch.first else stretch.lost == 0
             if excited and not kept:
                 notices.append(Notice("history", "begins after phases that are not recorded: taken as settled", name))
-            slow = stretch.averaged(average)
             if not slow.size:
                 text = f"its {stretch.size} samples are fewer than the {average} to be averaged: left out"
                 notices.append(Notice("averaged", text, name))

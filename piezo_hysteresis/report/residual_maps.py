@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.colors import LogNorm
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from .comparison import Comparison
@@ -45,6 +46,7 @@ def residual_maps(comparison: Comparison) -> Drawing | None:
             positive = np.geomspace(slow, max(fast, 2.0 * slow), BINS // 2)
             edges = np.concatenate((-positive[::-1], positive))
         else:
+            axis.xaxis.set_major_locator(MaxNLocator(4, prune="both"))  # the numbers of neighbours are close
             edges = np.linspace(values.min(), max(values.max(), values.min() + 1e-9), BINS + 1)
         fine = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b in zip(edges, edges[1:], strict=False)]))
         counts, xs, ys = np.histogram2d(values, e, bins=(fine, np.linspace(-limit, limit, 101)))

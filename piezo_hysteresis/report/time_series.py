@@ -95,7 +95,8 @@ def time_series(comparison: Comparison) -> Drawing:
                 bottom.axhline(sign * 1e9 * comparison.floors[index], **FLOOR)
             data |= {f"predicted_m_{record.phase}": predicted[at], f"residual_time_s_{record.phase}": time[e_at]}
             data[f"residual_m_{record.phase}"] = e[e_at]
-        bottom.xaxis.set_major_locator(MaxNLocator(4))  # the numbers of a late window are long
+        for axis in {upper, bottom}:  # the numbers of a late window are long
+            axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         bottom.set_xlabel(f"time in phase [{unit}]")
         if column == 0:
             upper.set_ylabel("y [µm]")

@@ -36,7 +36,9 @@ def verdict(comparison: Comparison, answer: Mapping[str, Any] | None = None) -> 
     if comparison.now is None:
         return Verdict("The recording, without a model", (*doubts, "No model was given: only the data are shown."))
     if answer is None:
-        return Verdict(_fit_headline(comparison), (*doubts, *_fit_sentences(comparison)))
+        more = "What is missing, `piezo diagnose` tries to name."
+        advice = (more,) if _excess(comparison) > ENOUGH else ()
+        return Verdict(_fit_headline(comparison), (*doubts, *_fit_sentences(comparison), *advice))
     said = answer_verdict(answer)
     return Verdict(said.headline, (*doubts, *said.sentences, *_fit_sentences(comparison)))
 

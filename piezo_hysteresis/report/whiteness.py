@@ -13,6 +13,8 @@ from .thinning import thinned
 
 SHARE = 40
 """The largest lag drawn is one part in so many of the record."""
+WIDE = 0.1
+"""Bound of the cross-correlation above which nothing found beyond it says little."""
 
 
 @styled
@@ -54,6 +56,8 @@ def whiteness(comparison: Comparison) -> Drawing | None:
     axes[0].set_ylabel("correlation")
     white = "white" if found.is_white else "not white"
     free = "depends on the drive" if not found.is_independent else "does not depend on the drive"
+    if found.is_independent and WIDE < found.cross_bound < 1.0:
+        free = f"may depend on the drive by less than the bound of {found.cross_bound:.2g}, wide for so slow a drive"
     if found.cross_bound >= 1.0:
         free = "may or may not depend on the drive: one of few frequencies decides nothing, the bound is above 1"
     return Drawing(
