@@ -83,11 +83,22 @@ def test_plotjuggler_shows_what_is_published(published):
     curves = [c.get(key) for c in root.iter("curve") for key in ("curve_x", "curve_y") if c.get(key)]
     curves += [c.get("name") for c in root.iter("curve") if not c.get("curve_x")]
     assert len(curves) >= 10
-    topics = {t.get("name") for t in root.iter("topic")}
+    topics = set(root.find("Plugins/plugin/selected_topics").get("value").split(";"))
     for curve in curves:
         topic, field = re.fullmatch(r"(/stage_x/\w+)/(.+)", curve).groups()
         assert topic in topics
         check(topic, field, published)
+
+
+def test_plotjuggler_finds_the_series_of_its_loops_when_it_loads_the_layout():
+    """It prepares the curves of one level of splitters by their names, and drops a loop without its two."""
+    root = ET.parse(CONFIG / "plotjuggler.xml").getroot()
+    prepared = {c.get("name") for c in root.findall("tabbed_widget/Tab/Container/DockSplitter/DockArea/plot/curve")}
+    curves = list(root.iter("curve"))
+    assert {c.get(key) for c in curves for key in ("curve_x", "curve_y") if c.get(key)} <= prepared
+    assert {c.get("name") for c in curves if not c.get("curve_x")} <= prepared
+    for splitter in root.iter("DockSplitter"):
+        assert int(splitter.get("count")) == len(splitter) == len(splitter.get("sizes").split(";"))
 
 
 def test_foxglove_shows_what_is_published(published):
