@@ -152,6 +152,7 @@ class Demo:
         """What the stage was hiding."""
         with (self.folder / "plant.yaml").open() as plant:
             self.say(f"[bold]the plant file opens: {plant.readline().removeprefix('# ').strip()}[/bold]")
+        self.say("like every simulated stage it also has an amplifier with a pole of its own, at 10 kHz")
         if self.verdict.startswith("nothing_missing"):
             self.say("the identified model had taken it in already: its residual was at the noise before the search")
 

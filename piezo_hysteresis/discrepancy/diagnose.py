@@ -22,13 +22,14 @@ from .diagnosis import Diagnosis, Verdict
 from .evidence import Evidence, extent_of
 from .few_records import diagnose_few
 from .gap import Gap, measure_gap
+from .held_out import ADEQUATE
 from .localise import localise
 from .next_experiment import decide
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
 from .refit import joint, restart
 from .sampling import at_period, common_period, shortened, slowed
-from .selection import ADEQUATE, NAMED, select
+from .selection import NAMED, select
 from .split import reporting
 from .steps import Selection
 

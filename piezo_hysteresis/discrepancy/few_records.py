@@ -22,12 +22,13 @@ from .candidates import Candidate, loop_is_off, score_model
 from .diagnosis import Diagnosis, Verdict
 from .evidence import Evidence, extent_of
 from .gap import measure_gap
+from .held_out import ADEQUATE
 from .localise import localise
 from .next_experiment import decide
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
 from .refit import joint
-from .selection import ADEQUATE, select
+from .selection import select
 from .steps import Selection, Step, explained
 
 BLOCKS = 16

@@ -16,6 +16,8 @@ from ..identification.normal_equations import Gram
 
 Array = NDArray[np.float64]
 
+ADEQUATE = 1.5
+"""Mean R² up to which nothing is missing beyond noise."""
 RIDGE = 1e-9
 """Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
 FARTHEST = 100.0

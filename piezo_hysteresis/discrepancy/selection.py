@@ -5,7 +5,7 @@ Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 20
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -15,19 +15,16 @@ from ..effects import CATALOGUE, Effect, MainsHum
 from ..identification.normal_equations import residuals
 from ..model import Model
 from .candidates import Candidate, alikeness, screen
+from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, contest, finest, settled, simplest
 from .evidence import Evidence
-from .held_out import Score
-from .refit import is_seen, is_steady, proceed, refit, restart, without
+from .held_out import ADEQUATE, Score
+from .refit import is_seen, is_steady, refit, restart, without
 from .steps import MANY, Rejection, Selection, Step, typical
 
 Progress = Callable[[str, float], None]
 
-ADEQUATE = 1.5
-"""Mean R² up to which nothing is missing beyond noise."""
 ALONE = 4.0
 """Residual in floors up to which one record alone asks for no further effect."""
-LEAST_GAIN = 0.15
-"""Least gain in mean ln max(1, R²) for which an effect is accepted."""
 KEEPS = (0.8, 0.5)
 """Share of V beyond noise that may remain after the first accepted effect, and after further ones."""
 NAMED = 0.6
@@ -36,23 +33,10 @@ REFITS = 6
 """Candidates that are refitted jointly."""
 HOPELESS = 0.02
 """Linearised gain below which an effect that is not among the first two is not refitted."""
-HOPELESS_BESIDE = 0.6
-"""Share of the gain of a best at the floor by which another one may lie behind it and still be refitted."""
-AGAIN = 3
-"""Refits that begin once more behind dynamics found anew."""
-RESTARTS = 4
-WORTHWHILE = 0.8
-"""Share of the cost above which beginning anew once more is not worth it."""
-FIRST, LATER = 3, 9
-"""Linearisations of a refit before the field is thinned out, and after."""
-FINER = 0.05
-"""Gain from which the finer form of an effect is taken."""
 MOST = 3
 """Effects at most."""
 MOST_TURNS = 5
 """Turns at most."""
-CLOSE = 0.3
-"""Share of the best gain by which a rival may lie behind."""
 ALIKE = 0.97
 """|cos| of two signatures from which they count as one."""
 
@@ -119,7 +103,7 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
             continue
         lean = restart(lean, FIRST)
         if lean.score.cost - score.cost < 2.0 * LEAST_GAIN + 0.5:
-            lean = _settled(lean, steps[0].before)
+            lean = settled(lean, steps[0].before)
         if lean.score.cost - score.cost < LEAST_GAIN and lean.fit is not None:
             told = Rejection(name, f"superfluous once {last.name} is there")
             steps[k] = replace(steps[k], accepted=False, rejected=(told, *steps[k].rejected))
@@ -145,10 +129,10 @@ def _turn(
     present = {e.public_name() for e in model.effects}
     screened = screen(model, evidence, [e for e in effects if e.public_name() not in present])
     likely = [c for k, c in enumerate(screened[:REFITS]) if k < 2 or before.cost - c.score.cost > HOPELESS]
-    refits = _refitted(model, likely, before, tell)
+    refits = contest(model, likely, before, tell)
     if not refits:
         return None
-    best = _finest(_simplest(refits), before)
+    best = finest(simplest(refits), before)
     rivals, rejected = [], []
     gain = before.cost - best.score.cost
     left = _left(best.score, before, null)
@@ -213,73 +197,3 @@ def _may_be_off(candidate: Candidate) -> bool:
     spread = covariance[:k, :k] - covariance[:k, k:] @ np.linalg.pinv(held, hermitian=True) @ covariance[k:, :k]
     off = np.array([fitted.values[n] - (fitted.model.row(n).off or 0.0) for n in sizes])
     return bool(off @ np.linalg.pinv(spread, hermitian=True) @ off < chi2.ppf(0.95, k))
-
-
-def _refitted(model: Model, candidates: Sequence[Candidate], before: Score, tell: Progress) -> list[Candidate]:
-    """Joint refits, best first: a few linearisations of all, dynamics anew for the leaders, the best to the end."""
-    refits: list[Candidate] = []
-    for k, candidate in enumerate(candidates):
-        if refits and _is_far_behind(candidate, refits[0], before):
-            continue
-        tell(f"refit with {candidate.name}", (k + 1) / (len(candidates) + 2))
-        result = refit(model, candidate, FIRST)
-        if result is not None:
-            refits = sorted([*refits, result], key=lambda c: c.score.cost)
-    if not refits:
-        return []
-    tell("dynamics anew", 0.8)
-    leader = restart(refits[0], FIRST)
-    field = [
-        leader,
-        *(
-            c if k >= AGAIN or _is_far_behind(c, leader, before) else restart(c, FIRST)
-            for k, c in enumerate(refits[1:], 1)
-        ),
-    ]
-    field.sort(key=lambda c: c.score.cost)
-    tell(f"refit with {field[0].name}", 0.9)
-    best = _settled(field[0], before)
-    reach = best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
-    rest = [_settled(c, before) if c.score.cost < reach and k < AGAIN else c for k, c in enumerate(field[1:], 1)]
-    return sorted([best, *rest], key=lambda c: c.score.cost)
-
-
-def _is_far_behind(candidate: Candidate, best: Candidate, before: Score) -> bool:
-    """Whether the best is at the floor and the other by so much short of it that it is no rival."""
-    gain = before.cost - best.score.cost
-    return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > HOPELESS_BESIDE * gain
-
-
-def _settled(candidate: Candidate, before: Score) -> Candidate:
-    """The refit to its end, and begun anew while that closes much of what is left."""
-    for _ in range(RESTARTS):
-        assert candidate.fit is not None
-        cost = candidate.fit.cost
-        candidate = proceed(candidate, LATER)
-        if candidate.score.excess <= ADEQUATE or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:
-            break
-        candidate = restart(candidate, FIRST)
-        assert candidate.fit is not None
-        if candidate.fit.cost > WORTHWHILE * cost:
-            break
-    return candidate
-
-
-def _finest(candidate: Candidate, before: Score) -> Candidate:
-    """The candidate in its finer form where that is asked for, and better."""
-    finer = candidate.effect.refined()
-    gain = before.cost - candidate.score.cost
-    if finer is None or candidate.fit is None or candidate.score.excess <= ADEQUATE or gain < LEAST_GAIN:
-        return candidate
-    refined = refit(candidate.fit.model, replace(candidate, effect=finer), LATER)
-    if refined is None or refined.score.cost > candidate.score.cost - FINER:
-        return candidate
-    return _settled(refined, before)
-
-
-def _simplest(refits: list[Candidate]) -> Candidate:
-    """The refit with the fewest numbers among those that are as good as the best."""
-    best = refits[0]
-    assert best.fit is not None
-    ties = [c for c in refits if c is best or c.score.cost - best.score.cost < 0.02]
-    return min(ties, key=lambda c: (len(c.fit.names) if c.fit else 0, c.score.cost))

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.held_out import Score
-from piezo_hysteresis.discrepancy.selection import ADEQUATE, select
+from piezo_hysteresis.discrepancy.held_out import ADEQUATE, Score
+from piezo_hysteresis.discrepancy.selection import select
 from piezo_hysteresis.discrepancy.steps import Selection, explained
 
 
