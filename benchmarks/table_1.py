@@ -166,9 +166,8 @@ def predict(gain: float, *effects: Effect) -> Prediction:
     wanted = [f"bouc_wen.{n}" for n in ("A", "beta", "gamma", "p1", "p2")]
     for f in FREQUENCIES:
         u = drive(f)
-        parts = [own for *_, own in model.linearise([Record(u, np.zeros(u.size), PERIOD)], wanted)]
-        rows = [np.concatenate([part[n] for part in parts]) for n in wanted]
-        slopes.append(np.array([gain * _settled(row, f) for row in rows]))
+        _, own = model.sensitivities(Record(u, np.zeros(u.size), PERIOD), wanted)
+        slopes.append(np.array([gain * _settled(own[n], f) for n in wanted]))
     return Prediction([gain * y for y in answers(*effects)], slopes)
 
 

@@ -211,8 +211,8 @@ class Chain:
         tangent: ChainTangent,
         wanted: Collection[str],
         channels: Channels | None = None,
-    ) -> tuple[Array, dict[str, Array], ChainState, ChainTangent]:
-        """`run`, and ∂y/∂θ of shape (n,) for every parameter `wanted`, in one pass."""
+    ) -> tuple[Array, tuple[str, ...], Array, ChainState, ChainTangent]:
+        """`run`, and in the same pass the names of the parameters `wanted`, in chain order, and their ∂y/∂θ (q, n)."""
         states, tangents, inputs, dinputs = [], [], [], []
         x, dx, rows = u, np.empty((0, u.size)), []
         for block, s, t in zip(self.blocks, state.blocks, tangent.blocks, strict=True):
@@ -222,14 +222,15 @@ class Chain:
                 s = (channels or {}).get(block.channel)
             before = len(dx)
             x, dx, s, t = block.linearise(x, dx, s, t)
-            kept = [k for k, n in enumerate(block.names) if n in wanted]
-            if kept == list(range(len(kept))):
-                dx = dx[: before + len(kept)]
-            else:
-                dx = np.vstack((dx[:before], dx[before:][kept]))
-            rows += [block.names[k] for k in kept]
+            if block.names:
+                kept = [k for k, n in enumerate(block.names) if n in wanted]
+                if kept == list(range(len(kept))):
+                    dx = dx[: before + len(kept)]
+                else:
+                    dx = np.vstack((dx[:before], dx[before:][kept]))
+                rows += [block.names[k] for k in kept]
             states.append(s)
             tangents.append(t)
         time = state.time + u.size * self.setting.sample_period
-        slopes = dict(zip(rows, dx, strict=True))
-        return x, slopes, ChainState(tuple(states), tuple(inputs), time), ChainTangent(tuple(tangents), tuple(dinputs))
+        state, tangent = ChainState(tuple(states), tuple(inputs), time), ChainTangent(tuple(tangents), tuple(dinputs))
+        return x, tuple(rows), dx, state, tangent

@@ -14,7 +14,7 @@ from .chain import Chain, ChainState, ChainTangent, Channels
 from .effects import BY_NAME, CHAIN, Effect, Offset, Setting
 from .errors import ModelError
 from .parameter import Parameter, Value
-from .record import Record
+from .record import Record, are_finite
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def samples(values: ArrayLike, name: str) -> Array:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1 or array.size == 0:
         raise ModelError(f"{name}: got shape {array.shape}, expected one dimension with at least one sample")
-    if not np.isfinite(array).all():
+    if not are_finite(array):
         raise ModelError(f"{name}: sample {int((~np.isfinite(array)).argmax())} is not finite")
     return array
 
@@ -217,7 +217,7 @@ class Model:
 
     def linearise(
         self, records: Iterable[Record], wanted: Collection[str], block: int = 8192
-    ) -> Iterator[tuple[int, slice, Array, dict[str, Array]]]:
+    ) -> Iterator[tuple[int, slice, Array, tuple[str, ...], Array]]:
         """Free run with sensitivities, block by block, so that records of any length fit in memory.
 
         Yields
@@ -228,9 +228,12 @@ class Model:
             Samples of the record in this block.
         y : (k,) ndarray
             Displacement [m].
-        slopes : dict of str to (k,) ndarray
-            ∂y/∂θ for every number `wanted`.
+        names : tuple of str
+            The numbers `wanted`, in chain order.
+        slopes : (q, k) ndarray
+            ∂y/∂θ of each of them.
         """
+        wanted = frozenset(wanted)
         state: ChainState | None = None
         tangent: ChainTangent | None = None
         chain: Chain | None = None
@@ -246,9 +249,9 @@ class Model:
             for start in range(0, record.size, block):
                 part = slice(start, min(start + block, record.size))
                 now, u = chain.channels_in(channels, part), record.voltage[part].copy()
-                y, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
+                y, names, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
                 if index is not None:
-                    yield index, part, y, slopes
+                    yield index, part, y, names, slopes
 
     def _in_one_go(self, records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:
         """The records with their index, and without one the holds between those that continue: creep goes on there."""
@@ -266,8 +269,8 @@ class Model:
 
     def sensitivities(self, record: Record, wanted: Collection[str]) -> tuple[Array, dict[str, Array]]:
         """Free-run displacement (n,) of a record from rest, and ∂y/∂θ (n,) of every number `wanted`."""
-        ((_, _, y, slopes),) = self.linearise([record], wanted, block=record.size)
-        return y, slopes
+        ((_, _, y, names, slopes),) = self.linearise([record], wanted, block=record.size)
+        return y, dict(zip(names, slopes, strict=True))
 
     def contributions(self, record: Record) -> dict[str, Array]:
         """How much each effect beyond hysteresis, dynamics and offset adds to the displacement [m], shape (n,)."""

@@ -73,7 +73,7 @@ def record(n: int = 600, period: float = PERIOD, **values) -> Record:
 
 def slopes(model: Model, records: list[Record], names: list[str], block: int = 8192) -> dict[str, np.ndarray]:
     """∂y/∂θ over all records, one after the other."""
-    parts = [s for _, _, _, s in model.linearise(records, names, block)]
+    parts = [dict(zip(order, s, strict=True)) for *_, order, s in model.linearise(records, names, block)]
     return {n: np.concatenate([p[n] for p in parts]) for n in names}
 
 

@@ -145,6 +145,8 @@ class ArxBlock(LinearBlock):
         self.taps = padded(b if exact else np.convolve(b, self.interpolation))
         self.taps_slope = padded(np.convolve(b, slopes))
         self.feedback = padded(a)
+        at_a = 1.0 + a.sum()
+        self._gain_slopes = np.concatenate((np.full(a.size, -b.sum() / at_a**2), np.full(b.size, 1.0 / at_a), [0.0]))
 
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.offset + self.taps.size - 1 + self.feedback.size))
@@ -169,8 +171,7 @@ class ArxBlock(LinearBlock):
         return y, rows, after, (dx0, dz, own)
 
     def gain_slopes(self) -> Array:
-        at_a = 1.0 + self.a.sum()
-        return np.concatenate((np.full(self.a.size, -self.b.sum() / at_a**2), np.full(self.b.size, 1.0 / at_a), [0.0]))
+        return self._gain_slopes
 
     def own_rest(self) -> State:
         before = self.first + self.taps_slope.size - 1

@@ -115,6 +115,7 @@ def fit(
     nuisance: Nuisance | None = None,
     max_iterations: int = 40,
     tolerance: float = 1e-6,
+    damping: float = 1e-3,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit the numbers `free` of `model` to the free-run displacement of `records`.
@@ -138,6 +139,8 @@ def fit(
         Linearisations at most.
     tolerance : float
         Relative decrease of the cost at which to stop.
+    damping : float
+        Of the first step, as a share of the diagonal; a start that is near needs little.
     progress : callable, optional
         Called with a word and the fraction done.
 
@@ -162,7 +165,7 @@ def fit(
         current = grams(model, records, free, nuisance)
     except DivergenceError as error:
         raise IdentificationError(f"fit: the start values diverge ({error})") from error
-    damping, iterations, converged = 1e-3, 1, False
+    iterations, converged = 1, False
     total = weighted(current, sizes)
     while iterations < max_iterations and not converged:
         hessian = directions.T @ total[:-1, :-1] @ directions

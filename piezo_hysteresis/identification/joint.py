@@ -21,6 +21,8 @@ FINER = 100
 """Sample periods of a pure lag per sample of the record."""
 SLOWEST_POLE = 0.1
 """Longest time constant of G, as share of the longest record: slower ones are drift in disguise."""
+NEAR = 1e-7
+"""Damping of a fit that starts from a linear one: more of it only slows the directions that hardly matter."""
 
 
 def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Fit:
@@ -81,7 +83,7 @@ def fit_joint(
     kept, sizes = select(records, floors, fitted)
     free = [f"{hysteresis_name(model)}.{n}" for n in LOOP]
     free += [f"arx.{n}" for n in dynamics_of(model).free_names() if n != "delay"]
-    return fit(model, kept, free, floors=sizes, nuisance=Nuisance(offset=True), progress=progress)
+    return fit(model, kept, free, floors=sizes, nuisance=Nuisance(offset=True), damping=NEAR, progress=progress)
 
 
 def fit_dynamics(

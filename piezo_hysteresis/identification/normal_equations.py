@@ -108,20 +108,16 @@ def grams(
     nuisance = nuisance or Nuisance()
     q = len(wanted) + (len(extra[0]) if extra else 0)
     sums: list[Array] = []
-    room = np.empty((0, 0))  # one for all blocks: fresh memory for each would cost more than the products
-    for index, part, y, slopes in model.linearise(records, wanted):
+    for index, part, y, names, slopes in model.linearise(records, wanted):
         record = records[index]
-        residual = record.displacement[part] - y
-        free = nuisance.rows(record, part)
-        if room.shape[0] != q + 1 + len(free) or room.shape[1] < y.size:
-            room = np.empty((q + 1 + len(free), y.size))
-        rows = room[:, : y.size]
-        for k, name in enumerate(wanted):
-            rows[k] = slopes[name]
-        if extra:
-            rows[len(wanted) : q] = extra[index][:, part]
-        rows[q], rows[q + 1 :] = residual, free
-        product = rows @ rows.T
+        beside = [(record.displacement[part] - y)[None, :], nuisance.rows(record, part)]
+        others: Array = np.concatenate([extra[index][:, part], *beside] if extra else beside)
+        order = [names.index(name) for name in wanted]
+        product = np.empty((len(wanted) + len(others),) * 2)
+        own, rest = slice(len(wanted)), slice(len(wanted), None)
+        product[own, own] = (slopes @ slopes.T)[np.ix_(order, order)]
+        product[own, rest] = np.array([slopes @ row for row in others]).T[order]
+        product[rest, own], product[rest, rest] = product[own, rest].T, others @ others.T
         if not np.abs(product).max() < RUNAWAY:
             raise DivergenceError(model.effects[-1].name, part.start, part.start * record.sample_period)
         if index == len(sums):

@@ -96,10 +96,10 @@ def sensitivities(
     outputs, slopes = [], []
     for a, b in itertools.pairwise(edges):
         here = {k: v[a:b].copy() for k, v in channels(u.size).items()}
-        y, s, state, tangent = chain.linearise(u[a:b].copy(), state, tangent, names, here)
+        y, order, s, state, tangent = chain.linearise(u[a:b].copy(), state, tangent, names, here)
         outputs.append(y)
         slopes.append(s)
-    return np.concatenate(outputs), {n: np.concatenate([s[n] for s in slopes]) for n in slopes[0]}
+    return np.concatenate(outputs), dict(zip(order, np.concatenate(slopes, axis=1), strict=True))
 
 
 def fitted_names(effect: Effect) -> list[str]:

@@ -173,6 +173,15 @@ def test_the_published_form_converges_to_the_exact_one() -> None:
     assert error(2000) < 0.6 * error(1000) < 0.36 * error(500)
 
 
+def test_own_sensitivities_of_the_published_form_are_those_beside_upstream_ones_bit_for_bit() -> None:
+    block, v = PublishedBoucWen().block(SETTING), 0.4 * np.sin(np.arange(300) / 20.0)
+    nothing, held = np.empty((0, v.size)), np.zeros((1, v.size))
+    w, alone, *_ = block.linearise(v, nothing, block.rest(0.0, 0.0), block.rest_tangent(0.0, np.empty(0)))
+    beside_w, beside, *_ = block.linearise(v, held, block.rest(0.0, 0.0), block.rest_tangent(0.0, np.zeros(1)))
+    np.testing.assert_array_equal(w, beside_w)
+    np.testing.assert_array_equal(alone, beside[1:])
+
+
 @pytest.mark.parametrize("kind", [BoucWen, PublishedBoucWen])
 def test_an_unbounded_loop_is_refused(kind) -> None:
     with pytest.raises(ParameterError, match="expected beta >= "):
