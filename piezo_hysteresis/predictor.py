@@ -138,8 +138,7 @@ class Predictor:
     @property
     def residual_rms(self) -> float | None:
         """Rms of the residual over the last `rms_time` [m]; None before there is one."""
-        count = sum(n for n, _ in self._squares)
-        return float(np.sqrt(sum(s for _, s in self._squares) / count)) if count else None
+        return float(np.sqrt(sum(s for _, s in self._squares) / self._squared)) if self._squared else None
 
     def swap(self, model: Model) -> None:
         """Let another model take over as soon as it has been run over the history.
@@ -238,7 +237,7 @@ class Predictor:
 
     def _zero_from(self, start: int, at_rest: bool = False) -> None:
         self._zero = SensorZero(start, self._window, at_rest)
-        self._squares: deque[tuple[int, float]] = deque()
+        self._forget_residuals()
 
     def _bridge(self, missing: int, never_measured: bool) -> None:
         """Hold the last voltage; what was really driven is unknown where the samples were lost on the way."""
@@ -274,10 +273,15 @@ class Predictor:
         self._zero.add(measured, modelled, self._history.travel)
         return modelled
 
+    def _forget_residuals(self) -> None:
+        self._squares: deque[tuple[int, float]] = deque()
+        self._squared = 0
+
     def _remember(self, residual: Array) -> None:
         self._squares.append((residual.size, float(residual @ residual)))
-        while sum(n for n, _ in self._squares) - self._squares[0][0] >= self._rms_samples:
-            self._squares.popleft()
+        self._squared += residual.size
+        while self._squared - self._squares[0][0] >= self._rms_samples:
+            self._squared -= self._squares.popleft()[0]
 
     def _warm(self, values: int) -> None:
         if self._warmup is None and self._waiting is not None:
@@ -292,6 +296,6 @@ class Predictor:
         self.model, self._chain, self._state = warmup.model, warmup.chain, warmup.state
         if warmup.zero is self._zero and warmup.mean is not None:
             self._zero.remodel(warmup.mean)
-            self._squares.clear()
+            self._forget_residuals()
         else:
             self._zero_from(self._history.count)

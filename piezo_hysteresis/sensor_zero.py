@@ -50,6 +50,8 @@ class SensorZero:
         if travel < self.until:
             self._end = max(self._end, self.stop + measured.size)
         count = min(measured.size, self._end - self.stop)
+        if count <= 0:
+            return
         self._measured += float(measured[:count].sum())
         if modelled is not None:
             self._modelled += float(modelled[:count].sum())

@@ -72,16 +72,17 @@ class VoltageHistory:
 
     def append(self, voltage: Array) -> None:
         """Add the next samples [V], shape (n,)."""
-        held = is_held(voltage)
+        low, high = float(voltage.min()), float(voltage.max())
+        held = high - low <= 2 * REST_TOLERANCE
         if self.count == 0:
             self.rest_voltage = float(np.median(voltage)) if held else float(voltage[0])
             self._counted = self.rest_voltage
         self.count += voltage.size
         self.has_rested |= held
-        if not self._has_moved and held and np.abs(voltage - self.rest_voltage).max() <= REST_TOLERANCE:
+        if not self._has_moved and held and max(high - self.rest_voltage, self.rest_voltage - low) <= REST_TOLERANCE:
             return
         self._has_moved = True
-        self._travel(float(voltage.min()), float(voltage.max()), float(voltage[-1]))
+        self._travel(low, high, float(voltage[-1]))
         if self._kept + voltage.size > self._full.size:
             grown = np.empty(2 * (self._kept + voltage.size))
             grown[: self._kept] = self._full[: self._kept]
@@ -138,4 +139,4 @@ class VoltageHistory:
 
 def is_held(voltage: Array) -> bool:
     """True where a block of voltages [V] stays at one level."""
-    return bool(np.ptp(voltage) <= 2 * REST_TOLERANCE)
+    return bool(voltage.max() - voltage.min() <= 2 * REST_TOLERANCE)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import array
 from collections.abc import Mapping
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -12,6 +14,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
 from ..errors import RecordError
+from ..record import are_finite
 
 _DATATYPES = {
     PointField.INT8: "i1",
@@ -100,41 +103,66 @@ def from_cloud(
         raise RecordError(
             f"cloud: got {len(cloud.data)} bytes, expected {count} points of {step} bytes; it is truncated"
         )
-    wanted = {**(optional or {}), **required}
-    order = ">" if cloud.is_bigendian else "<"
-    found = {field.name: field for field in cloud.fields if field.name in wanted}
-    for name in required:
-        if name not in found:
-            has = ", ".join(field.name for field in cloud.fields) or "none"
-            raise RecordError(f"cloud: field '{name}' is missing, got {has}; expected {', '.join(required)}")
-    stored = {name: order + _stored_type(field, wanted[name], step) for name, field in found.items()}
-    dtype = np.dtype(
-        {
-            "names": list(stored),
-            "formats": list(stored.values()),
-            "offsets": [found[name].offset for name in stored],
-            "itemsize": step,
-        }
-    )
+    fields = tuple(_Field(field.name, field.offset, field.datatype, field.count) for field in cloud.fields)
+    given = tuple(required.items()), tuple(optional.items()) if optional else ()
+    dtype, wanted = _stored(fields, step, cloud.is_bigendian, *given)
     points = np.frombuffer(cloud.data, dtype=dtype)
-    arrays = {name: np.ascontiguousarray(points[name], dtype=wanted[name]) for name in stored}
-    for name, values in arrays.items():
-        if not np.isfinite(values).all():
+    arrays: dict[str, NDArray] = {}
+    for name, word in wanted:
+        arrays[name] = values = points[name].astype(word)
+        if word[0] == "f" and not are_finite(values):
             first = int(np.argmin(np.isfinite(values)))
             raise RecordError(f"cloud: {name} {first} is {values[first]}, expected finite values")
     return arrays
 
 
-def _stored_type(field: PointField, wanted: str, step: int) -> str:
-    word = _DATATYPES.get(field.datatype)
-    if word is None or field.count > 1:
-        raise RecordError(
-            f"cloud: field '{field.name}' has datatype {field.datatype} x {field.count}, expected one number per point"
-        )
-    if wanted[0] != "f" and (word[0] == "f" or int(word[1]) > int(wanted[1])):
-        raise RecordError(f"cloud: field '{field.name}' has type {word}, expected {wanted}")
-    if field.offset + int(word[1]) > step:
-        raise RecordError(
-            f"cloud: field '{field.name}' at offset {field.offset} leaves the point of {step} bytes; expected it inside"
-        )
-    return word
+class _Field(NamedTuple):
+    """A PointField that can be compared."""
+
+    name: str
+    offset: int
+    datatype: int
+    each: int
+
+    def stored_type(self, wanted: str, step: int) -> str:
+        """Numpy's word for it; RecordError where it is not what is wanted, or not inside the point."""
+        word = _DATATYPES.get(self.datatype)
+        if word is None or self.each > 1:
+            raise RecordError(
+                f"cloud: field '{self.name}' has datatype {self.datatype} x {self.each}, expected one number per point"
+            )
+        if wanted[0] != "f" and (word[0] == "f" or int(word[1]) > int(wanted[1])):
+            raise RecordError(f"cloud: field '{self.name}' has type {word}, expected {wanted}")
+        if self.offset + int(word[1]) > step:
+            raise RecordError(
+                f"cloud: field '{self.name}' at offset {self.offset} leaves the point of {step} bytes; "
+                "expected it inside"
+            )
+        return word
+
+
+_Wanted = tuple[tuple[str, str], ...]
+
+
+@lru_cache(maxsize=8)
+def _stored(
+    fields: tuple[_Field, ...], step: int, big_endian: bool, required: _Wanted, optional: _Wanted
+) -> tuple[np.dtype, _Wanted]:
+    """The wanted fields of a point: looked for once, for a stream brings the same ones with every message."""
+    wanted = dict(optional + required)
+    order = ">" if big_endian else "<"
+    found = {field.name: field for field in fields if field.name in wanted}
+    for name, _ in required:
+        if name not in found:
+            has = ", ".join(field.name for field in fields) or "none"
+            expected = ", ".join(name for name, _ in required)
+            raise RecordError(f"cloud: field '{name}' is missing, got {has}; expected {expected}")
+    dtype = np.dtype(
+        {
+            "names": list(found),
+            "formats": [order + field.stored_type(wanted[name], step) for name, field in found.items()],
+            "offsets": [field.offset for field in found.values()],
+            "itemsize": step,
+        }
+    )
+    return dtype, tuple((name, wanted[name]) for name in found)

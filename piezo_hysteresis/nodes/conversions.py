@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -112,15 +113,15 @@ def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
     _require_consecutive(block)
     for name, largest in _LARGEST.items():
         values = getattr(block, name)
-        if values.max() > largest or values.min() < -largest:
+        if np.abs(values).max() > largest:
             worst = float(values[np.abs(values).argmax()])
             raise RecordError(f"samples: got a {name} of {worst:g}, expected at most {largest:g}")
     return block
 
 
 def _require_consecutive(block: SampleBlock) -> None:
-    count = np.arange(block.size)
-    jumps = block.index - block.index[0] != count.astype(np.uint32)
+    count, places = _counting(block.size)
+    jumps = block.index - block.index[0] != count
     if jumps.any():
         raise RecordError(f"samples: the index jumps at sample {int(jumps.argmax())}, expected consecutive samples")
     first, last = float(block.time[0]), float(block.time[-1])
@@ -129,9 +130,18 @@ def _require_consecutive(block: SampleBlock) -> None:
     period = block.sample_period
     if period is None:
         return
-    off = float(np.abs(block.time - first - period * count).max())
+    off = float(np.abs(block.time - first - period * places).max())
     if not off <= _PERIOD_TOLERANCE * period:
         raise RecordError(f"samples: times are {off:.3g} s off a period of {period:.6g} s, expected even ones")
+
+
+@lru_cache(maxsize=2)
+def _counting(size: int) -> tuple[NDArray[np.uint32], Samples]:
+    """0, 1, 2, … as index and as number: a stream brings blocks of one size."""
+    index, number = np.arange(size, dtype=np.uint32), np.arange(size, dtype=np.float64)
+    for values in (index, number):
+        values.setflags(write=False)
+    return index, number
 
 
 def predicted_to_cloud(
