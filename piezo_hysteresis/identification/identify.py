@@ -6,7 +6,7 @@ held as the gauge between hysteresis and dynamics.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,22 +15,22 @@ from ..effects import Arx, BoucWen, Effect, Offset
 from ..errors import IdentificationError
 from ..model import Model
 from ..provenance import provenance
-from ..record import Experiment, Notice
+from ..record import Experiment, Notice, Record
 from .comparison import Comparison, compare_inputs
 from .delay import Delay, identify_delay
 from .dynamics import Dynamics, OrderError, choose_order, compare_orders, delay_of
 from .fit import Fit, Progress
-from .hysteresis import fit_hysteresis
+from .hysteresis import fit_hysteresis, hysteresis_name
 from .identification import Identification, PhaseError
 from .joint import fit_dynamics, fit_lag
 from .lag import lag_notices
 from .lead_in import known_from_within
 from .leading_step import Blocks, steps_apart
-from .linear_start import hysteresis_signals
+from .linear_start import dynamics_of, hysteresis_signals
 from .memory import choose_memory
 from .normal_equations import Nuisance, residuals
 from .roles import HELD_OUT, Roles, roles_of
-from .three_steps import ThreeSteps, three_steps
+from .three_steps import ThreeSteps, named, three_steps
 
 ADEQUATE = 3e-4
 """Share of the range below which a residual does not decide: no lab needs better."""
@@ -119,7 +119,7 @@ def identify(
     tell("step 3: hysteresis", 0.1)
     dead = 1.0 if delay is None else max(1.0, delay.time / period)
     frame = Model((hysteresis(), Arx(a=(), b=(gain,), delay=dead)), period, scale_v, scale_y)
-    start = fit_hysteresis(frame, records, roles.loops).model
+    start = _behind_the_gauge(frame, published, records, roles.loops)
     dynamics: Dynamics | None = None
     table: tuple[OrderError, ...] = ()
     comparisons: tuple[Comparison, ...] = ()
@@ -213,6 +213,18 @@ def _published(
     except IdentificationError as error:
         notices.append(Notice("no_three_steps", str(error)))
         return None
+
+
+def _behind_the_gauge(
+    frame: Model, published: ThreeSteps | None, records: Sequence[Record], loops: Collection[int]
+) -> Model:
+    """`frame` with its hysteresis fitted to the loops; where step 3 was, only its gain is another one."""
+    if published is None or set(loops) != set(named(records, "triangle")):
+        return fit_hysteresis(frame, records, loops).model
+    name = hysteresis_name(frame)
+    gain = published.dynamics.arx.dc_gain / dynamics_of(frame).dc_gain
+    scales = {f"{name}.A": gain, f"{name}.p1": gain, f"{name}.p2": gain}
+    return frame.with_values({n: scales.get(n, 1.0) * value for n, value in published.loop.values.items()})
 
 
 def _free_run(model: Model, experiment: Experiment, roles: Roles, reach: float) -> tuple[PhaseError, ...]:
