@@ -29,7 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="column number from 1, name, or /topic.field; e.g. displacement=5 (repeatable)",
     )
     group.add_argument(
-        "--unit", metavar="CHANNEL=UNIT", action="append", default=[], help="e.g. displacement=um (repeatable)"
+        "--unit",
+        metavar="CHANNEL=UNIT",
+        action="append",
+        default=[],
+        help="e.g. displacement=um; or the SI value of one count, 2e-6 for a sensor of 2 um/V (repeatable)",
     )
     group.add_argument("--sample-period", metavar="S", type=float, help="time between samples [s]")
     group.add_argument(

@@ -17,6 +17,9 @@ from .time_base import TimeBase
 
 _ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _ROWS = 1 << 15
+_LOOK = 1 << 12
+_EPOCH = 1e8
+"""A clock that shows more [s] counts from an epoch, not from the start of the experiment."""
 
 
 class Csv:
@@ -28,8 +31,8 @@ class Csv:
     """
 
     def recognises(self, path: Path) -> bool:
-        """True for the endings of text tables."""
-        return path.is_file() and path.suffix.lower() in _ENDINGS
+        """True for the endings of text tables, and for any text with rows of numbers."""
+        return path.is_file() and (path.suffix.lower() in _ENDINGS or _is_table(path))
 
     def read(self, path: Path, layout: Layout) -> Experiment:
         """The table as phases: labelled ones, or else what the drive looks like."""
@@ -41,6 +44,8 @@ class Csv:
             words = {name: at for name, (at, _) in places.items() if name in LABELS}
             cells = read_cells(path, dialect, numbers, words, layout)
             channels = {name: layout.in_si(name, values, places[name][1]) for name, values in cells.columns.items()}
+            if "time" in channels and abs(channels["time"][0]) > _EPOCH:
+                channels["time"] = channels["time"] - channels["time"][0]
             rest = layout.after_reading(cells.average)
             records, notices = table_records(channels, cells.marks, rest, truncated=layout.passes_over)
             notices += found.notices
@@ -70,6 +75,16 @@ class Csv:
                 file.write(",".join(["time_s", "voltage_V", "displacement_m", *titles]) + "\n")
                 for number, record in enumerate(experiment, 1):
                     _write_record(file, record, channels, _row_end(number, record, labels))
+
+
+def _is_table(path: Path) -> bool:
+    with path.open("rb") as file:
+        if b"\0" in file.read(_LOOK):
+            return False
+    try:
+        return len(Dialect.sniff(path).header) > 0
+    except RecordingError:
+        return False
 
 
 def _labels(experiment: Experiment) -> list[str]:

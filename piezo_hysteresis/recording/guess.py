@@ -10,7 +10,7 @@ from .units import UNITS, plain
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$|[\s_,/:]\s*([^\s_,/:\[\]()]+)\s*$")
 _WORDS = {
-    "time": r"time|zeit|\bt\b",
+    "time": r"time|zeit|\bt\b|\bx value\b",
     "voltage": r"volt|drive|spannung|input|\bu\b|\bv\b|\bu_?in\b|\bv_?in\b",
     "displacement": r"disp|posi|sensor|stroke|weg\b|elong|output|\by\b|\bx\b",
 }

@@ -88,7 +88,9 @@ def resolve(titles: Sequence[str], width: int, layout: Layout) -> Places:
     places |= {channel: (at, unit_in(titles[at], channel)) for channel, at in found.items()}
     for channel in ("voltage", "displacement"):
         if channel not in places:
-            raise RecordingError(f"got {_listed(titles, width)}, expected a column for {channel}; name it by columns")
+            raise RecordingError(
+                f"got {_listed(titles, width)}, expected a column for {channel}; name it by columns, e.g. {channel}=2"
+            )
     names = {channel: titles[at].strip() for channel, at in found.items()}
     return Places(places, guess_notice(names, {channel: places[channel][1] for channel in found}))
 

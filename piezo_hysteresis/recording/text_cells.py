@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +15,15 @@ from ..errors import RecordingError
 from ..record import Samples
 from .intake import Intake
 from .layout import Layout
+from .units import is_unit
 
 BLOCK_BYTES = 1 << 20
 """Text that is parsed at a time; no line may be longer."""
 
 
 _COMMENT = ("#", "%")
+_STAMP = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?Z?")
+_YEAR_2000 = np.datetime64("2000-01-01", "ns")
 _NO_ROW = (b"#", b"%", b"\n\n", b"\n\r", b"\r\r", b"\n ", b"\n\t", b"\f", b"\v")
 """Bytes without which every line is a row: looking at each line takes longer than reading its numbers."""
 
@@ -84,12 +88,15 @@ class Dialect:
         rows = [[] if line.lstrip().startswith(_COMMENT) else _cells(line, delimiter) for line in lines]
         body = [row for row in rows if row][-40:]
         width = len(body[-1]) if body else 0
-        first = next((i for i, row in enumerate(rows) if len(row) == width and _has_numbers(row, comma)), None)
+        of_numbers = [at for at in range(width) if _number(body[-1][at], comma) is not None]
+        like = (i for i, row in enumerate(rows) if len(row) == width and _all(row, of_numbers, comma))
+        first = next((i for i in like if _has_numbers(rows[i], comma)), None)
         if width < 2 or first is None:
             return None
-        numeric = [np.mean([_number(cell, comma) is not None for cell in row]) for row in body if len(row) == width]
-        above = _cells(lines[first - 1].lstrip(" #%"), delimiter) if first else []
-        header = tuple(above) if len(above) == width else ()
+        filled = [[cell for cell in row if cell] for row in body if len(row) == width]
+        numeric = [np.mean([_number(cell, comma) is not None for cell in row]) for row in filled if row]
+        titles = (_cells(line.lstrip(" #%"), delimiter) for line in reversed(lines[:first][-2:]))
+        header = _titles(*(tuple(cells) if len(cells) == width else () for cells in titles))
         return float(np.sum(numeric)) / len(body), width, cls(delimiter, comma, first, header, width)
 
 
@@ -220,7 +227,31 @@ def _number(cell: str, comma: bool) -> float | None:
     try:
         return float(cell.replace(",", ".") if comma else cell)
     except ValueError:
+        return _seconds(cell) if _STAMP.fullmatch(cell) else None
+
+
+def _seconds(stamp: str) -> float | None:
+    """Date and time as ISO 8601 writes them, since the year 2000 [s]."""
+    try:
+        return float((np.datetime64(stamp[:29].rstrip("Z"), "ns") - _YEAR_2000) / np.timedelta64(1, "s"))
+    except ValueError:
         return None
+
+
+def _all(row: Sequence[str], columns: Sequence[int], comma: bool) -> bool:
+    return all(not row[at] or _number(row[at], comma) is not None for at in columns)
+
+
+def _titles(line: tuple[str, ...] = (), above: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Column titles from the line above the numbers; where that holds units only, with the line above it.
+
+    >>> _titles(("s", "V", "um"), ("Time", "Drive", "Position"))
+    ('Time [s]', 'Drive [V]', 'Position [um]')
+    """
+    named = [cell for cell in line if cell]
+    if above and named and all(is_unit(cell) for cell in named):
+        return tuple(f"{title} [{unit}]" if unit else title for title, unit in zip(above, line, strict=True))
+    return line
 
 
 def _has_numbers(row: list[str], comma: bool) -> bool:

@@ -66,7 +66,7 @@ class TimeBase:
         forward = steps[steps > 0]
         if not forward.size or not np.isfinite(time).all():
             raise RecordError(
-                "time: got times that are not finite or do not grow, expected seconds; give sample_period"
+                "time: got times that are not finite or do not grow, expected seconds or ISO dates; give sample_period"
             )
         # times written with few digits stand still between their steps: then only the mean step tells
         usual = float(np.median(steps[steps >= 0]))

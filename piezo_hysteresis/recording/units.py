@@ -29,6 +29,15 @@ def plain(unit: str) -> str:
     return unit.strip(" \t[]()").replace("µ", "u").replace("μ", "u")
 
 
+def is_unit(word: str) -> bool:
+    """True for a unit of any channel.
+
+    >>> is_unit("[µm]"), is_unit("Position")
+    (True, False)
+    """
+    return any(plain(word) in known for known in UNITS.values())
+
+
 def si_factor(channel: str, unit: str | float) -> float:
     """SI value of one `unit` of a channel.
 

@@ -1,5 +1,6 @@
 """Tables of other software: columns, units, sample periods, missing cells, and a measured record."""
 
+import math
 import os
 from pathlib import Path
 
@@ -259,3 +260,33 @@ def test_the_measured_record_is_a_sine_from_zero_volts():
 
 def test_the_measured_record_taken_as_settled_contradicts_rest():
     assert "not_at_rest" in kinds(read(measured() / "Model_Vi_Do.dat", **OPTIONS))
+
+
+ROWS = [(k / 100, round(5.0 - 5.0 * math.cos(k / 50), 4), round(7.0 - 7.0 * math.cos(k / 50), 4)) for k in range(900)]
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("Time,Drive,Position\nms,mV,nm\n", lambda t, u, y: f"{1e3 * t:.0f},{1e3 * u:.1f},{1e3 * y:.1f}"),
+        ("timestamp,voltage (V),Weg [µm]\n", lambda t, u, y: f"2024-03-12 10:00:{t:06.3f},{u},{y}"),
+        (
+            '"t [ms]","Piezo (V)","Sensor (nm)","Target (nm)"\n',
+            lambda t, u, y: f'"{1e3 * t:.0f}","{u}","{1e3 * y}","0"',
+        ),
+        (
+            "LabVIEW Measurement\t\nSeparator\tTab\n***End_of_Header***\t\n\t\nSamples\t900\t900\t\n"
+            "***End_of_Header***\t\t\t\t\nX_Value\tDrive_V\tPosition_um\tComment\n",
+            lambda t, u, y: f"{t:.3f}\t{u}\t{y}\t",
+        ),
+    ],
+    ids=["row of units", "dates", "quoted", "LabVIEW"],
+)
+def test_files_as_instruments_write_them(head, row, tmp_path):
+    path = tmp_path / "r.lvm"
+    path.write_text(head + "".join(row(*values) + "\n" for values in ROWS), encoding="utf-8")
+    (record,) = read(path, phases="record")
+    assert record.sample_period == pytest.approx(0.01)
+    assert record.start_time == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(record.voltage, [u for _, u, _ in ROWS], atol=1e-9)
+    np.testing.assert_allclose(record.displacement, [1e-6 * y for _, _, y in ROWS], atol=1e-14)
