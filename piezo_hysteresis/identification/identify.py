@@ -144,7 +144,9 @@ def identify(
             if again != samples:
                 samples = again
                 joint, dynamics, told = fit_behind(joint.model, samples)
-            notices.append(Notice("delay_from_fit", f"no step recorded: delay of {samples} samples from the dynamics"))
+            notices.append(
+                Notice("delay_from_fit", f"no step to read it from: delay of {samples} samples from the dynamics")
+            )
         notices += told
         noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
         comparisons, told = compare_inputs(joint.model, records, noise, samples, chosen)
