@@ -67,8 +67,8 @@ def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
     edges = [(record, edge) for record in records for edge in find_edges(record.voltage, 8 * every, 4 * every)]
     if not edges:
         raise IdentificationError(
-            f"no step found: expected an edge of over a fifth of the drive range within 8 samples, with {8 * every} quiet "
-            f"samples before it and {4 * every} after it; record a step phase"
+            f"no step found: expected an edge of over a fifth of the drive range within 8 samples, with {8 * every} "
+            f"quiet samples before it and {4 * every} after it; record a step phase"
         )
     resolution = _resolution({id(r): r for r, _ in edges}.values())
     # A stage that still rings is not straight over a long base line; a short one is noisy.
