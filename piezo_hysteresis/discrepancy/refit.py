@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from ..effects import Arx, MainsHum
 from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
@@ -147,6 +148,25 @@ def is_seen(candidate: Candidate) -> bool:
         np.std(first - second) > SEEN * floor
         for first, second, floor in zip(with_it, without_it, evidence.floors, strict=True)
     )
+
+
+def may_be_off(candidate: Candidate) -> bool:
+    """Whether the numbers of the effect could as well all have their off value: Wald's test, the others held.
+
+    A time constant or an exponent has no off value; while it is held, its correlation with a size blurs nothing.
+    """
+    fitted = candidate.fit
+    assert fitted is not None
+    errors, rows = fitted.standard_errors, fitted.model.row
+    own = [n for n in fitted.names if n.startswith(f"{candidate.name}.")]
+    if all(rows(n).off is None for n in own):
+        return False
+    told = sorted((n for n in own if errors[n] > 0.0), key=lambda n: rows(n).off is None)
+    off = np.array([(fitted.values[n] - value) / errors[n] for n in told if (value := rows(n).off) is not None])
+    at, scale, k = [fitted.names.index(n) for n in told], np.array([errors[n] for n in told]), off.size
+    spread = fitted.covariance[np.ix_(at, at)] / np.outer(scale, scale)
+    spread = spread[:k, :k] - spread[:k, k:] @ np.linalg.pinv(spread[k:, k:], hermitian=True) @ spread[k:, :k]
+    return bool(off @ np.linalg.pinv(spread, rcond=1e-9, hermitian=True) @ off < chi2.ppf(0.95, max(1, k)))
 
 
 def is_steady(candidate: Candidate) -> bool:

@@ -9,16 +9,15 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from ..effects import CATALOGUE, Effect, MainsHum
 from ..identification.normal_equations import residuals
 from ..model import Model
-from .candidates import Candidate, alikeness, screen
+from .candidates import alikeness, screen
 from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, contest, finest, settled, simplest
 from .evidence import Evidence
 from .held_out import ADEQUATE, Score
-from .refit import is_seen, is_steady, refit, restart, without
+from .refit import is_seen, is_steady, may_be_off, refit, restart, without
 from .steps import MANY, Rejection, Selection, Step, typical
 
 Progress = Callable[[str, float], None]
@@ -143,7 +142,7 @@ def _turn(
         accepted = owed >= LEAST_GAIN and _left(best.score, alone.score, null) <= keeps
         if not accepted:
             rejected.append(Rejection(best.name, f"gains {owed:.2f} over the model fitted anew without it"))
-    if accepted and _may_be_off(best):
+    if accepted and may_be_off(best):
         accepted = False
         rejected.append(Rejection(best.name, "all its numbers could as well be off"))
     if accepted and not is_seen(best):
@@ -178,22 +177,3 @@ def _left(after: Score, before: Score, null: float) -> float:
     """Share of V beyond noise that is left; the worst record does not decide."""
     first, second = typical(before, after)
     return max(0.0, second - null) / max(first - null, 1e-12)
-
-
-def _may_be_off(candidate: Candidate) -> bool:
-    """Whether the numbers of the effect could as well all have their off value: Wald's test, the others held.
-
-    A time constant or an exponent has no off value; while it is held, its correlation with a size blurs nothing.
-    """
-    fitted = candidate.fit
-    assert fitted is not None
-    own = [n for n in fitted.names if n.startswith(f"{candidate.name}.")]
-    sizes = [n for n in own if fitted.model.row(n).off is not None]
-    if not sizes:
-        return False
-    at = [fitted.names.index(n) for n in (*sizes, *(n for n in own if n not in sizes))]
-    covariance, k = fitted.covariance[np.ix_(at, at)], len(sizes)
-    held = covariance[k:, k:]
-    spread = covariance[:k, :k] - covariance[:k, k:] @ np.linalg.pinv(held, hermitian=True) @ covariance[k:, :k]
-    off = np.array([fitted.values[n] - (fitted.model.row(n).off or 0.0) for n in sizes])
-    return bool(off @ np.linalg.pinv(spread, hermitian=True) @ off < chi2.ppf(0.95, k))

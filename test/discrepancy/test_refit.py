@@ -1,0 +1,50 @@
+"""What counts as an effect once it has been fitted."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.discrepancy.candidates import Candidate
+from piezo_hysteresis.discrepancy.evidence import Evidence
+from piezo_hysteresis.discrepancy.held_out import Score
+from piezo_hysteresis.discrepancy.refit import may_be_off
+from piezo_hysteresis.effects import BoucWen, GainDrift, HysteresisMemory
+from piezo_hysteresis.effects.extent import Extent
+from piezo_hysteresis.identification.fit import Fit
+from piezo_hysteresis.identification.normal_equations import Nuisance
+from piezo_hysteresis.model import Model
+
+EXTENT = Extent(0.0, 10.0, 1e3, 10.0, 1e-5, 2e-5, 100.0, 10.0)
+
+
+def fitted(effect, names, covariance):
+    model = Model((BoucWen(A=0.5, beta=3.0, gamma=0.5, p1=0.0, p2=1.0), effect), 2e-5, 10.0, 1e-5)
+    result = Fit(model, names, np.asarray(covariance), 1.0, (), (), (), True, 3)
+    evidence = Evidence((), np.array([]), Nuisance(), EXTENT)
+    return Candidate(effect, evidence, Score(np.ones(3), np.zeros(len(names))), result)
+
+
+def gain_drift(size, along, across):
+    """Size and time constant so correlated that only their ratio is known well, as where the end is never seen."""
+    tau = 600.0
+    direction = np.array([size / tau, 1.0])
+    normal = np.array([1.0, -size / tau])
+    covariance = along**2 * np.outer(direction, direction) + across**2 * np.outer(normal, normal)
+    return fitted(GainDrift(g=size, tau=tau), ("gain_drift.g", "gain_drift.tau"), covariance)
+
+
+def test_a_size_that_its_time_constant_blurs_is_a_size_all_the_same():
+    blurred = gain_drift(0.05, along=1000.0, across=1e-3)
+    assert blurred.fit.standard_errors["gain_drift.g"] > 0.05
+    assert not may_be_off(blurred)
+
+
+def test_a_size_below_its_error_may_be_off():
+    assert may_be_off(gain_drift(0.05, along=1.0, across=0.1))
+
+
+@pytest.mark.parametrize("blind", [1e6, 1e145])
+def test_a_play_that_nothing_moves_decides_nothing(blind):
+    memory = HysteresisMemory(c=(0.02, 0.03, 0.0))
+    names = tuple(f"hysteresis_memory.c[{j}]" for j in range(3))
+    assert not may_be_off(fitted(memory, names, np.diag([1e-3, 1e-3, blind]) ** 2))
+    assert may_be_off(fitted(memory, names, np.diag([0.1, 0.1, blind]) ** 2))
