@@ -9,7 +9,7 @@ from ..parameter import Parameter
 from .block import Array, Block, State
 from .effect import Effect, Place, Setting
 from .loop import LOOP, run_general, run_plain
-from .loop_slopes import START, linearise_general
+from .loop_slopes import START, linearise_general, linearise_plain
 
 LOOP_OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5])
 
@@ -118,19 +118,10 @@ class BoucWenBlock(Block):
         w, state = np.empty_like(x), state.copy()
         slopes, last = tangent[0].copy(), tangent[1].copy()
         rows = np.empty((len(slopes) + 2, x.size))
-        linearise_general(
-            x,
-            dx,
-            self.loop,
-            self.p1,
-            self.p2,
-            self.own,
-            self.sample_period,
-            self.jump_period,
-            state,
-            slopes,
-            last,
-            w,
-            rows,
-        )
+        chosen = self.loop, self.p1, self.p2
+        if self.is_plain and self.own.size == 3 and not len(dx):
+            linearise_plain(x, *chosen, state, slopes, w, rows)
+        else:
+            periods = self.sample_period, self.jump_period
+            linearise_general(x, dx, *chosen, self.own, *periods, state, slopes, last, w, rows)
         return w, rows, state, (slopes, last)

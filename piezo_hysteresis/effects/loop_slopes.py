@@ -82,6 +82,34 @@ def slope_at(h, p, s):
 
 
 @kernel
+def linearise_plain(v, p, p1, p2, state, tangent, w, dw):
+    """`linearise_general` for n = 1 without terms and a drive that nothing is fitted of: rows A, β, γ, p1, p2."""
+    a, beta, gamma = p[A], p[BETA], p[GAMMA]
+    h, last = state[0], state[1]
+    by_a, by_beta, by_gamma = tangent[0], tangent[1], tangent[2]
+    row_a, row_beta, row_gamma, row_1, row_2 = dw[0], dw[1], dw[2], dw[3], dw[4]
+    full = np.zeros(5)
+    for i in range(v.size):
+        x = v[i]
+        dv = x - last
+        if dv != 0.0:
+            last = x
+            s = copysign(1.0, dv)
+            drive = s * a
+            turn = s * copysign(1.0, drive if h == 0.0 else h)
+            h = advance_slopes(h, drive, abs(dv), beta + gamma * turn, beta - gamma * turn, full)
+            by_a = full[0] * by_a + full[1] * s
+            by_beta = full[0] * by_beta + (full[3] + full[4])
+            by_gamma = full[0] * by_gamma + (full[3] * turn - full[4] * turn)
+        row_a[i], row_beta[i], row_gamma[i] = by_a, by_beta, by_gamma
+        w[i] = p1 * x * x * x + p2 * x + h
+    for i in range(v.size):
+        row_1[i], row_2[i] = v[i] * v[i] * v[i], v[i]
+    state[0], state[1] = h, last
+    tangent[0], tangent[1], tangent[2] = by_a, by_beta, by_gamma
+
+
+@kernel
 def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, state, tangent, last_in, w, dw):
     """`run_general` with sensitivities.
 

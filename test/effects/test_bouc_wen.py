@@ -173,12 +173,15 @@ def test_the_published_form_converges_to_the_exact_one() -> None:
     assert error(2000) < 0.6 * error(1000) < 0.36 * error(500)
 
 
-def test_own_sensitivities_of_the_published_form_are_those_beside_upstream_ones_bit_for_bit() -> None:
-    block, v = PublishedBoucWen().block(SETTING), 0.4 * np.sin(np.arange(300) / 20.0)
+@pytest.mark.parametrize("kind", [BoucWen, PublishedBoucWen])
+def test_own_sensitivities_are_those_beside_upstream_ones_bit_for_bit(kind) -> None:
+    turns = np.random.default_rng(5).normal(scale=0.3, size=40)
+    block, v = kind().block(SETTING), np.concatenate((polyline(turns, 8), turns, np.repeat(turns, 2)))
     nothing, held = np.empty((0, v.size)), np.zeros((1, v.size))
     w, alone, *_ = block.linearise(v, nothing, block.rest(0.0, 0.0), block.rest_tangent(0.0, np.empty(0)))
     beside_w, beside, *_ = block.linearise(v, held, block.rest(0.0, 0.0), block.rest_tangent(0.0, np.zeros(1)))
     np.testing.assert_array_equal(w, beside_w)
+    np.testing.assert_array_equal(w, block.run(v, block.rest(0.0, 0.0))[0])
     np.testing.assert_array_equal(alone, beside[1:])
 
 
