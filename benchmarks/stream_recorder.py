@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor
 from rclpy.node import Node
+from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 
 from piezo_hysteresis.nodes.bag_recorder import BagRecorder
@@ -20,6 +21,10 @@ from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
 PATIENCE = 60.0
 CATCH_UP = 5.0
 """What the model node may be behind at the end [s]; what comes later counts as lost."""
+
+
+_LOOK = 0.05
+"""Time between two looks at what is waited for [s]."""
 
 
 @dataclass
@@ -39,18 +44,17 @@ class StreamRecorder:
         Of the axis.
     folder : pathlib.Path
         For the bag.
-    executor : SingleThreadedExecutor
+    executor : Executor
         That of all axes.
     check : callable
         Raises where a node has ended.
     """
 
-    def __init__(
-        self, namespace: str, folder: Path, executor: SingleThreadedExecutor, check: Callable[[], None]
-    ) -> None:
+    def __init__(self, namespace: str, folder: Path, executor: Executor, check: Callable[[], None]) -> None:
         self._check, self._executor = check, executor
         self._node = Node("recorder", namespace=namespace)
         self._executor.add_node(self._node)
+        self._never = Future()
         self._ended: dict[str, dict[str, str]] = {}
         self._command = self._node.create_publisher(PointCloud2, "command", COMMAND)
         self._node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
@@ -65,7 +69,7 @@ class StreamRecorder:
         """Spin until `done`."""
         end = time.monotonic() + timeout
         while not done():
-            self._executor.spin_once(timeout_sec=0.02)
+            self._executor.spin_until_future_complete(self._never, timeout_sec=_LOOK)
             if time.monotonic() > end:
                 raise TimeoutError(f"{what}: nothing after {timeout:g} s")
             self._check()

@@ -20,7 +20,6 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
@@ -36,6 +35,7 @@ from piezo_hysteresis.model import Model
 from piezo_hysteresis.model_file import save
 from piezo_hysteresis.nodes.cloud import from_cloud
 from piezo_hysteresis.nodes.conversions import from_stamp
+from piezo_hysteresis.nodes.executor import make_executor
 from piezo_hysteresis.recording.bag import Bag
 
 NODES = ("driver_node", "model_node")
@@ -76,10 +76,10 @@ def stream(rate: float, duration: float, folder: Path, axes: int = 1) -> tuple[d
     voltage = waveform(rate, min(duration, LONGEST / rate))
     save(Model((BoucWen(), ARX), period, 10.0, 3e-5), folder / "model.yaml")
     with ExitStack() as stack:
-        executor, recorders, ids = SingleThreadedExecutor(), list[StreamRecorder](), dict[str, list[int]]()
+        executor, recorders, ids = make_executor(), list[StreamRecorder](), dict[str, list[int]]()
         for axis in range(axes):
             processes = stack.enter_context(Processes(f"/bench_{axis}", folder / f"log_{axis}"))
-            processes.start("driver_node", sample_period=f"{period:.12f}", discovery_time=0.1)
+            processes.start("driver_node", sample_period=f"{period:.17f}", discovery_time=0.1)
             processes.start("model_node", model_file=folder / "model.yaml")
             recorder = StreamRecorder(f"/bench_{axis}", folder / f"bag_{axis}", executor, processes.check)
             stack.callback(recorder.close)

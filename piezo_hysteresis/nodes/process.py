@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import socket
 import sys
@@ -11,11 +12,12 @@ from typing import TypeVar
 
 import rclpy
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+
+from .executor import make_executor, spin_until
 
 _BAD_START = (InvalidParameterTypeException, InvalidParameterValueException, rclpy_implementation.RCLError)
 
@@ -62,15 +64,18 @@ def run(
         sys.stderr.write(f"{' '.join(str(error).split())}\n")
         rclpy.try_shutdown()
         return 2
-    executor = SingleThreadedExecutor()
+    gc.collect()
+    gc.freeze()  # what was made so far stays: the collector need not walk over it while a stream waits
+    executor = make_executor()
     executor.add_node(node)
     try:
         begin(node)
-        executor.spin_until_future_complete(stop)
+        spin_until(executor, stop)
     finally:
         try:
             end(node)
         finally:
+            executor.shutdown()
             rclpy.try_shutdown()
     return 0
 
