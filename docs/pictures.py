@@ -1,7 +1,11 @@
-"""Pictures of docs/tour.md, made from the code they show; `make docs` runs this."""
+"""Pictures of docs/tour.md, made from the code they show; `make docs` runs this.
+
+Those of the demo come from what `make demo` has left in a folder: ``python docs/pictures.py --demo demo`` (chromium).
+"""
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -49,9 +53,28 @@ PAPER = ("table_1", "figure_5", "figure_8")
 """Exhibits of examples/paper that the tour shows."""
 
 
+SCREEN = "1000,1150"
+"""Width and height of the page as it is shown [px]."""
+
+
+def of_the_demo(folder: Path) -> None:
+    """The live run, and the beginning of its page as a browser shows it."""
+    (IMAGES / "demo_residual.png").write_bytes((folder / "residual.png").read_bytes())
+    with tempfile.TemporaryDirectory() as profile:
+        browser = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
+        shown = [f"--user-data-dir={profile}", f"--window-size={SCREEN}", f"--screenshot={IMAGES / 'report.png'}"]
+        subprocess.run([*browser, *shown, (folder / "report.html").resolve().as_uri()], check=True)
+
+
 def main() -> None:
     """Draw all."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--demo", type=Path, metavar="FOLDER", help="only those of the demo that wrote this folder")
+    options = parser.parse_args()
     IMAGES.mkdir(exist_ok=True)
+    if options.demo is not None:
+        of_the_demo(options.demo)
+        return
     with mpl.rc_context(SETTINGS):
         what_a_stage_does().savefig(IMAGES / "what_a_stage_does.png", dpi=110, metadata={"Software": None})
     scripts = IMAGES.parents[1] / "examples" / "paper"

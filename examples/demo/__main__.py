@@ -140,7 +140,7 @@ class Demo:
     def report(self, experiment: Path) -> None:
         """Figures and the page."""
         picture.save(self.folder / "residual.png", self.voltage, LIMITS.sample_period, self.traces)
-        command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "report", experiment]
+        command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "report", os.path.relpath(experiment)]
         for label, file in (("identified", "identification.yaml"), ("extended", "diagnosis.yaml")):
             command += ["--model", f"{label}={experiment / file}"]
         if (experiment / "answer.json").exists():
