@@ -10,6 +10,7 @@ from collections.abc import Collection, Sequence
 
 from ..effects import Arx, BoucWen, Offset, PublishedBoucWen
 from ..errors import IdentificationError, ModelError
+from ..identification.content import content_of
 from ..identification.delay import identify_delay
 from ..identification.dynamics import delay_of
 from ..identification.hysteresis import fit_hysteresis
@@ -42,18 +43,21 @@ def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
     period = experiment.fastest_period
     fast = [records[i] for i in fitted if records[i].sample_period < 1.001 * period]
     try:
-        delay = identify_delay([r for r in fast if r.phase.split("_")[0] == "step"] or fast).samples
+        delay = max(1, identify_delay([r for r in fast if r.phase.startswith("step")] or fast).samples)
     except IdentificationError:
-        delay = 0
+        delay = None
     voltage = max(float(max(r.voltage.max(), -r.voltage.min())) for r in records)
     reach = max(float(r.displacement.max() - r.displacement.min()) for r in records)
-    frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=max(1, delay))), period, voltage, reach)
+    frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1)), period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or delay_of(hysteresis_signals(start, records, broadband))
-    try:
-        return with_dynamics(start, dynamics_behind(start, records, broadband, delay, ORDERS).arx)
-    except IdentificationError:  # noise without low frequencies, or behind narrow plays, leaves the dc gain open
-        return start.with_effect(follower(start, delay, ORDERS))
+    steps = [i for i in fitted if records[i].sample_period < 1.001 * period and not content_of(records[i]).is_slow]
+    for chosen in (broadband, steps):
+        try:
+            return with_dynamics(start, dynamics_behind(start, records, chosen, delay, ORDERS).arx)
+        except IdentificationError:  # noise without low frequencies, or behind narrow plays, leaves the dc gain open
+            continue
+    return start.with_effect(follower(start, delay, ORDERS))
 
 
 def exact(model: Model) -> Model:
