@@ -3,7 +3,8 @@
 The driver plays sines and slow loops without a pause; this process is the recorder and writes every topic to a bag, in
 which the samples are counted afterwards. Latency counts from the last sample of a block to its residual in the
 recorder's hands. The exit code is 1 where a sample is missing, doubled, or was played at another voltage than was
-commanded, up to 500 kHz; beyond, the highest rate is sought that loses nothing.
+commanded, up to 500 kHz; beyond, the highest rate is sought that loses nothing. All processes take
+`config/large_blocks.xml`.
 
     python -m benchmarks.streaming --rate 50e3 200e3 --seconds 30
 """
@@ -39,6 +40,7 @@ from piezo_hysteresis.nodes.executor import make_executor
 from piezo_hysteresis.recording.bag import Bag
 
 NODES = ("driver_node", "model_node")
+LARGE_BLOCKS = Path(__file__).parents[1] / "config" / "large_blocks.xml"
 LONGEST = 500_000
 """Samples of a command at most."""
 PROMISED = 500e3
@@ -77,6 +79,7 @@ def stream(rate: float, duration: float, folder: Path, axes: int = 1) -> tuple[d
     save(Model((BoucWen(), ARX), period, 10.0, 3e-5), folder / "model.yaml")
     with ExitStack() as stack:
         executor, recorders, ids = make_executor(), list[StreamRecorder](), dict[str, list[int]]()
+        stack.callback(executor.shutdown)
         for axis in range(axes):
             processes = stack.enter_context(Processes(f"/bench_{axis}", folder / f"log_{axis}"))
             processes.start("driver_node", sample_period=f"{period:.17f}", discovery_time=0.1)
@@ -199,6 +202,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> list[Figures]:
     """A column for every rate, one for several axes, and the highest rate."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    os.environ.setdefault("FASTDDS_DEFAULT_PROFILES_FILE", str(LARGE_BLOCKS))
     short = min(8.0, options.seconds)
     cases = [(rate, short if k else options.seconds, 1) for k, rate in enumerate(options.rate)]
     if options.axes > 1:

@@ -1,6 +1,7 @@
 """The driver as a process: nothing is lost untold, nothing leaves the limits, and its end leaves the stage safe."""
 
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,6 +44,16 @@ def test_a_signal_ramps_to_the_safe_voltage(lab, number):
     assert driver.wait() == 0, driver.output
     lab.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
     assert samples.steepest(PERIOD) <= RAMP_RATE * (1 + 1e-6)
+
+
+def test_room_for_large_blocks_is_shared_with_nodes_that_have_less(lab):
+    profile = Path(__file__).parents[2] / "config" / "large_blocks.xml"
+    driver = lab.driver(sample_period=2e-6, environment={"FASTDDS_DEFAULT_PROFILES_FILE": str(profile)})
+    samples = lab.streaming()
+    lab.wait(lambda: len(samples.blocks) > 3 and samples.newest.size == 5000, "blocks of 500 kHz")
+    lines = Path(f"/proc/{driver.pid}/maps").read_text().splitlines()
+    ends = [line.split()[0].split("-") for line in lines if "/dev/shm/fastdds_" in line]
+    assert max(int(last, 16) - int(first, 16) for first, last in ends) >= 100 * 5000 * 40
 
 
 def test_deactivate_ramps_down_and_activate_streams_again(lab):
