@@ -155,14 +155,12 @@ def _screen_moves(model: Model, evidence: Evidence, base: list[str], moves: list
     products = grams(model, evidence.records, base, evidence.nuisance, extra)
     columns = directions(model, base, len(usable))
     kept = columns.shape[1] - len(usable)
-    return [
-        Candidate(
-            effect,
-            evidence,
-            held_out(products, evidence.floors, columns[:, [*range(kept), kept + k]], evidence.alone),
-        )
-        for k, effect in enumerate(usable)
-    ]
+    found = []
+    for k, effect in enumerate(usable):
+        score = held_out(products, evidence.floors, columns[:, [*range(kept), kept + k]], evidence.alone)
+        if score.step[-1] > 0.0:  # else its opposite would help
+            found.append(Candidate(effect, evidence, score))
+    return found
 
 
 def alikeness(first: Candidate, second: Candidate, model: Model) -> float:

@@ -83,13 +83,15 @@ class BoucWenBlock(Block):
         self.start = 0.0
         owners = dict.fromkeys(("A", "beta", "gamma"), effect.name)
         for term in terms:
-            owners |= dict.fromkeys(term.values, term.name)
+            owners |= {name: term.name for name in term.values if name in LOOP or name == "h0"}
         for member in (effect, *terms):
             for name in member.values:
                 if name in LOOP:
                     self.loop[LOOP.index(name)] = member[name]
                 elif name == "h0":
                     self.start = member[name]
+                elif name == "jumps" and not member[name]:
+                    self.jump_period = setting.sample_period
         self.own = np.array([LOOP.index(n) if n in LOOP else START for n in owners], dtype=np.int64)
         self.names = (*(f"{owner}.{n}" for n, owner in owners.items()), f"{effect.name}.p1", f"{effect.name}.p2")
         self.is_plain = bool(np.array_equal(self.loop[3:7], LOOP_OFF[3:7]))

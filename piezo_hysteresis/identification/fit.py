@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import DivergenceError, IdentificationError, ParameterError
 from ..model import Model
 from ..record import Record
+from .covariance import covariance
 from .normal_equations import Gram, Nuisance, grams, residuals
 from .step import bounded_step
 
@@ -202,7 +203,7 @@ def fit(
     return Fit(
         model=model,
         names=free,
-        covariance=_covariance(model, records, nuisance, current, sizes, directions),
+        covariance=covariance(model, records, nuisance, current, sizes, directions),
         cost=float(total[-1, -1]),
         rms=tuple(g.rms for g in current),
         nuisances=tuple(g.nuisance for g in current),
@@ -242,37 +243,3 @@ def _try(
         return candidate, float(np.mean([e @ e / (e.size * f * f) for e, f in zip(left, floors, strict=True)]))
     except (DivergenceError, ParameterError):
         return None, np.inf
-
-
-def _covariance(
-    model: Model,
-    records: Sequence[Record],
-    nuisance: Nuisance | None,
-    current: Sequence[Gram],
-    floors: Array,
-    directions: Array,
-) -> Array:
-    """Sandwich covariance: every record has its own residual variance and colour."""
-    weights = [1.0 / (g.size * f * f) for g, f in zip(current, floors, strict=True)]
-    bread = sum(w * (directions.T @ g.matrix[:-1, :-1] @ directions) for w, g in zip(weights, current, strict=True))
-    meat = np.zeros_like(bread)
-    for w, g, e in zip(weights, current, residuals(model, records, nuisance), strict=True):
-        variance = e @ e / max(1.0, e.size - directions.shape[1] / len(records))
-        meat += w * w * variance * colour(e) * (directions.T @ g.matrix[:-1, :-1] @ directions)
-    scale = 1.0 / np.sqrt(np.clip(np.diag(bread), 1e-300, None))
-    inverse = np.linalg.pinv(bread * np.outer(scale, scale), rcond=1e-10, hermitian=True) * np.outer(scale, scale)
-    return np.asarray(directions @ inverse @ meat @ inverse @ directions.T)
-
-
-def colour(residual: Array, blocks: int = 64) -> float:
-    """How much more the slow part of a residual weighs than that of white noise of the same variance, at least 1.
-
-    Ratio of the variance of block means to its white value; up to 1.7 (three standard deviations for 64 blocks) counts
-    as white.
-    """
-    length = residual.size // blocks
-    if length < 2:
-        return 1.0
-    means = residual[: blocks * length].reshape(blocks, length).mean(axis=1)
-    ratio = float(means.var() * length / max(residual.var(), 1e-300))
-    return ratio if ratio > 1.7 else 1.0

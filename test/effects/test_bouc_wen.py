@@ -194,3 +194,16 @@ def test_an_unbounded_loop_is_refused(kind) -> None:
 def test_a_term_has_no_block_of_its_own() -> None:
     with pytest.raises(ModelError, match="term of 'bouc_wen'"):
         InitialState(h0=0.1).block(SETTING)
+
+
+def test_a_change_in_one_slow_sample_is_a_jump_or_a_ramp_as_the_rate_law_is_told() -> None:
+    slow, own = Setting(1e-2, 2e-5), Setting(1e-2, 1e-2)
+    stairs = np.repeat([0.0, 0.2, 0.4, 0.1], 50)
+
+    def loop(setting: Setting, jumps: float) -> np.ndarray:
+        effect = BoucWen(A=0.4, beta=3.0, gamma=0.5, p1=0.0, p2=1.0)
+        block = effect.block(setting, (RateDependentHysteresis(k=0.05, a=0.2, jumps=jumps),))
+        return block.run(stairs, block.rest(0.0, 0.0))[0]
+
+    np.testing.assert_array_equal(loop(slow, 0.0), loop(own, 1.0))
+    assert np.abs(loop(slow, 1.0) - loop(slow, 0.0)).max() > 1e-3
