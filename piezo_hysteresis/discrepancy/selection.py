@@ -161,14 +161,17 @@ def _turn(
         if accepted and close and (lead < 2.0 * error or alikeness(best, candidate, model) > ALIKE):
             rivals.append(candidate)
         else:
-            rejected.append(Rejection(candidate.name, f"held-out score {lead:.2f} ± {error:.2f} behind {best.name}"))
-    rejected += [
-        Rejection(c.name, f"score test: at most {max(0.0, before.cost - c.score.cost):.2f} of held-out gain")
-        for c in screened
-        if c.name not in {r.name for r in refits}
-    ]
+            told = f"{lead:.2f} ± {error:.2f} behind {best.name} on records left out (mean ln R²)"
+            rejected.append(Rejection(candidate.name, told))
+    for candidate in screened:
+        if candidate.name not in {r.name for r in refits}:
+            most = max(0.0, before.cost - candidate.score.cost)
+            rejected.append(Rejection(candidate.name, f"improves records left out by {most:.2f} at most (mean ln R²)"))
     if gain < LEAST_GAIN or left > keeps:
-        reason = f"closest, but a held-out gain of {gain:.2f} and {left:.2f} of V beyond noise left do not suffice"
+        reason = (
+            f"closest, but improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
+            f"{100 * left:.0f} % of V beyond noise stays ({100 * keeps:.0f} % at most)"
+        )
         rejected.insert(0, Rejection(best.name, reason))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
 
