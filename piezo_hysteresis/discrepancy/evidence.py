@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import MainsHum
 from ..effects.extent import Extent
 from ..identification.content import content_of
 from ..identification.normal_equations import Nuisance
@@ -61,6 +62,10 @@ class Evidence:
     def with_hum(self, frequency: float) -> Evidence:
         """With mains hum of its own amplitude and phase in every record."""
         return replace(self, nuisance=replace(self.nuisance, hum_frequency=frequency))
+
+    def without(self, effect: str) -> Evidence:
+        """Where `effect` is no part of the model: hum, free in every record, is then not free either."""
+        return replace(self, nuisance=replace(self.nuisance, hum_frequency=None)) if effect == MainsHum.name else self
 
 
 def extent_of(records: Sequence[Record], model: Model) -> Extent:

@@ -123,9 +123,7 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
     """
     assert candidate.fit is not None
     model = candidate.fit.model.without(candidate.name)
-    evidence = candidate.evidence
-    if candidate.name == MainsHum.name:
-        evidence = replace(evidence, nuisance=replace(evidence.nuisance, hum_frequency=None))
+    evidence = candidate.evidence.without(candidate.name)
     starts = [model]
     if candidate.effect.family in LINEAR and (absorbed := _absorbed(model, candidate.fit.model, evidence)) is not None:
         starts.append(absorbed)

@@ -97,7 +97,8 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
     accepted = [k for k, step in enumerate(steps) if step.accepted]
     for k in accepted[:-1]:
         name, last = steps[k].best.name, steps[accepted[-1]].best
-        lean = refit(model.without(name), replace(last, effect=model[last.name]), FIRST)
+        without_it = replace(last, effect=model[last.name], evidence=last.evidence.without(name))
+        lean = refit(model.without(name), without_it, FIRST)
         if lean is None:
             continue
         lean = restart(lean, FIRST)
@@ -106,6 +107,7 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
         if lean.score.cost - score.cost < LEAST_GAIN and lean.fit is not None:
             told = Rejection(name, f"superfluous once {last.name} is there")
             steps[k] = replace(steps[k], accepted=False, rejected=(told, *steps[k].rejected))
+            steps[accepted[-1]] = replace(steps[accepted[-1]], best=lean)
             model, score = lean.fit.model, lean.score
     return model, score
 
