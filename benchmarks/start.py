@@ -1,7 +1,7 @@
 """Start: import of the package, node ready after its process began, first prediction after the first block.
 
 Wall-clock time, kernels compiled and cached before. The model node counts as ready when it subscribes to `samples`, the
-driver when its first block comes; the first prediction counts from the arrival of the first block at a subscriber.
+driver when a first block comes; the first prediction that comes counts from the last sample of its block.
 
     python -m benchmarks.start --repeats 5
 """
@@ -29,6 +29,8 @@ from examples.demo.processes import Processes
 from piezo_hysteresis.effects import BoucWen
 from piezo_hysteresis.model import Model
 from piezo_hysteresis.model_file import save
+from piezo_hysteresis.nodes.cloud import from_cloud
+from piezo_hysteresis.nodes.conversions import from_stamp
 from piezo_hysteresis.nodes.quality import SAMPLES
 
 NAMESPACE = "/start"
@@ -43,16 +45,16 @@ def import_time(module: str) -> float:
 
 
 def node_times(folder: Path) -> tuple[float, float, float]:
-    """Model node ready, driver's first block, and the first prediction after that block [s]."""
+    """Model node ready, driver's first block, first prediction after the last sample of its block [s]."""
     save(Model((BoucWen(), ARX), PERIOD, 10.0, 3e-5), folder / "model.yaml")
-    arrivals: dict[str, float] = {}
+    first: dict[str, tuple[float, PointCloud2]] = {}
     node = Node("watch", namespace=NAMESPACE)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
 
     def watch(topic: str) -> None:
         node.create_subscription(
-            PointCloud2, topic, lambda _: arrivals.setdefault(topic, time.monotonic()), SAMPLES, raw=True
+            PointCloud2, topic, lambda cloud: first.setdefault(topic, (time.time(), cloud)), SAMPLES
         )
 
     with Processes(NAMESPACE, folder / "log") as processes:
@@ -71,11 +73,14 @@ def node_times(folder: Path) -> tuple[float, float, float]:
         ready = wait(lambda: node.count_subscribers("samples") > 0, "the model node") - begin
         watch("samples")
         watch("predicted_samples")
-        begin = time.monotonic()
+        begin = time.time()
         processes.start("driver_node", sample_period=f"{PERIOD:.12f}", discovery_time=0.1)
-        wait(lambda: len(arrivals) == 2, "the first prediction")
+        wait(lambda: len(first) == 2, "the first prediction")
     node.destroy_node()
-    return ready, arrivals["samples"] - begin, arrivals["predicted_samples"] - arrivals["samples"]
+    arrival, predicted = first["predicted_samples"]
+    columns = from_cloud(predicted, {"time": "f8"})
+    taken = from_stamp(predicted.header.stamp) * 1e-9 + float(columns["time"][-1])
+    return ready, first["samples"][0] - begin, arrival - taken
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -104,7 +109,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
     told = (
         "model node subscribes after its start",
         "first block after the driver's start",
-        "first prediction after it",
+        "first prediction after the last sample of its block",
     )
     for what, times in zip(told, zip(*starts, strict=True), strict=True):
         row(what, list(times))

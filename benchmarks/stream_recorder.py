@@ -81,6 +81,7 @@ class StreamRecorder:
 
     def send(self, voltage: np.ndarray, sample_period: float, name: str) -> None:
         """Have a waveform played; without a stamp, for where no core is free it may be old when it comes."""
+        self.wait(lambda: self._command.get_subscription_count() > 0, "the driver")
         self._command.publish(command_to_cloud(voltage, sample_period, name))
 
     def played(self, voltage: np.ndarray, sample_period: float, name: str) -> Command:
