@@ -3,7 +3,7 @@
 The stage of the naming benchmark with creep hidden in it; the rich protocol with its slow phases stored slowly, as it
 should be, and at the full rate of 50 kHz, as a recorder may have left it.
 
-    python -m benchmarks.diagnosis --holds 1 5 15
+    python -m benchmarks.diagnosis --holds 1 5 16
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def exponent(sizes: list[float], costs: list[float]) -> float:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
-    parser.add_argument("--holds", type=float, nargs="+", default=[1.0, 5.0, 15.5], help="length of the steps [s]")
+    parser.add_argument("--holds", type=float, nargs="+", default=[1.0, 5.0, 16.3], help="length of the steps [s]")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:

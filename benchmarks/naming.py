@@ -4,7 +4,7 @@ Prints every case as it ends, then the confusion matrix, the figures of every gr
 to a JSON file after every case, so that a campaign that was stopped is not lost.
 
     python -m benchmarks.naming --quick
-    python -m benchmarks.naming --seeds 5 --json naming.json
+    python -m benchmarks.naming --seeds 5 --jobs 2 --json naming.json
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import argparse
 import json
 import time
 from collections import Counter, defaultdict
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -165,13 +166,16 @@ def main() -> None:
     parser.add_argument("--groups", nargs="+", choices=GROUPS, default=list(GROUPS))
     parser.add_argument("--only", default="", help="cases whose label holds this word")
     parser.add_argument("--json", type=Path, help="outcomes as JSON")
+    parser.add_argument("--jobs", type=int, default=1, help="cases at a time, each on a core")
     options = parser.parse_args()
     seeds, noises = (1, (NOISES[1],)) if options.quick else (options.seeds, NOISES)
     wanted = [c for c in cases(tuple(options.groups), seeds, noises) if options.only in c.label][: options.cases]
     console, outcomes, crashes = Console(), list[Outcome](), 0
-    for k, case in enumerate(wanted, 1):
+    pool = ProcessPoolExecutor(options.jobs)
+    answers = [pool.submit(answer, case) for case in wanted]
+    for k, (case, found) in enumerate(zip(wanted, answers, strict=True), 1):
         try:
-            outcome = answer(case)
+            outcome = found.result()
         except Exception as error:  # a crash is counted, and the campaign goes on
             console.print(f"{k}/{len(wanted)} {case.label} seed {case.seed}: [red]{error!r}")
             crashes += 1
@@ -188,6 +192,7 @@ def main() -> None:
         )
         if options.json:
             options.json.write_text(json.dumps([asdict(o) for o in outcomes], indent=1))
+    pool.shutdown()
     for table in (confusion(outcomes), figures(outcomes), gaps(outcomes)):
         console.print(table)
     console.print(f"{crashes} of {len(wanted)} diagnoses crashed")
