@@ -69,7 +69,8 @@ def test_a_day_of_predictions_is_exact_and_memory_stays_flat(period):
     assert worst < 1e-15
     assert predictor.continuity.received == round(DAY / period) // size * size
     assert predictor.continuity.lost == 0
-    assert max(sizes[1:]) < 1.05 * sizes[0] + 1e6
+    half = len(sizes) // 2  # by then the history of the drive is as long as it gets
+    assert max(sizes[half:]) < 1.05 * max(sizes[:half])
 
 
 @given(st.integers(10**9, 2**38), st.integers(1, 5000), st.integers(0, 10**6))

@@ -11,9 +11,10 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from benchmarks.naming_cases import Case
 from piezo_hysteresis.nodes.conversions import values_of
 from piezo_hysteresis.nodes.quality import LATCHED
-from piezo_hysteresis.recording import read
+from piezo_hysteresis.recording import read, write
 
 pytestmark = pytest.mark.nodes
 
@@ -119,9 +120,10 @@ def test_parameters_from_outside_choose_no_place(running):
 
 
 @pytest.mark.soak
-def test_killed_while_it_fits_it_takes_the_fit_along_and_starts_again(running):
+def test_killed_while_it_fits_it_takes_the_fit_along_and_starts_again(running, tmp_path):
     lab, _, identification = running
-    recording = identification.newest()
+    recording = identification.root / f"0_{tmp_path.name}"  # before all that the node records
+    write(Case("poor", ("creep",), 0, 5e-4).experiment(), recording)
     request = SetParameters.Request(parameters=[Parameter("experiment", value=str(recording)).to_parameter_msg()])
     assert lab.call(SetParameters, f"{NODE}/set_parameters", request).results[0].successful
     assert identification.ask("diagnose").success
