@@ -35,10 +35,17 @@ def nodes(shared_lab):
     for executable in ("model_node", "identification_node"):
         shared_lab.start(executable)
     there = shared_lab.node.get_node_names
-    shared_lab.wait(lambda: set(NODES.values()) <= set(there()), "all nodes")
     last = {"driver_node": "/samples", "model_node": "/predicted_live", "identification_node": "/model"}
-    for node, topic in last.items():
-        shared_lab.wait(lambda node=node, topic=topic: topic in published(shared_lab, node), f"{topic} of the {node}")
+    try:
+        shared_lab.wait(lambda: set(NODES.values()) <= set(there()), "all nodes")
+        for node, topic in last.items():
+            shared_lab.wait(
+                lambda node=node, topic=topic: topic in published(shared_lab, node), f"{topic} of the {node}"
+            )
+    except BaseException:  # the next attempt begins with nodes of its own
+        for process in shared_lab.processes:
+            process.end()
+        raise
     return shared_lab
 
 
