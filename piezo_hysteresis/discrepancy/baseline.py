@@ -10,7 +10,6 @@ from collections.abc import Collection, Sequence
 
 from ..effects import Arx, BoucWen, Offset, PublishedBoucWen
 from ..errors import IdentificationError, ModelError
-from ..identification.content import content_of
 from ..identification.delay import identify_delay
 from ..identification.dynamics import delay_of
 from ..identification.hysteresis import fit_hysteresis
@@ -41,7 +40,8 @@ def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
     if not loops or not broadband:
         return identify(Experiment(experiment.records[: max(fitted) + 1]), held_out=("validation",)).model
     period = experiment.fastest_period
-    fast = [records[i] for i in fitted if records[i].sample_period < 1.001 * period]
+    at_full_rate = [i for i in fitted if records[i].sample_period < 1.001 * period]
+    fast = [records[i] for i in at_full_rate]
     try:
         delay = max(1, identify_delay([r for r in fast if r.phase.startswith("step")] or fast).samples)
     except IdentificationError:
@@ -51,8 +51,7 @@ def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
     frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1)), period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or delay_of(hysteresis_signals(start, records, broadband))
-    steps = [i for i in fitted if records[i].sample_period < 1.001 * period and not content_of(records[i]).is_slow]
-    for chosen in (broadband, steps):
+    for chosen in (broadband, [i for i in at_full_rate if not roles.contents[i].is_slow]):
         try:
             return with_dynamics(start, dynamics_behind(start, records, chosen, delay, ORDERS).arx)
         except IdentificationError:  # noise without low frequencies, or behind narrow plays, leaves the dc gain open
@@ -61,7 +60,13 @@ def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
 
 
 def exact(model: Model) -> Model:
-    """The model with the exact loop, which the terms of the catalogue join, and with a sensor zero."""
+    """The model with the exact loop, which the terms of the catalogue join, and with a sensor zero.
+
+    Raises
+    ------
+    ModelError
+        On a published loop of another exponent than n = 1, for which there is no exact step.
+    """
     if PublishedBoucWen.name in model:
         published = model[PublishedBoucWen.name]
         if published["n"] != 1.0:

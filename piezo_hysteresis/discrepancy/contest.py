@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
+from ..identification.fit import Progress
 from ..model import Model
 from .candidates import Candidate
 from .held_out import ADEQUATE, Score
 from .refit import proceed, refit, restart
-
-Progress = Callable[[str, float], None]
 
 LEAST_GAIN = 0.15
 """Least gain in mean ln max(1, R²) for which an effect is accepted."""

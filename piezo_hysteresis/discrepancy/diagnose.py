@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..effects import CATALOGUE, Effect
 from ..errors import IdentificationError
 from ..identification.carried import select as select_records
-from ..identification.fit import Fit
+from ..identification.fit import Fit, Progress
 from ..identification.normal_equations import Nuisance, residuals
 from ..identification.roles import CARRYING
 from ..model import Model
@@ -34,7 +34,6 @@ from .split import reporting
 from .steps import Selection
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 FEWEST = 4
 """Records below which none can be held out and no name is given."""

@@ -6,12 +6,13 @@ not show what a missing effect does under another drive, so none is named with c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..effects import BoucWen, Effect, HysteresisMemory
+from ..identification.fit import Progress
 from ..identification.identify import identify
 from ..identification.leading_step import step_length
 from ..identification.normal_equations import Nuisance, residuals
@@ -37,8 +38,6 @@ FEWEST = 256
 """Samples of a block at least."""
 LAST, PRECISE = 25, 1e-6
 """Linearisations of a fit, and relative decrease of the cost at which it has converged."""
-
-Progress = Callable[[str, float], None]
 
 
 def diagnose_few(

@@ -115,7 +115,15 @@ def propose(first: Model, second: Model, names: tuple[str, str], evidence: Evide
 
 
 def decide(selection: Selection, evidence: Evidence) -> NextExperiment | None:
-    """For the first accepted effect that has a rival."""
+    """What would decide between the first accepted effect that has a rival, and that rival; None where none has.
+
+    Parameters
+    ----------
+    selection : Selection
+        Outcome of the search.
+    evidence : Evidence
+        What has been recorded.
+    """
     for step in selection.accepted:
         mine = step.best
         others = [r for r in step.rivals if r.effect.public_name() != mine.effect.public_name()]

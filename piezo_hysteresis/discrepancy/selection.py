@@ -5,22 +5,21 @@ Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 20
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
 from ..effects import CATALOGUE, Effect, MainsHum
+from ..identification.fit import Progress
 from ..identification.normal_equations import residuals
 from ..model import Model
-from .candidates import alikeness, screen
+from .candidates import Candidate, alikeness, screen
 from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, contest, finest, settled, simplest
 from .evidence import Evidence
 from .held_out import ADEQUATE, Score
-from .refit import is_seen, is_steady, may_be_off, refit, restart, without
+from .refit import Fitted, is_seen, is_steady, may_be_off, refit, restart, without
 from .steps import MANY, Rejection, Selection, Step, typical
-
-Progress = Callable[[str, float], None]
 
 ALONE = 4.0
 """Residual in floors up to which one record alone asks for no further effect."""
@@ -65,9 +64,10 @@ def select(
     progress : callable, optional
         Called with a word and the fraction done.
     """
+    tell = progress or (lambda word, fraction: None)
     baseline, steps, accepted = model, list[Step](), 0
     while not _is_enough(score, accepted) and len(steps) < MOST_TURNS and accepted < MOST:
-        step = _turn(model, evidence, score, null, effects, KEEPS[min(accepted, 1)], progress)
+        step = _turn(model, evidence, score, null, effects, KEEPS[min(accepted, 1)], tell)
         if step is None:
             break
         steps.append(step)
@@ -119,12 +119,8 @@ def _turn(
     null: float,
     effects: Collection[type[Effect]],
     keeps: float,
-    progress: Progress | None,
+    tell: Progress,
 ) -> Step | None:
-    def tell(word: str, fraction: float) -> None:
-        if progress is not None:
-            progress(word, fraction)
-
     tell("score test of the catalogue", 0.0)
     evidence = evidence.with_peaks(residuals(model, evidence.records, evidence.nuisance))
     present = {e.public_name() for e in model.effects}
@@ -134,25 +130,18 @@ def _turn(
     if not refits:
         return None
     best = finest(simplest(refits), before)
-    rivals, rejected = [], []
-    gain = before.cost - best.score.cost
-    left = _left(best.score, before, null)
-    accepted = gain >= LEAST_GAIN and left <= keeps
-    alone = without(best, LATER) if accepted else None
-    if alone is not None:
-        owed = alone.score.cost - best.score.cost
-        accepted = owed >= LEAST_GAIN and _left(best.score, alone.score, null) <= keeps
-        if not accepted:
-            rejected.append(Rejection(best.name, f"gains {owed:.2f} over the model fitted anew without it"))
-    if accepted and may_be_off(best):
-        accepted = False
-        rejected.append(Rejection(best.name, "all its numbers could as well be off"))
-    if accepted and not is_seen(best):
-        accepted = False
-        rejected.append(Rejection(best.name, "changes no record by as much as half its floor"))
-    if accepted and best.name == MainsHum.name and not is_steady(best):
-        accepted = False
-        rejected.append(Rejection(best.name, "its amplitude follows the drive from record to record"))
+    gain, left = before.cost - best.score.cost, _left(best.score, before, null)
+    alone = None
+    if gain < LEAST_GAIN or left > keeps:
+        objection: str | None = (
+            f"closest, but improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
+            f"{100 * left:.0f} % of V beyond noise stays ({100 * keeps:.0f} % at most)"
+        )
+    else:
+        alone = without(best, LATER)
+        objection = _objection(best, alone, null, keeps)
+    accepted, rivals = objection is None, list[Candidate]()
+    rejected = [] if objection is None else [Rejection(best.name, objection)]
     better = alone is not None and before.cost - alone.score.cost > 0.5 * LEAST_GAIN
     renewed = alone if better and not accepted else None
     for candidate in refits:
@@ -169,13 +158,22 @@ def _turn(
         if candidate.name not in {r.name for r in refits}:
             most = max(0.0, before.cost - candidate.score.cost)
             rejected.append(Rejection(candidate.name, f"improves records left out by {most:.2f} at most (mean ln R²)"))
-    if gain < LEAST_GAIN or left > keeps:
-        reason = (
-            f"closest, but improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
-            f"{100 * left:.0f} % of V beyond noise stays ({100 * keeps:.0f} % at most)"
-        )
-        rejected.insert(0, Rejection(best.name, reason))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
+
+
+def _objection(best: Candidate, alone: Fitted | None, null: float, keeps: float) -> str | None:
+    """Why a refit that gains enough is no effect, beside the model fitted anew without it; None where it is one."""
+    if alone is not None:
+        owed = alone.score.cost - best.score.cost
+        if owed < LEAST_GAIN or _left(best.score, alone.score, null) > keeps:
+            return f"gains {owed:.2f} over the model fitted anew without it"
+    if may_be_off(best):
+        return "all its numbers could as well be off"
+    if not is_seen(best):
+        return "changes no record by as much as half its floor"
+    if best.name == MainsHum.name and not is_steady(best):
+        return "its amplitude follows the drive from record to record"
+    return None
 
 
 def _left(after: Score, before: Score, null: float) -> float:
