@@ -9,10 +9,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .intake import ENOUGH
-
-PIECE = 1 << 18
-"""Numbers that are looked at, or moved, at a time."""
+from .intake import ENOUGH, PIECE
 
 
 class Column:

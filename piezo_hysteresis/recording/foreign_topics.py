@@ -14,9 +14,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from ..errors import RecordingError
 from ..record import Notice, Record, Samples
 from .bag import Bag
-from .column import PIECE, Column
+from .column import Column
 from .finite import finite_records
-from .intake import Intake, averaged_notice
+from .intake import PIECE, Intake, averaged_notice
 from .layout import CHANNELS, Layout
 from .phases import labelled
 from .time_base import TimeBase

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from .intake import Intake
+from .intake import PIECE, Intake
 from .layout import Layout
+from .mat_variables import MatVariables
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _LARGEST_EXPANSION = 1100
-_ROWS = 1 << 18
 
 
 def is_hdf5(path: Path) -> bool:
@@ -26,7 +25,7 @@ def is_hdf5(path: Path) -> bool:
     return _SIGNATURE in (head[:8], head[512:])
 
 
-class Hdf5Variables(Mapping[str, NDArray[Any]]):
+class Hdf5Variables(MatVariables):
     """Dotted name to array, oriented as in MATLAB; texts are arrays of one string.
 
     Parameters
@@ -57,53 +56,23 @@ class Hdf5Variables(Mapping[str, NDArray[Any]]):
             self._file.close()
             raise
 
-    def __enter__(self) -> Hdf5Variables:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
         self._file.close()
 
     def __iter__(self) -> Iterator[str]:
         return (name.replace("/", ".") for name in self._names if not name.startswith("#"))
 
-    def __contains__(self, name: object) -> bool:
-        return name in set(self)  # a mapping would read it to see
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
     def samples(self, name: str, column: int | None, layout: Layout) -> Intake:
-        """The one column of a vector, or a column of a matrix; only the rows that a layout keeps are read.
-
-        Parameters
-        ----------
-        name : str
-            Dotted name.
-        column : int or None
-            Column in MATLAB, counted from 0.
-        layout : Layout
-            Its `rows`, where they count from the beginning, and its `average` apply.
-
-        Raises
-        ------
-        RecordingError
-            If there is no such column, or several where none is named.
-        """
         dataset = self._numbers(name)
         shape = tuple(dataset.shape[::-1])  # as in MATLAB
-        if column is None and dataset.size != max(shape, default=1):
-            raise RecordingError(f"{name}: got shape {shape}, expected a vector; choose a column as {name}[1]")
-        if column is not None and (len(shape) != 2 or column >= shape[1]):
-            raise RecordingError(f"{name}: got shape {shape}, expected a matrix with that column")
+        self.check_column(name, shape, column)
         along = dataset.ndim - 1 if column is not None else int(np.argmax(dataset.shape))
         intake = Intake.of(1, layout)
-        for first in range(0, dataset.shape[along], _ROWS):
+        for first in range(0, dataset.shape[along], PIECE):
             index: list[int | slice] = [column or 0] * dataset.ndim
-            index[along] = slice(first, first + _ROWS)
-            skipped = first + _ROWS <= intake.start
-            intake.add(np.empty((_ROWS, 1)) if skipped else np.asarray(dataset[tuple(index)], np.float64)[:, None])
+            index[along] = slice(first, first + PIECE)
+            skipped = first + PIECE <= intake.start
+            intake.add(np.empty((PIECE, 1)) if skipped else np.asarray(dataset[tuple(index)], np.float64)[:, None])
             if intake.is_full:
                 break
         return intake

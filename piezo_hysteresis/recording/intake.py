@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..record import Notice, Samples
 from .layout import Layout
+
+PIECE = 1 << 18
+"""Numbers that are looked at, or moved, at a time."""
 
 ENOUGH = 1 << 24
 """Samples of a recording above which they are averaged, where nothing is said: below 2 GB while they are judged."""
@@ -140,6 +144,11 @@ class Intake:
             self._keep(values[:whole])
             values = values[whole:]
         self._rest = values.copy()
+
+    def add_column(self, values: NDArray[Any]) -> None:
+        """Take numbers of one column, shape (n,), a piece at a time."""
+        for first in range(0, values.size, PIECE):
+            self.add(values[first : first + PIECE].astype(np.float64, copy=False)[:, None])
 
     def _keep(self, values: Samples) -> None:
         if self.factor > 1:

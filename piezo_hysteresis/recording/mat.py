@@ -17,12 +17,11 @@ from .hdf5_variables import Hdf5Variables, is_hdf5
 from .intake import Intake, averaged_notice
 from .layout import CHANNELS, LABELS, Layout
 from .mat5_variables import Mat5Variables
+from .mat_variables import MatVariables
 from .table import table_records
 
 _PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
 _STRUCT = "phase_"
-
-Variables = Hdf5Variables | Mat5Variables
 
 
 class Mat:
@@ -74,7 +73,7 @@ class Mat:
 
 
 def _records(
-    variables: Variables, prefix: str, layout: Layout, before: Sequence[Record]
+    variables: MatVariables, prefix: str, layout: Layout, before: Sequence[Record]
 ) -> tuple[list[Record], list[Notice]]:
     given = {c: str(layout.columns.get(c, prefix + c)) for c in (*CHANNELS, *LABELS)}
     places = {c: place for c, place in given.items() if c in layout.columns or place in variables}
@@ -104,7 +103,7 @@ def _records(
     return records, [*notices, *guess_notice(guess, units)]
 
 
-def _channel(variables: Variables, place: str, layout: Layout) -> Intake:
+def _channel(variables: MatVariables, place: str, layout: Layout) -> Intake:
     match = _PLACE.fullmatch(place)
     name, number = (match["name"], match["column"]) if match else (place, None)
     if name not in variables:
@@ -120,5 +119,5 @@ def _label(value: NDArray[Any], place: str) -> str:
     return str(int(item)) if isinstance(item, bool) else str(item)
 
 
-def _listed(variables: Variables) -> str:
+def _listed(variables: MatVariables) -> str:
     return "the variables " + ", ".join(list(variables)[:30])

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from .intake import Intake
+from .intake import PIECE, Intake
 from .layout import Layout
 from .mat5_sizes import COMPRESSED, HEADER, MATRIX, ORDERS, Inflated, check_sizes
+from .mat_variables import MatVariables
 
 _LONG = 1 << 20
-_PIECE = 1 << 18
 _REAL = range(6, 16)
 _COMPLEX = 0x800
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
@@ -36,7 +36,7 @@ class _Matrix:
     kind: np.dtype[Any]
 
 
-class Mat5Variables(Mapping[str, NDArray[Any]]):
+class Mat5Variables(MatVariables):
     """Dotted name to array of every variable and field; one variable is in memory at a time.
 
     Parameters
@@ -61,10 +61,7 @@ class Mat5Variables(Mapping[str, NDArray[Any]]):
         self._loaded: tuple[str, dict[str, NDArray[Any]]] = ("", {})
         self._fields: dict[str, list[str]] = {}
 
-    def __enter__(self) -> Mat5Variables:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         self._loaded = ("", {})
 
     def __iter__(self) -> Iterator[str]:
@@ -76,12 +73,6 @@ class Mat5Variables(Mapping[str, NDArray[Any]]):
                 self._fields[name] = list(self._variable(name))
             yield from self._fields[name]
 
-    def __contains__(self, name: object) -> bool:
-        return name in set(self)  # a mapping would read it to see
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
     def __getitem__(self, name: str) -> NDArray[Any]:
         top = name.partition(".")[0]
         if top not in self._classes:
@@ -89,28 +80,9 @@ class Mat5Variables(Mapping[str, NDArray[Any]]):
         return self._variable(top)[name]
 
     def samples(self, name: str, column: int | None, layout: Layout) -> Intake:
-        """The one column of a vector, or a column of a matrix, as a layout keeps it.
-
-        Parameters
-        ----------
-        name : str
-            Dotted name.
-        column : int or None
-            Column, counted from 0.
-        layout : Layout
-            Its `rows`, where they count from the beginning, and its `average` apply.
-
-        Raises
-        ------
-        RecordingError
-            If there are no real numbers, no such column, or several where none is named.
-        """
         matrix = self._long.get(name)
         shape = self[name].shape if matrix is None else matrix.shape
-        if column is not None and (len(shape) != 2 or column >= shape[1]):
-            raise RecordingError(f"{name}: got shape {shape}, expected a matrix with that column")
-        if column is None and math.prod(shape) != max(shape, default=1):
-            raise RecordingError(f"{name}: got shape {shape}, expected a vector; choose a column as {name}[1]")
+        self.check_column(name, shape, column)
         intake = Intake.of(1, layout)
         if matrix is not None:
             count = math.prod(shape) if column is None else shape[0]
@@ -119,9 +91,7 @@ class Mat5Variables(Mapping[str, NDArray[Any]]):
         values = self[name]
         if values.dtype.kind not in "fiub":
             raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
-        whole = values.ravel() if column is None else values[:, column]
-        for first in range(0, whole.size, _PIECE):
-            intake.add(whole[first : first + _PIECE].astype(np.float64, copy=False)[:, None])
+        intake.add_column(values.ravel() if column is None else values[:, column])
         return intake
 
     def _variable(self, top: str) -> dict[str, NDArray[Any]]:
@@ -210,9 +180,9 @@ def _read(path: Path, matrix: _Matrix, first: int, count: int, intake: Intake) -
         stream = _opened(file, matrix.position, order)
         ahead = matrix.offset + first * matrix.kind.itemsize
         while ahead > 0:
-            ahead -= len(stream.read(min(ahead, _PIECE))) or ahead
+            ahead -= len(stream.read(min(ahead, PIECE))) or ahead
         while count > 0 and not intake.is_full:
-            raw = stream.read(min(count, _PIECE) * matrix.kind.itemsize)
+            raw = stream.read(min(count, PIECE) * matrix.kind.itemsize)
             values = np.frombuffer(raw[: len(raw) // matrix.kind.itemsize * matrix.kind.itemsize], matrix.kind)
             if not values.size:
                 raise RecordingError(f"a variable ends {count} numbers early")

@@ -10,12 +10,11 @@ import numpy as np
 
 from ..errors import RecordingError
 from ..record import Samples
-from .intake import Intake
+from .intake import PIECE, Intake
 
 _MAGIC_READERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 _LARGEST_EXPANSION = 100
 _SMALL = 1 << 26
-_PIECE = 1 << 18
 
 
 class NpzMembers:
@@ -60,8 +59,8 @@ class NpzMembers:
             if len(shape) != 1:
                 raise RecordingError(f"{name}: got shape {shape}, expected one dimension")
             intake = Intake(1, part.start, min(part.stop, shape[0]), average)
-            for first in range(0, intake.stop or 0, _PIECE):
-                raw = stream.read(min(_PIECE, shape[0] - first) * dtype.itemsize)
+            for first in range(0, intake.stop or 0, PIECE):
+                raw = stream.read(min(PIECE, shape[0] - first) * dtype.itemsize)
                 intake.add(np.frombuffer(raw, dtype).astype(np.float64)[:, None])
         if intake.rows < (intake.stop or 0):
             raise RecordingError(f"{name}: got {intake.rows} samples, expected {shape[0]}")

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..record import Samples
-from .column import PIECE
 from .intake import Intake
 
 
@@ -61,6 +60,5 @@ class Stretch:
 
 def _averaged(values: Samples, average: int) -> Samples:
     intake = Intake(1, average=average)
-    for first in range(0, values.size, PIECE):
-        intake.add(values[first : first + PIECE, None])
+    intake.add_column(values)
     return intake.column(0)
