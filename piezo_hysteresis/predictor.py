@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from .chain import Chain, ChainState
 from .continuity import LONGEST_SILENCE, Continuity
 from .errors import DivergenceError, RecordError
 from .model import Model, samples
+from .running_rms import RunningRms
 from .sensor_zero import SensorZero
 from .voltage_history import FULL_SAMPLES, VoltageHistory, is_held
 from .warmup import Warmup, chain_at
@@ -112,7 +112,7 @@ class Predictor:
         self._unseen: float | None = None  # travel [V] at which the drive was last unknown
         self._joined_unseen = False
         self._window = max(ZERO_SAMPLES, round(ZERO_TIME / sample_period))
-        self._rms_samples = max(1, round(rms_time / sample_period))
+        self._rms = RunningRms(max(1, round(rms_time / sample_period)))
         self._begin()
         if model is not None:
             self.swap(model)
@@ -138,7 +138,7 @@ class Predictor:
     @property
     def residual_rms(self) -> float | None:
         """Rms of the residual over the last `rms_time` [m]; None before there is one."""
-        return float(np.sqrt(sum(s for _, s in self._squares) / self._squared)) if self._squared else None
+        return self._rms.value
 
     def swap(self, model: Model) -> None:
         """Let another model take over as soon as it has been run over the history.
@@ -220,7 +220,7 @@ class Predictor:
             modelled = self._run_and_zero(drive, measured)
         prediction = np.empty(0) if modelled is None else modelled + self.offset
         residual = measured[: prediction.size] - prediction
-        self._remember(residual)
+        self._rms.add(residual)
         answer = Prediction(arrival.repeated, prediction, residual, self.model, self.warming_up)
         self._warm(max(PIECE, 8 * drive.size))
         return answer
@@ -237,7 +237,7 @@ class Predictor:
 
     def _zero_from(self, start: int, at_rest: bool = False) -> None:
         self._zero = SensorZero(start, self._window, at_rest)
-        self._forget_residuals()
+        self._rms.clear()
 
     def _bridge(self, missing: int, never_measured: bool) -> None:
         """Hold the last voltage; what was really driven is unknown where the samples were lost on the way."""
@@ -273,16 +273,6 @@ class Predictor:
         self._zero.add(measured, modelled, self._history.travel)
         return modelled
 
-    def _forget_residuals(self) -> None:
-        self._squares: deque[tuple[int, float]] = deque()
-        self._squared = 0
-
-    def _remember(self, residual: Array) -> None:
-        self._squares.append((residual.size, float(residual @ residual)))
-        self._squared += residual.size
-        while self._squared - self._squares[0][0] >= self._rms_samples:
-            self._squared -= self._squares.popleft()[0]
-
     def _warm(self, values: int) -> None:
         if self._warmup is None and self._waiting is not None:
             waiting, self._waiting = self._waiting, None
@@ -296,6 +286,6 @@ class Predictor:
         self.model, self._chain, self._state = warmup.model, warmup.chain, warmup.state
         if warmup.zero is self._zero and warmup.mean is not None:
             self._zero.remodel(warmup.mean)
-            self._forget_residuals()
+            self._rms.clear()
         else:
             self._zero_from(self._history.count)

@@ -73,7 +73,7 @@ class VoltageHistory:
     def append(self, voltage: Array) -> None:
         """Add the next samples [V], shape (n,)."""
         low, high = float(voltage.min()), float(voltage.max())
-        held = high - low <= 2 * REST_TOLERANCE
+        held = _is_level(low, high)
         if self.count == 0:
             self.rest_voltage = float(np.median(voltage)) if held else float(voltage[0])
             self._counted = self.rest_voltage
@@ -139,4 +139,8 @@ class VoltageHistory:
 
 def is_held(voltage: Array) -> bool:
     """True where a block of voltages [V] stays at one level."""
-    return bool(voltage.max() - voltage.min() <= 2 * REST_TOLERANCE)
+    return _is_level(float(voltage.min()), float(voltage.max()))
+
+
+def _is_level(low: float, high: float) -> bool:
+    return high - low <= 2 * REST_TOLERANCE

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..errors import ParameterError
 from ..parameter import Parameter
-from .arx_block import ArxBlock
+from .arx_block import ArxBlock, dc_gain_slopes
 from .block import Array, Block, SeriesBlock
 from .effect import Effect, Place, Setting
 from .lag import LagBlock
@@ -99,7 +99,6 @@ class Arx(Effect):
         at_a, at_b = 1.0 + a.sum(), b.sum()
         power = np.arange(1, a.size + 1)
         lag_a, lag_b = power @ a / at_a, np.arange(b.size) @ b / at_b
-        gain_slopes = np.concatenate((np.full(a.size, -at_b / at_a**2), np.full(b.size, 1.0 / at_a), [0.0]))
         lag_slopes = ratio * np.concatenate((-(power - lag_a) / at_a, (np.arange(b.size) - lag_b) / at_b, [1.0]))
         if not self.group_delay <= LONGEST_DELAY:
             raise ParameterError(
@@ -107,5 +106,5 @@ class Arx(Effect):
                 f"{LONGEST_DELAY:g}; B(1) or A(1) all but vanishes"
             )
         lag = max(0.0, ratio * self.group_delay)
-        slow = LagBlock(names, self.dc_gain, lag, gain_slopes, lag_slopes)
+        slow = LagBlock(names, self.dc_gain, lag, dc_gain_slopes(a, b), lag_slopes)
         return SeriesBlock((StaticSoftening(*softening[0]), slow)) if softening else slow

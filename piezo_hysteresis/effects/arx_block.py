@@ -131,6 +131,12 @@ def arx_slopes(x, y, at_rest, taps_slope, first, a, interpolation, na, poles, be
     before_x[:], before_y[:] = by_x[n:], by_y[n:]
 
 
+def dc_gain_slopes(a: Array, b: Array) -> Array:
+    """∂G(1) by a_1 … a_na, b_1 … b_nb and the delay, shape (na + nb + 1,)."""
+    at_a = 1.0 + a.sum()
+    return np.concatenate((np.full(a.size, -b.sum() / at_a**2), np.full(b.size, 1.0 / at_a), [0.0]))
+
+
 class ArxBlock(LinearBlock):
     """State: history of inputs, oldest first, and of outputs, newest first."""
 
@@ -145,8 +151,7 @@ class ArxBlock(LinearBlock):
         self.taps = padded(b if exact else np.convolve(b, self.interpolation))
         self.taps_slope = padded(np.convolve(b, slopes))
         self.feedback = padded(a)
-        at_a = 1.0 + a.sum()
-        self._gain_slopes = np.concatenate((np.full(a.size, -b.sum() / at_a**2), np.full(b.size, 1.0 / at_a), [0.0]))
+        self._gain_slopes = dc_gain_slopes(a, b)
 
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.offset + self.taps.size - 1 + self.feedback.size))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -42,8 +41,6 @@ _END_OF_TIME = 2**31
 
 _LARGEST = {"voltage": 1e4, "displacement": 1.0}
 """What no piezo stage is driven with [V], and no piezo stage moves [m]."""
-
-_PHASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -208,37 +205,6 @@ def waveform_from_cloud(cloud: PointCloud2, sample_period: float) -> Samples:
                 f"time: got a period of {got:g} s ({off.max():.3g} s off at worst), expected {sample_period:g} s"
             )
     return voltage
-
-
-def phase_name(frame_id: str) -> str:
-    """Name of a commanded phase; `command` where none is given.
-
-    Raises
-    ------
-    RecordError
-        On a name that could not stand in a file name.
-    """
-    if not frame_id:
-        return "command"
-    if not _PHASE_NAME.fullmatch(frame_id):
-        raise RecordError(
-            f"frame_id: got {frame_id[:80]!r} as phase name, expected 1 to 64 letters, digits, '_', '.', '-'"
-        )
-    return frame_id
-
-
-def phase_from_text(text: str) -> tuple[int, str]:
-    """Number and name of a message of `phase`, ``"<number> <name>"``.
-
-    Raises
-    ------
-    RecordError
-        On any other text.
-    """
-    number, _, name = text.partition(" ")
-    if not (number.isascii() and number.isdigit() and name):
-        raise RecordError(f"phase: got {text[:80]!r}, expected '<number> <name>'")
-    return int(number), name
 
 
 def live(stamp: Time, frame_id: str, **values: float) -> JointState:

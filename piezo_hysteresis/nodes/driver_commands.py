@@ -8,10 +8,11 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from ..errors import PiezoError, StageError
-from .conversions import from_stamp, phase_name
+from .conversions import from_stamp
 from .driver_diagnostics import DriverDiagnostics
 from .driver_session import DriverSession
 from .driver_topics import DriverTopics
+from .phase_text import phase_name
 from .quality import COMMAND
 
 _LONGEST_NAME = 64

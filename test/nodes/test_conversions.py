@@ -10,6 +10,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from piezo_hysteresis.errors import PiezoError, RecordError
 from piezo_hysteresis.nodes import cloud, conversions
+from piezo_hysteresis.nodes.phase_text import phase_from_text, phase_name
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -62,7 +63,7 @@ def test_sample_period_is_that_of_the_time_field():
 def test_waveform_comes_back_bit_for_bit(voltage):
     message = over_the_wire(conversions.command_to_cloud(voltage, 2e-5, "triangle"))
     assert np.array_equal(conversions.waveform_from_cloud(message, 2e-5), voltage)
-    assert conversions.phase_name(message.header.frame_id) == "triangle"
+    assert phase_name(message.header.frame_id) == "triangle"
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.001, 2.0])
@@ -200,14 +201,14 @@ def test_any_cloud_gives_arrays_or_our_error(fields, step, width, height, data, 
 @pytest.mark.parametrize("name", ["../etc", "a b", "x" * 65, "a\nb", "-x"])
 def test_phase_names_that_could_not_name_a_file_are_refused(name):
     with pytest.raises(RecordError):
-        conversions.phase_name(name)
+        phase_name(name)
 
 
 def test_phase_text_round_trip_and_refusal():
-    assert conversions.phase_from_text("12 sine_50hz") == (12, "sine_50hz")
+    assert phase_from_text("12 sine_50hz") == (12, "sine_50hz")
     for text in ("", "12", "x y", "-1 rest", "² rest"):
         with pytest.raises(RecordError):
-            conversions.phase_from_text(text)
+            phase_from_text(text)
 
 
 def test_predicted_samples_layout():

@@ -1,0 +1,47 @@
+"""`RunningRms`: root mean square of the newest samples of a stream."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class RunningRms:
+    """Rms over the newest blocks that together hold so many samples, or over all while there are fewer.
+
+    Parameters
+    ----------
+    count : int
+        Samples, at least 1.
+
+    Examples
+    --------
+    >>> rms = RunningRms(2)
+    >>> rms.add(np.array([9.0, 9.0])), rms.add(np.array([3.0, -3.0])), rms.value
+    (None, None, 3.0)
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self.clear()
+
+    @property
+    def value(self) -> float | None:
+        """Of what was added; None before there is anything."""
+        return float(np.sqrt(sum(s for _, s in self._squares) / self._held)) if self._held else None
+
+    def add(self, values: Array) -> None:
+        """Take the next samples, shape (n,)."""
+        self._squares.append((values.size, float(values @ values)))
+        self._held += values.size
+        while self._held - self._squares[0][0] >= self._count:
+            self._held -= self._squares.popleft()[0]
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self._squares: deque[tuple[int, float]] = deque()
+        self._held = 0
