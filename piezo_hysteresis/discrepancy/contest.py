@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..effects.effect import Place
 from ..identification.fit import Progress
 from ..model import Model
 from .candidates import Candidate
 from .held_out import ADEQUATE, Score
-from .refit import proceed, refit, restart
+from .refit import from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
 """Least gain in mean ln max(1, R²) for which an effect is accepted."""
@@ -41,13 +42,10 @@ def contest(model: Model, candidates: Sequence[Candidate], before: Score, tell: 
     if not refits:
         return []
     tell("dynamics anew", 0.8)
-    leader = restart(refits[0], FIRST)
+    leader = _anew(refits[0])
     field = [
         leader,
-        *(
-            c if k >= AGAIN or _is_far_behind(c, leader, before) else restart(c, FIRST)
-            for k, c in enumerate(refits[1:], 1)
-        ),
+        *(c if k >= AGAIN or _is_far_behind(c, leader, before) else _anew(c) for k, c in enumerate(refits[1:], 1)),
     ]
     field.sort(key=lambda c: c.score.cost)
     tell(f"refit with {field[0].name}", 0.9)
@@ -55,6 +53,14 @@ def contest(model: Model, candidates: Sequence[Candidate], before: Score, tell: 
     reach = best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
     rest = [settled(c, before) if c.score.cost < reach and k < AGAIN else c for k, c in enumerate(field[1:], 1)]
     return sorted([best, *rest], key=lambda c: c.score.cost)
+
+
+def _anew(candidate: Candidate) -> Candidate:
+    """The refit behind dynamics found anew; an effect of the drive, behind which all else stands, from every start."""
+    anew = restart(candidate, FIRST)
+    if anew.effect.place is not Place.DRIVE or anew.score.excess <= ADEQUATE:
+        return anew
+    return from_all_starts(anew, FIRST)
 
 
 def _is_far_behind(candidate: Candidate, best: Candidate, before: Score) -> bool:

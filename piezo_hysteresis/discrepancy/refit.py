@@ -6,6 +6,7 @@ that had the same chances without it.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,20 +101,47 @@ def restart(candidate: Candidate, max_iterations: int) -> Candidate:
 
     The dynamics of the model before were bent by the effect it lacked; from there a joint fit has a long way to go.
     """
-    evidence, fitted = candidate.evidence, candidate.fit
-    assert fitted is not None
-    broadband = evidence.broadband()
-    if not broadband or not isinstance(arx := fitted.model["arx"], Arx):
+    assert candidate.fit is not None
+    anew = _behind_anew(candidate.fit.model, candidate)
+    return candidate if anew is None else _better(_refitted(anew, candidate, max_iterations), candidate)
+
+
+def from_all_starts(candidate: Candidate, max_iterations: int) -> Candidate:
+    """The refit begun at the best start of its effect; itself where that is no better.
+
+    Every start is judged behind dynamics found anew: noise that a limit cuts to pieces bends the dynamics so much that
+    every size has a valley of its own.
+    """
+    assert candidate.fit is not None
+    found = []
+    for start in type(candidate.effect).starts(candidate.evidence.extent):
+        anew = _behind_anew(candidate.fit.model.without(candidate.name).with_effect(start), candidate)
+        if anew is not None:
+            with suppress(DivergenceError):
+                found.append(Fitted(anew, score_model(anew, candidate.evidence)))
+    if not found:
         return candidate
+    best = min(found, key=lambda f: f.score.cost)
+    return _better(_refitted(best.model, candidate, max_iterations), candidate)
+
+
+def _behind_anew(model: Model, candidate: Candidate) -> Model | None:
+    """The model with dynamics found anew; None where the records do not tell them."""
+    evidence, arx = candidate.evidence, model["arx"]
+    broadband = evidence.broadband()
+    if not broadband or not isinstance(arx, Arx):
+        return None
     orders = (arx.array("a").size, arx.array("b").size)
     try:
-        found = dynamics_behind(fitted.model, evidence.records, broadband, round(arx["delay"]), orders)
-        anew = _refitted(with_dynamics(fitted.model, found.arx), candidate, max_iterations)
+        found = dynamics_behind(model, evidence.records, broadband, round(arx["delay"]), orders)
+        return with_dynamics(model, found.arx)
     except (DivergenceError, ParameterError, ModelError, IdentificationError):
-        return candidate
-    if anew is None or anew.fit is None or anew.fit.cost >= fitted.cost:
-        return candidate
-    return anew
+        return None
+
+
+def _better(anew: Candidate | None, candidate: Candidate) -> Candidate:
+    assert candidate.fit is not None
+    return candidate if anew is None or anew.fit is None or anew.fit.cost >= candidate.fit.cost else anew
 
 
 def without(candidate: Candidate, max_iterations: int) -> Fitted | None:

@@ -37,7 +37,8 @@ class AmplifierSlewLimit(Effect):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        return tuple(cls(S=extent.max_slew / 2.0**k) for k in range(1, 12) if extent.max_slew / 2.0**k > extent.span)
+        slopes = extent.max_slew / 2.0 ** np.arange(1.0, 12.0, 0.5)  # a noise has a valley for every half octave
+        return tuple(cls(S=float(slope)) for slope in slopes if slope > extent.span)
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         return AmplifierSlewLimitBlock(self["S"], setting.sample_period)

@@ -172,7 +172,8 @@ def test_wrong_units_are_seen_at_the_first_move(bench):
 def test_the_error_an_earlier_user_left_is_nobodys_now(bench):
     b = bench(opened=False)
     client = b.observer()
-    client.connection.send("MOV 1 3\n")
+    client.connection.send("MOV 1 3\n*IDN?\n")
+    client.connection.receive()  # once this is answered, the command before it has been refused
     client.connection.close()
     b.stage = Gcs2Stage(b.setup())
     b.stage.set_voltage(1.0)
