@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .chain import Chain, ChainState, ChainTangent, Channels
-from .effects import BY_NAME, CHAIN, Effect, Offset, Setting
+from .effects import CHAIN, Effect, Offset, Setting
 from .errors import ModelError
 from .parameter import Parameter, Value
 from .record import Record, are_finite
@@ -138,7 +138,7 @@ class Model:
 
     def values(self) -> dict[str, float]:
         """All numbers by name, ``"bouc_wen.A"``, ``"arx.a[0]"``."""
-        return {f"{e.name}.{n}": float(v) for e in self.effects for n, v in zip(e.free_names(), _flat(e), strict=True)}
+        return {f"{e.name}.{n}": v for e in self.effects for n, v in zip(e.free_names(), e.free_values(), strict=True)}
 
     def row(self, name: str) -> Parameter:
         """The table row of a number."""
@@ -277,24 +277,3 @@ class Model:
         (whole,) = self.simulate(record)
         core = {e.name for e in self.effects if not any(p.off is not None for p in e.parameters)} | {Offset.name}
         return {e.name: whole - self.without(e.name).simulate(record)[0] for e in self.effects if e.name not in core}
-
-
-def _flat(effect: Effect) -> Iterator[float]:
-    for value in effect.values.values():
-        if isinstance(value, tuple):
-            yield from value
-        else:
-            yield value
-
-
-def effect_named(name: str) -> type[Effect]:
-    """The class of an effect identifier.
-
-    Raises
-    ------
-    ModelError
-        If the catalogue has none of that name.
-    """
-    if name not in BY_NAME:
-        raise ModelError(f"unknown effect '{name}', expected one of {', '.join(BY_NAME)}")
-    return BY_NAME[name]

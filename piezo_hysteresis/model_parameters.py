@@ -10,9 +10,9 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from .effects import Effect
+from .effects import Effect, effect_named
 from .errors import ModelError, ParameterError
-from .model import Model, effect_named
+from .model import Model
 from .parameter import Parameter, Value
 from .parameter_file import Entry, entry
 

@@ -5,9 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from piezo_hysteresis.effects import Arx, AsymmetricHysteresis, BoucWen, Creep, Offset, SensorNonlinearity, ThermalDrift
+from piezo_hysteresis.effects import (
+    Arx,
+    AsymmetricHysteresis,
+    BoucWen,
+    Creep,
+    Offset,
+    SensorNonlinearity,
+    ThermalDrift,
+    effect_named,
+)
 from piezo_hysteresis.errors import ModelError, ParameterError
-from piezo_hysteresis.model import Model, effect_named
+from piezo_hysteresis.model import Model
 from piezo_hysteresis.record import Record
 
 PERIOD = 1e-3

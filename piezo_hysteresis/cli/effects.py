@@ -8,8 +8,7 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from ..effects import BASELINE, CHAIN, Effect
-from ..model import effect_named
+from ..effects import BASELINE, CHAIN, Effect, effect_named
 from ..parameter import Parameter
 
 

@@ -6,6 +6,7 @@ u → [amplifier] → [backlash] → v → [h with its terms + plays + even poly
 
 from __future__ import annotations
 
+from ..errors import ModelError
 from .amplifier_bandwidth import AmplifierBandwidth
 from .amplifier_saturation import AmplifierSaturation
 from .amplifier_slew_limit import AmplifierSlewLimit
@@ -74,6 +75,20 @@ CATALOGUE: tuple[type[Effect], ...] = tuple(e for e in CHAIN if e not in BASELIN
 
 BY_NAME: dict[str, type[Effect]] = {e.name: e for e in CHAIN}
 
+
+def effect_named(name: str) -> type[Effect]:
+    """The class of an effect identifier.
+
+    Raises
+    ------
+    ModelError
+        If the catalogue has none of that name.
+    """
+    if name not in BY_NAME:
+        raise ModelError(f"unknown effect '{name}', expected one of {', '.join(BY_NAME)}")
+    return BY_NAME[name]
+
+
 __all__ = [
     "BASELINE",
     "BY_NAME",
@@ -110,4 +125,5 @@ __all__ = [
     "Term",
     "ThermalDrift",
     "ThermalExpansion",
+    "effect_named",
 ]

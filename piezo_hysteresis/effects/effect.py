@@ -145,6 +145,14 @@ class Effect(ABC):
             else:
                 yield row.name
 
+    def free_values(self) -> Iterator[float]:
+        """All scalar numbers, in the order of `free_names`."""
+        for value in self._values.values():
+            if isinstance(value, tuple):
+                yield from map(float, value)
+            else:
+                yield float(value)
+
     @classmethod
     def public_name(cls) -> str:
         """Identifier under which the catalogue knows the effect."""
