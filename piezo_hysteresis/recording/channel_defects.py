@@ -14,7 +14,8 @@ FEWEST_LEVELS = 1000
 _DRIVE_MOVES = 0.05
 _DRIVE_RETURNS = 0.01
 _RETURN = 0.03
-_ARC = 0.3
+_ARC = 0.9
+_MISSED = 0.3
 _CONSTANT_SPEED = 0.75
 _SEVERE_SHARE = 0.05
 
@@ -71,6 +72,7 @@ def _clipped_voltage(record: Record) -> list[Notice]:
     samples = 0
     direction = np.sign(np.dot(u - u.mean(), y - y.mean()) or 1.0)
     returned = _RETURN * float(np.ptp(y))
+    gain = float(np.ptp(y)) / max(float(np.ptp(u)), 1e-300)
     for rail, sign in ((u.max(), 1.0), (u.min(), -1.0)):
         runs = _runs_of_equal(np.where(u == rail, rail, np.arange(u.size)), 5)
         for a, b in runs.tolist():
@@ -79,12 +81,21 @@ def _clipped_voltage(record: Record) -> list[Notice]:
             # a stage that rings after a step also goes on and comes back, but ends far from where it was, or swings
             # about its level; a turning point that the recording lacks is one arc over the whole run
             returns = way.max() - max(way[0], way[-1]) > max(returned, abs(way[0] - way[-1]))
-            if returns and rise.mean() > _ARC * rise.max():
+            arc = np.sin(np.linspace(0.0, np.pi, way.size))
+            likeness = float(rise @ arc) / max(float(np.sqrt((rise @ rise) * (arc @ arc))), 1e-300)
+            if returns and likeness > _ARC and rise.max() > _MISSED * gain * _taken_off(u, a, b):
                 samples += b - a
     if not samples:
         return []
     text = f"the voltage is cut off for {samples} samples while the displacement goes on"
     return [Notice("clipped", text, record.phase, severe=samples > _SEVERE_SHARE * record.size)]
+
+
+def _taken_off(voltage: Samples, start: int, stop: int) -> float:
+    """Height of the parabola that leaves and meets the voltage around a run at the steeper of its two slopes."""
+    around = voltage[max(0, start - 2) : start + 1], voltage[stop - 1 : stop + 2]
+    slope = max(float(np.abs(np.diff(part)).max(initial=0.0)) for part in around)
+    return slope * (stop - start) / 4.0
 
 
 def _dropouts(record: Record) -> list[Notice]:

@@ -61,7 +61,8 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     straight = _straightness(voltage, turns)
     reversals = turns[1:-1]  # the ends of the record are none
     periods = reversals[2:] - reversals[:-2]
-    usual = float(np.median(periods)) if periods.size else 2.0 * float(turns[1] - turns[0])
+    swings = np.diff(reversals if reversals.size > 1 else turns)  # those of the ends may be parts of swings
+    usual = float(np.median(periods)) if periods.size else 2.0 * float(swings[0])
     like = periods[np.abs(periods - usual) <= _REGULAR * usual]
     regular = like.size >= 0.8 * periods.size - 1  # one may belong to what leads in or out
     if straight < _STRAIGHT:

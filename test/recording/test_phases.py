@@ -52,6 +52,12 @@ def test_a_sine_is_named_by_its_frequency(frequency, amplitude, offset, start, p
     assert float(name[5:-2]) == pytest.approx(frequency, rel=0.05)
 
 
+def test_one_period_about_zero_is_named_by_its_frequency_too():
+    swing = np.sin(2 * np.pi * 10.0 * np.arange(0.0, 0.1, PERIOD))
+    name = phase_name(np.concatenate([np.zeros(10), swing]), PERIOD)
+    assert float(name.removeprefix("sine_").removesuffix("hz")) == pytest.approx(10.0, rel=0.1)
+
+
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("measured_noise", [0.0, 1e-3])
 @pytest.mark.parametrize(
