@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,8 @@ _EXPLAINED = 0.999
 _SURE = 4.0
 _JUMP = 0.3
 _BENT = 0.01
+_SLOWER, _ALIKE, _SHARED = 10.0, 1.2, 2.0
+"""Swings, in lags and in swings of the phase, of others that a lag is compared with; how far it may differ."""
 _SLOW = 20e-3
 """A drive that turns faster [s] may pass a resonance, behind which a lag of over half a period looks like a lead."""
 
@@ -90,21 +92,29 @@ def lag_of(record: Record) -> Lag | None:
     return Lag(lag * period, float(error) * period, 2.0 * float(np.median(half)) * period)
 
 
-def lag_notice(record: Record) -> list[Notice]:
-    """Notice ``leads`` where the displacement moves before the drive does, ``late`` where it lags beyond `LATE`."""
-    lag = lag_of(record)
-    if lag is None:
-        return []
-    samples = f"{abs(lag.time):.3g} s ({abs(lag.time) / record.sample_period:.2g} samples)"
-    least = max(_SURE * lag.error, 2.0 * _BENT * lag.swing)
-    if lag.time < -max(least, 0.5 * record.sample_period) and lag.swing > _SLOW:
-        text = f"the displacement leads the voltage by {samples}: one channel is shifted in time"
-        return [Notice("leads", text, record.phase, severe=True)]
-    if lag.time > max(LATE, least):
-        cause = "a slow sensor filter, a channel that is late, or a wrong time base"
-        text = f"the displacement follows the voltage by {samples}: {cause}"
-        return [Notice("late", text, record.phase)]
-    return []
+def lag_notices(records: Sequence[Record]) -> list[Notice]:
+    """Notices ``leads`` where the displacement moves before the drive does, ``late`` where it lags beyond `LATE`.
+
+    A late channel and a slow filter lag in all that is slow beside the lag; hysteresis that bends a loop does not.
+    """
+    lags = [lag_of(record) for record in records]
+    notices = []
+    for record, lag in zip(records, lags, strict=True):
+        if lag is None:
+            continue
+        samples = f"{abs(lag.time):.3g} s ({abs(lag.time) / record.sample_period:.2g} samples)"
+        doubt = _SURE * lag.error
+        least = max(doubt, 2.0 * _BENT * lag.swing)
+        peers = [o for o in lags if o is not None and _SLOWER * lag.time < o.swing <= _ALIKE * lag.swing]
+        shared = min((max(o.time, 0.0) + _SURE * o.error for o in peers), default=lag.time)
+        if lag.time < -max(least, 0.5 * record.sample_period) and lag.swing > _SLOW:
+            text = f"the displacement leads the voltage by {samples}: one channel is shifted in time"
+            notices.append(Notice("leads", text, record.phase, severe=True))
+        elif lag.time > max(LATE, least) and lag.time - doubt < _SHARED * shared:
+            cause = "a slow sensor filter, a channel that is late, or a wrong time base"
+            text = f"the displacement follows the voltage by {samples}: {cause}"
+            notices.append(Notice("late", text, record.phase))
+    return notices
 
 
 def _between(values: Samples, place: Samples) -> Samples:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..record import Experiment, Notice, Record, Samples
 from .channel_defects import channel_defects
-from .lag import lag_notice, lag_of
+from .lag import lag_notices, lag_of
 from .onset import onset
 from .waveform import phase_name
 
@@ -47,7 +47,7 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
     for record in moving:
         notices += _named_frequency(record)
         notices += channel_defects(record)
-    late = [notice for record in moving for notice in lag_notice(record)]
+    late = lag_notices(moving)
     notices += late
     notices += [n for n in _polarity_and_lead(moving) if n.kind not in {told.kind for told in late}]
     for record in experiment:

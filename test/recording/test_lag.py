@@ -51,6 +51,17 @@ def test_a_channel_that_is_shifted_by_more_than_its_loops_bend_is_told(shift):
     assert "leads" in told(10.0 * voltage[:-shift], displacement[shift:])
 
 
+@pytest.mark.parametrize(("shift", "is_late"), [(0, False), (60, True)])
+def test_a_late_channel_lags_in_every_phase_and_a_bent_loop_in_the_slow_one_alone(shift, is_late):
+    phases = []
+    for periods in (1, 4):
+        voltage = np.sin(2 * np.pi * periods * np.arange(3000) / 1000)
+        displacement = 1e-5 * (1.2 * voltage + loop(voltage, -0.6, 3.5, 1.0, -1.1, -0.8))
+        late = np.roll(displacement, shift)[200:]
+        phases.append(Record(10.0 * voltage[200:], late, PERIOD, f"sine_{periods}hz"))
+    assert ("late" in {n.kind for n in inspect(Experiment(tuple(phases)))}) == is_late
+
+
 def test_a_drive_above_the_resonance_does_not_lead():
     period, resonance = 5e-5, 320.0
     pole = np.exp(2 * np.pi * resonance * period * (-0.1 + 1j))
