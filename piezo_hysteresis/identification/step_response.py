@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import f
 
 from ..errors import IdentificationError
 from ..record import Record, Samples
@@ -15,6 +16,12 @@ BEFORE = (64, 32, 16)
 """Most samples before an edge from which the base line is drawn; fewer where the stage still rings."""
 LONGEST = 4096
 """Most samples after an edge among which the onset is sought."""
+QUIET = 2.0
+"""Scatter before an edge, as a multiple of that before the quietest one, up to which its response is averaged."""
+NEGLIGIBLE = 1e-4
+"""Scatter that matters to none, in swings of the displacement."""
+RARE = 1e-4
+"""Chance at which noise alone has that much more scatter before one edge than before another."""
 SCATTER = 3.0
 """Standard deviations by which the end of a base line may leave what its beginning foretells."""
 
@@ -45,7 +52,7 @@ class StepResponse:
 
 
 def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
-    """Average the response to every edge in the records, weighted by the height of the edge.
+    """Average the response to the edges in the records before which the stage is quiet, weighted by their heights.
 
     Parameters
     ----------
@@ -71,6 +78,12 @@ def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
             f"quiet samples before it and {4 * every} after it; record a step phase"
         )
     resolution = _resolution({id(r): r for r, _ in edges}.values())
+    scatters = np.array([_scatter(record, edge, every) for record, edge in edges])
+    swing = max(float(np.ptp(record.displacement)) for record, _ in edges)
+    quietest = max(float(scatters.min()), resolution / np.sqrt(12.0), NEGLIGIBLE * swing)
+    freedom = min(BEFORE[0], *(edge.quiet_before // every for _, edge in edges)) - 2
+    by_chance = float(np.sqrt(f.isf(RARE, freedom, freedom)))
+    edges = [e for e, scatter in zip(edges, scatters, strict=True) if scatter <= max(QUIET, by_chance) * quietest]
     # A stage that still rings is not straight over a long base line; a short one is noisy.
     for most in BEFORE:
         response, ringing = _averaged(edges, every, most, resolution)
@@ -84,6 +97,13 @@ def _resolution(records: Iterable[Record]) -> float:
     changes = (np.abs(np.diff(r.displacement)) for r in records)
     finest = min(float(np.min(c, where=c > 0.0, initial=np.inf)) for c in changes)
     return finest if finest < np.inf else 0.0
+
+
+def _scatter(record: Record, edge: Edge, every: int) -> float:
+    """Rms of the displacement before an edge about a line [m]."""
+    behind = np.arange(-min(BEFORE[0], edge.quiet_before // every), 0)
+    base = record.displacement[edge.start + every * behind]
+    return float(np.sqrt(np.sum((base - np.polyval(np.polyfit(behind, base, 1), behind)) ** 2) / (base.size - 2)))
 
 
 def _averaged(

@@ -30,6 +30,21 @@ def test_three_samples_at_every_noise(noise):
         assert delay.is_resolved
 
 
+@pytest.mark.parametrize("resonance", [300.0, 700.0, 1900.0])
+@pytest.mark.parametrize("samples", [1, 3])
+def test_edges_before_which_the_stage_still_rings_have_no_say(resonance, samples):
+    pole = np.exp(2 * np.pi * resonance * SAMPLE_PERIOD * (-0.01 + 1j))
+    mode = np.real(np.poly([pole, np.conj(pole)]))
+    quiet = np.repeat([0.0, 1.0], 1000)
+    trapezoids = np.repeat([0.0, 5.0, 0.0, 8.0, 3.0, 9.0, 1.0], 200)
+    records = []
+    for name, drive in (("step", quiet), ("steps", trapezoids)):
+        y = lfilter([mode.sum()], mode, np.concatenate([np.zeros(samples), drive[:-samples]]))
+        noise = 5e-9 * np.random.default_rng(0).standard_normal(y.size)
+        records.append(Record(drive, 1e-6 * y + noise, SAMPLE_PERIOD, name))
+    assert samples <= identify_delay(records).samples <= identify_delay(records[:1]).samples + 1
+
+
 def test_noise_that_hides_the_first_response_is_told():
     for seed in range(10):
         delay = identify_delay([step_record(0.02, seed)])
