@@ -43,8 +43,6 @@ LAST, PRECISE = 25, 1e-4
 """Linearisations of the last fit, and relative decrease of the cost at which it has converged."""
 NOISY, WORTHWHILE = 1.1, 0.95
 """Cost over that of noise from which it is begun anew, and share of it that may be left for another time."""
-FALLS = 0.95
-"""Share of the gap on records set aside that may remain after an effect is named."""
 IDLE = ("idle", "hold", *CARRYING)
 """Phases that only bring the stage from one state to another."""
 
@@ -133,7 +131,7 @@ def diagnose(
         return measure_gap(models, records, chosen, least.tolist(), span, nuisances, bool(spared))
 
     gap = gap_of(final, final_evidence.nuisance)
-    falls = not named or gap.after < FALLS * gap.before
+    falls = not named or gap.falls
     if named and not falls:
         named, final, gap = False, first, gap_of(first, evidence.nuisance)
     tell("next experiment", 0.95)

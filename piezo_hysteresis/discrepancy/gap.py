@@ -11,8 +11,12 @@ from numpy.typing import NDArray
 from ..identification.normal_equations import Nuisance, residuals
 from ..model import Model
 from ..record import Record
+from .held_out import ADEQUATE
 
 Array = NDArray[np.float64]
+
+FALLS = 0.9
+"""Share of V on records set aside that may remain after an effect is named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +52,18 @@ class Gap:
     interval_95: tuple[float, float]
     per_phase: tuple[PhaseGap, ...]
     unseen: bool
+
+    @property
+    def falls(self) -> bool:
+        """Whether the extended model is better there, every record in units of its own floor.
+
+        Records that are quiet beside the others, and show what those hide in noise, then count like them. Where nothing
+        is to be seen before, the effect must do no harm.
+        """
+        before, after = (
+            float(np.mean([(getattr(p, when) / p.floor) ** 2 for p in self.per_phase])) for when in ("before", "after")
+        )
+        return after < (FALLS if before > ADEQUATE else 1.0) * before
 
 
 def measure_gap(

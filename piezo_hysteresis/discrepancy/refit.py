@@ -24,8 +24,8 @@ from .held_out import Score
 
 LINEAR = ("lag", "dynamics")
 """Families that dynamics of an order high enough can hold."""
-IMITATIONS = 8
-"""Steiglitz-McBride iterations with which dynamics imitate others."""
+IMITATIONS = 12
+"""Steiglitz-McBride iterations at most with which dynamics imitate others."""
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Periods of the mains in a record that tells its amplitude, sample period in periods, and records."""
 STEADY = 0.3

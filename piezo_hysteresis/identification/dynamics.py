@@ -24,6 +24,9 @@ _ALL = slice(None)
 LARGEST_POLE = 0.99999
 """Radius to which poles on or just outside the unit circle are drawn back."""
 
+PATIENCE, GAINS = 3, 0.99
+"""Iterations without a gain after which no more are made, and the share of the error that a gain leaves at most."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Dynamics:
@@ -117,7 +120,7 @@ def identify_arx(
     orders : (int, int)
         na and nb.
     iterations : int
-        Steiglitz-McBride iterations after plain least squares; 0 is the paper.
+        Steiglitz-McBride iterations at most after plain least squares; 0 is the paper.
 
     Returns
     -------
@@ -151,6 +154,9 @@ def identify_arx(
         arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
         model = Dynamics(arx, sample_period, one_step, notices=told if mirrored else ())
         candidates.append(replace(model, free_run_error=_free_run_error(model, signals)))
+        errors = [c.free_run_error for c in candidates]
+        if len(errors) > PATIENCE and min(errors[-PATIENCE:]) > GAINS * min(errors[:-PATIENCE]):
+            break
     return min(candidates, key=lambda model: model.free_run_error)
 
 

@@ -18,8 +18,8 @@ from .carried import carried
 from .dynamics import Dynamics, identify_arx
 from .regressors import Signals
 
-ITERATIONS = 3
-"""Steiglitz-McBride iterations of the start."""
+ITERATIONS = 12
+"""Steiglitz-McBride iterations of the start at most: weak, lightly damped modes come last."""
 
 
 def hysteresis_signals(model: Model, records: Sequence[Record], wanted: Collection[int]) -> Signals:

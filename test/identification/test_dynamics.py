@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from benchmarks.published_plant import A_Z, B_Z, DELAY, SAMPLE_PERIOD, STROKE, hysteresis_output, linear_output
 from piezo_hysteresis.effects import Arx
@@ -9,6 +10,7 @@ from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.identification import protocol
 from piezo_hysteresis.identification.dynamics import Dynamics, choose_order, compare_orders, identify_arx
 from piezo_hysteresis.identification.frequency_response import periodic, welch
+from piezo_hysteresis.identification.linear_start import ITERATIONS
 
 PUBLISHED = Dynamics(Arx(a=A_Z[1:], b=B_Z, delay=DELAY), SAMPLE_PERIOD)
 BAND = np.geomspace(1.0, 2000.0, 60)
@@ -55,6 +57,26 @@ def test_iterations_remove_the_bias_of_the_sensor_noise():
 
     assert largest_error(0) > 0.2
     assert largest_error(6) < 0.03
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_iterations_come_to_weak_and_lightly_damped_modes_last(seed):
+    random = np.random.default_rng(seed)
+    drive = 0.04 * random.standard_normal(30_000)
+    y = 5e-4 * random.standard_normal(drive.size)
+    for frequency, damping, weight in ((300.0, 0.01, 0.8), (690.0, 0.008, 0.15), (1230.0, 0.008, 0.05)):
+        mode = poles(frequency, damping)
+        y += weight * lfilter([0.0, mode.sum()], mode, drive)
+
+    def error(iterations):
+        return identify_arx([(drive, y)], 1, SAMPLE_PERIOD, (8, 8), iterations).free_run_error
+
+    assert error(ITERATIONS) < 0.5 * error(3)
+
+
+def poles(frequency, damping):
+    pole = np.exp(2 * np.pi * frequency * SAMPLE_PERIOD * (-damping + 1j * np.sqrt(1 - damping**2)))
+    return np.real(np.poly([pole, np.conj(pole)]))
 
 
 def test_a_noisy_record_gives_a_start_good_to_0_3_percent():
