@@ -101,7 +101,7 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
         lean = refit(model.without(name), without_it, FIRST)
         if lean is None:
             continue
-        lean = restart(lean, FIRST)
+        lean = min(lean, restart(lean, FIRST), key=lambda c: c.score.cost)
         if lean.score.cost - score.cost < 2.0 * LEAST_GAIN + 0.5:
             lean = settled(lean, steps[0].before)
         if lean.score.cost - score.cost < LEAST_GAIN and lean.fit is not None:

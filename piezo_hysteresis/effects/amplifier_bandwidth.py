@@ -10,7 +10,7 @@ from .effect import Effect, Place, Setting
 from .extent import Extent
 from .pole import PoleBlock
 
-FOUND_BY = (1e-5, 2e-5, 5e-5)
+FOUND_BY = (1e-5, 2e-5, 5e-5, 1.5e-4)
 """Time constants at which a search begins [s]."""
 
 
