@@ -72,6 +72,17 @@ class MainsHum(Effect):
         return MainsHumBlock(names, self["f"], self.array("cosine"), self.array("sine"), setting.sample_period)
 
 
+def harmonics(frequency: float, count: int, t: Array) -> tuple[Array, Array]:
+    """Cosines and sines of harmonics of `frequency` [Hz] at times (n,) [s], both (count, n): addition theorem."""
+    cosines, sines = np.empty((count, t.size)), np.empty((count, t.size))
+    angle = 2.0 * np.pi * frequency * t
+    c, s = np.cos(angle), np.sin(angle)
+    for k in range(count):
+        cosines[k], sines[k] = c, s
+        c, s = c * cosines[0] - s * sines[0], s * cosines[0] + c * sines[0]
+    return cosines, sines
+
+
 class MainsHumBlock(TimeBlock):
     """x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)], t from the start of the record."""
 
@@ -85,23 +96,17 @@ class MainsHumBlock(TimeBlock):
     def rest(self, x0: float, time: float) -> State:
         return 0.0, 0
 
-    def _waves(self, t: Array) -> tuple[Array, Array]:
-        """Cosines and sines of all harmonics, each (k, n), by the addition theorem."""
-        cosines, sines = np.empty((self.cosine.size, t.size)), np.empty((self.cosine.size, t.size))
-        angle = 2.0 * np.pi * self.frequency * t
-        c, s = np.cos(angle), np.sin(angle)
-        for k in range(self.cosine.size):
-            cosines[k], sines[k] = c, s
-            c, s = c * cosines[0] - s * sines[0], s * cosines[0] + c * sines[0]
-        return cosines, sines
-
     def value(self, x: Array, t: Array) -> Array:
-        for c, s, cosine, sine in zip(self.cosine, self.sine, *self._waves(t), strict=True):
+        if not (self.cosine.any() or self.sine.any()):
+            return x
+        for c, s, cosine, sine in zip(
+            self.cosine, self.sine, *harmonics(self.frequency, self.cosine.size, t), strict=True
+        ):
             x = x + (c * cosine + s * sine)
         return x
 
     def by_parameter(self, x: Array, t: Array) -> Array:
-        cosines, sines = self._waves(t)
+        cosines, sines = harmonics(self.frequency, self.cosine.size, t)
         by_frequency = np.zeros(t.size)
         for k, (c, s) in enumerate(zip(self.cosine, self.sine, strict=True)):
             by_frequency += 2.0 * np.pi * (k + 1) * t * (s * cosines[k] - c * sines[k])

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects.mains_hum import harmonics
 from ..errors import DivergenceError
 from ..model import Model
 from ..record import Record
@@ -45,12 +46,12 @@ class Nuisance:
         rows = [np.ones(size)] if self.offset else []
         if self.hum_frequency is not None:
             t = record.sample_period * np.arange(part.start, part.stop)
-            for order in range(1, self.harmonics + 1):
+            waves = zip(*harmonics(self.hum_frequency, self.harmonics, t), strict=True)
+            for order, (cosine, sine) in enumerate(waves, 1):
                 line = order * self.hum_frequency * record.sample_period
                 # a line that the sample period folds onto dc is averaged away, and would free the offset
                 if abs(line - round(line)) * record.size > 1.0:
-                    angle = 2 * np.pi * order * self.hum_frequency * t
-                    rows += [np.cos(angle), np.sin(angle)]
+                    rows += [cosine, sine]
         return np.array(rows).reshape(len(rows), size)
 
 
