@@ -44,6 +44,12 @@ def run(args: argparse.Namespace) -> int:
     if args.output is not None and found.model is not None:
         path = str(model_file.save(found.model, args.output))
     answer = found.answer(path)
+    if args.json is not None:
+        write_json(args.json, answer)
+    if args.report is not None:
+        with progress("report") as tell:
+            drawn = page(_comparison(experiment, found), fit=found.fit, answer=answer, progress=tell)
+        drawn.save(Path(args.report).expanduser())
     out = console()
     said = answer_verdict(answer)
     out.print(said.headline, style="bold")
@@ -52,12 +58,6 @@ def run(args: argparse.Namespace) -> int:
     out.print()
     show(effect_table(answer), where_table(answer), gap_table(answer), rejection_table(answer))
     show_notices(experiment.notices)
-    if args.json is not None:
-        write_json(args.json, answer)
-    if args.report is not None:
-        with progress("report") as tell:
-            drawn = page(_comparison(experiment, found), fit=found.fit, answer=answer, progress=tell)
-        drawn.save(Path(args.report).expanduser())
     for written in (path, args.json, args.report):
         if written:
             out.print(f"wrote {written}")

@@ -54,6 +54,9 @@ def run(args: argparse.Namespace) -> int:
             held_out=HELD_OUT if args.held_out is None else tuple(args.held_out),
             progress=tell,
         )
+    path = model_file.save(found.model, args.output)
+    if args.json is not None:
+        write_json(args.json, answer(found, str(path)))
     show(parameter_table(found.model, found.fit), correlation_table(found.fit), _phases(found))
     out = console()
     if found.delay is not None:
@@ -61,10 +64,7 @@ def run(args: argparse.Namespace) -> int:
     for comparison in found.comparisons:
         out.print(str(comparison))
     show_notices(found.notices)
-    path = model_file.save(found.model, args.output)
     out.print(f"wrote {path}")
-    if args.json is not None:
-        write_json(args.json, answer(found, str(path)))
     return 0 if found.fit.converged else 1
 
 

@@ -42,12 +42,13 @@ def run(args: argparse.Namespace) -> int:
     nuisances = {"error": Nuisance(offset=True)} if args.zero_per_phase else None
     comparison = compare(experiment, {"error": model}, nuisances)
     tests = _tests(comparison)
-    show(error_table(comparison), frequency_table(comparison), _test_table(tests))
-    show_notices(experiment.notices)
     if args.json is not None:
         write_json(args.json, answer(comparison, tests))
     if args.figures is not None:
         _draw(comparison, Path(args.figures).expanduser())
+    show(error_table(comparison), frequency_table(comparison), _test_table(tests))
+    show_notices(experiment.notices)
+    if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
     return 0
 

@@ -16,6 +16,7 @@ _DRIVE_RETURNS = 0.01
 _RETURN = 0.03
 _ARC = 0.9
 _MISSED = 0.3
+_PARTS = 32
 _CONSTANT_SPEED = 0.75
 _SEVERE_SHARE = 0.05
 
@@ -76,7 +77,7 @@ def _clipped_voltage(record: Record) -> list[Notice]:
     for rail, sign in ((u.max(), 1.0), (u.min(), -1.0)):
         runs = _runs_of_equal(np.where(u == rail, rail, np.arange(u.size)), 5)
         for a, b in runs.tolist():
-            way = sign * direction * y[a:b]
+            way = sign * direction * _means(y[a:b])
             rise = way - np.linspace(way[0], way[-1], way.size)
             # a stage that rings after a step also goes on and comes back, but ends far from where it was, or swings
             # about its level; a turning point that the recording lacks is one arc over the whole run
@@ -89,6 +90,12 @@ def _clipped_voltage(record: Record) -> list[Notice]:
         return []
     text = f"the voltage is cut off for {samples} samples while the displacement goes on"
     return [Notice("clipped", text, record.phase, severe=samples > _SEVERE_SHARE * record.size)]
+
+
+def _means(values: Samples) -> Samples:
+    """Means of at most `_PARTS` equal parts: an arc is no noise."""
+    starts = np.unique(np.linspace(0, values.size, min(_PARTS, values.size), endpoint=False).astype(np.int64))
+    return np.asarray(np.add.reduceat(values, starts) / np.diff(starts, append=values.size))
 
 
 def _taken_off(voltage: Samples, start: int, stop: int) -> float:

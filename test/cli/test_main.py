@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
@@ -45,6 +46,13 @@ def test_a_reader_that_leaves_early_is_no_error():
     )
     assert "Catalogue" in done.stdout
     assert done.stderr == ""
+
+
+def test_a_reader_that_leaves_early_takes_no_file_with_it(folder, tmp_path):
+    told = tmp_path / "answer.json"
+    command = f"identify {folder} -o {tmp_path / 'model.yaml'} --json {told}"
+    subprocess.run(f"{sys.executable} -m piezo_hysteresis.cli.main {command} | head -1", shell=True, check=False)
+    assert json.loads(told.read_text())["schema"] == 1
 
 
 @pytest.fixture(scope="module")
