@@ -8,7 +8,7 @@ it. So residual and sensitivities are projected off everything the model can sti
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from ..identification.fit import Fit, gauge
 from ..identification.normal_equations import Gram, Nuisance, grams
 from ..model import Model
 from .evidence import Evidence
-from .held_out import Score, held_out
+from .held_out import Score, held_out, indispensable
 
 Array = NDArray[np.float64]
 
@@ -82,6 +82,13 @@ def score_model(model: Model, evidence: Evidence) -> Score:
     names = free_numbers(model, evidence.nuisance)
     products = grams(model, evidence.records, names, evidence.nuisance)
     return held_out(products, evidence.floors, directions(model, names), evidence.alone)
+
+
+def with_indispensable(model: Model, evidence: Evidence) -> Evidence:
+    """The evidence, of which records that alone tell a number of the model are never left out."""
+    names = free_numbers(model, evidence.nuisance)
+    products = grams(model, evidence.records, names, evidence.nuisance)
+    return replace(evidence, alone=indispensable(products, evidence.floors, directions(model, names)))
 
 
 def screen(model: Model, evidence: Evidence, effects: Iterable[type[Effect]]) -> list[Candidate]:

@@ -10,7 +10,7 @@ from ..identification.fit import Progress
 from ..model import Model
 from .candidates import Candidate
 from .held_out import ADEQUATE, Score
-from .refit import from_all_starts, proceed, refit, restart
+from .refit import LINEAR, better, from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
 """Least gain in mean ln max(1, R²) for which an effect is accepted."""
@@ -55,12 +55,24 @@ def contest(model: Model, candidates: Sequence[Candidate], before: Score, tell: 
     return sorted([best, *rest], key=lambda c: c.score.cost)
 
 
+def behind_the_pole(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
+    """Refits of lags of the drive, which the dynamics have taken up, so that no score test sees them."""
+    refits = []
+    for candidate in candidates:
+        if candidate.effect.place is Place.DRIVE and candidate.effect.family in LINEAR:
+            anew = from_all_starts(model, candidate, FIRST)
+            if anew is not None:
+                refits.append(settled(anew, before))
+    return refits
+
+
 def _anew(candidate: Candidate) -> Candidate:
     """The refit behind dynamics found anew; an effect of the drive, behind which all else stands, from every start."""
     anew = restart(candidate, FIRST)
     if anew.effect.place is not Place.DRIVE or anew.score.excess <= ADEQUATE:
         return anew
-    return from_all_starts(anew, FIRST)
+    assert anew.fit is not None
+    return better(from_all_starts(anew.fit.model.without(anew.name), anew, FIRST), anew)
 
 
 def _is_far_behind(candidate: Candidate, best: Candidate, before: Score) -> bool:

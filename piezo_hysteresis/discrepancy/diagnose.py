@@ -17,7 +17,7 @@ from ..identification.roles import CARRYING
 from ..model import Model
 from ..record import Experiment, Notice
 from .baseline import exact, start_model
-from .candidates import score_model
+from .candidates import score_model, with_indispensable
 from .diagnosis import Diagnosis, Verdict
 from .evidence import Evidence, extent_of
 from .few_records import diagnose_few
@@ -103,6 +103,7 @@ def diagnose(
     evidence = Evidence(tuple(kept), np.array(sizes), Nuisance(), extent_of([records[i] for i in usable], start))
     tell("baseline, jointly", 0.25)
     baseline = joint(start, evidence, LAST, PRECISE)
+    evidence = with_indispensable(baseline.model, evidence)
     score = score_model(baseline.model, evidence)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
 

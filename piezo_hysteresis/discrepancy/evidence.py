@@ -36,7 +36,7 @@ class Evidence:
     extent : Extent
         What the records span.
     alone : tuple of int
-        Records whose kind has no other; they are never left out.
+        Records whose kind has no other, or that alone tell a number; they are never left out.
     """
 
     records: tuple[Record, ...]

@@ -20,6 +20,8 @@ ADEQUATE = 1.5
 """Mean R² up to which nothing is missing beyond noise."""
 RIDGE = 1e-9
 """Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
+SPOILT = 0.2
+"""Error from noise alone, in R², beyond which a record says nothing when it is left out."""
 FARTHEST = 100.0
 """How far leaving a record out may raise its R² over that of the fit to all: beyond, nothing is linear any more."""
 
@@ -94,6 +96,28 @@ def held_out(
     changes = np.einsum("rj,rjk,rk->r", steps, hessians, steps) - 2.0 * np.sum(steps * slopes, axis=1)
     squares = np.clip(np.array(power) + changes, 0.0, FARTHEST * np.maximum(1.0, power))
     return Score(np.sqrt(squares), _solve(hessian[None], slope[None], scale)[0])
+
+
+def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array) -> tuple[int, ...]:
+    """Indices of records without which a direction is so little known that noise alone would spoil their judgement.
+
+    The one rest at a high level, say, tells alone how a stage settles there. With a share μ of what is known about a
+    direction, a record of n samples that is left out is off by μ/(1 − μ)/n in R² from the noise of the others.
+
+    Parameters
+    ----------
+    grams, floors, columns
+        As for `held_out`.
+    """
+    counted = [i for i, floor in enumerate(floors) if np.isfinite(floor)]
+    hessians = [columns.T @ grams[i].matrix @ columns / (grams[i].size * floors[i] ** 2) for i in counted]
+    total = np.sum(hessians, axis=0)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(total), 1e-300))
+    values, vectors = np.linalg.eigh(total * np.outer(scale, scale))
+    known = values > RIDGE * values[-1]
+    whitened = vectors[:, known] / np.sqrt(values[known]) * scale[:, None]
+    shares = [float(np.linalg.eigvalsh(whitened.T @ h @ whitened)[-1]) for h in hessians]
+    return tuple(i for i, share in zip(counted, shares, strict=True) if share > SPOILT * grams[i].size * (1.0 - share))
 
 
 def _solve(matrices: Array, rights: Array, scale: Array) -> Array:

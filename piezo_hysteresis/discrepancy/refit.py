@@ -103,26 +103,23 @@ def restart(candidate: Candidate, max_iterations: int) -> Candidate:
     """
     assert candidate.fit is not None
     anew = _behind_anew(candidate.fit.model, candidate)
-    return candidate if anew is None else _better(_refitted(anew, candidate, max_iterations), candidate)
+    return candidate if anew is None else better(_refitted(anew, candidate, max_iterations), candidate)
 
 
-def from_all_starts(candidate: Candidate, max_iterations: int) -> Candidate:
-    """The refit begun at the best start of its effect; itself where that is no better.
+def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
+    """Refit of the model with the candidate begun at the best start of its effect; None where all diverge.
 
     Every start is judged behind dynamics found anew: noise that a limit cuts to pieces bends the dynamics so much that
     every size has a valley of its own.
     """
-    assert candidate.fit is not None
     found = []
     for start in type(candidate.effect).starts(candidate.evidence.extent):
-        anew = _behind_anew(candidate.fit.model.without(candidate.name).with_effect(start), candidate)
+        anew = _behind_anew(model.with_effect(start), candidate)
         if anew is not None:
             with suppress(DivergenceError):
                 found.append(Fitted(anew, score_model(anew, candidate.evidence)))
-    if not found:
-        return candidate
-    best = min(found, key=lambda f: f.score.cost)
-    return _better(_refitted(best.model, candidate, max_iterations), candidate)
+    best = min(found, key=lambda f: f.score.cost, default=None)
+    return None if best is None else _refitted(best.model, candidate, max_iterations)
 
 
 def _behind_anew(model: Model, candidate: Candidate) -> Model | None:
@@ -139,7 +136,8 @@ def _behind_anew(model: Model, candidate: Candidate) -> Model | None:
         return None
 
 
-def _better(anew: Candidate | None, candidate: Candidate) -> Candidate:
+def better(anew: Candidate | None, candidate: Candidate) -> Candidate:
+    """The refit that fits better; the first may have failed."""
     assert candidate.fit is not None
     return candidate if anew is None or anew.fit is None or anew.fit.cost >= candidate.fit.cost else anew
 

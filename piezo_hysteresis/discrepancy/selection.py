@@ -15,7 +15,7 @@ from ..identification.fit import Progress
 from ..identification.normal_equations import residuals
 from ..model import Model
 from .candidates import Candidate, alikeness, screen
-from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, contest, finest, settled, simplest
+from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, behind_the_pole, contest, finest, settled, simplest
 from .evidence import Evidence
 from .held_out import ADEQUATE, Score
 from .refit import Fitted, is_seen, is_steady, may_be_off, refit, restart, without
@@ -129,17 +129,10 @@ def _turn(
     refits = contest(model, likely, before, tell)
     if not refits:
         return None
-    best = finest(simplest(refits), before)
-    gain, left = before.cost - best.score.cost, _left(best.score, before, null)
-    alone = None
-    if gain < LEAST_GAIN or left > keeps:
-        objection: str | None = (
-            f"closest, but improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
-            f"{100 * left:.0f} % of V beyond noise stays ({100 * keeps:.0f} % at most)"
-        )
-    else:
-        alone = without(best, LATER)
-        objection = _objection(best, alone, null, keeps)
+    best, alone, objection = _judged(refits, before, null, keeps)
+    if objection is not None and (late := behind_the_pole(model, _others(screened, refits), before)):
+        refits = sorted([*refits, *late], key=lambda c: c.score.cost)
+        best, alone, objection = _judged(refits, before, null, keeps)
     accepted, rivals = objection is None, list[Candidate]()
     rejected = [] if objection is None else [Rejection(best.name, objection)]
     better = alone is not None and before.cost - alone.score.cost > 0.5 * LEAST_GAIN
@@ -148,17 +141,38 @@ def _turn(
         if candidate.name == best.name:
             continue
         lead, error = best.score.better_than(candidate.score)
-        close = lead < CLOSE * gain
+        close = lead < CLOSE * (before.cost - best.score.cost)
         if accepted and close and (lead < 2.0 * error or alikeness(best, candidate, model) > ALIKE):
             rivals.append(candidate)
         else:
             told = f"{lead:.2f} ± {error:.2f} behind {best.name} on records left out (mean ln R²)"
             rejected.append(Rejection(candidate.name, told))
-    for candidate in screened:
-        if candidate.name not in {r.name for r in refits}:
-            most = max(0.0, before.cost - candidate.score.cost)
-            rejected.append(Rejection(candidate.name, f"improves records left out by {most:.2f} at most (mean ln R²)"))
+    for candidate in _others(screened, refits):
+        most = max(0.0, before.cost - candidate.score.cost)
+        rejected.append(Rejection(candidate.name, f"improves records left out by {most:.2f} at most (mean ln R²)"))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
+
+
+def _others(screened: list[Candidate], refits: list[Candidate]) -> list[Candidate]:
+    """Those that were not refitted."""
+    names = {r.name for r in refits}
+    return [c for c in screened if c.name not in names]
+
+
+def _judged(
+    refits: list[Candidate], before: Score, null: float, keeps: float
+) -> tuple[Candidate, Fitted | None, str | None]:
+    """The best refit, the model fitted anew without it where it comes to that, and what speaks against the effect."""
+    best = finest(simplest(refits), before)
+    gain, left = before.cost - best.score.cost, _left(best.score, before, null)
+    if gain < LEAST_GAIN or left > keeps:
+        told = (
+            f"closest, but improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
+            f"{100 * left:.0f} % of V beyond noise stays ({100 * keeps:.0f} % at most)"
+        )
+        return best, None, told
+    alone = without(best, LATER)
+    return best, alone, _objection(best, alone, null, keeps)
 
 
 def _objection(best: Candidate, alone: Fitted | None, null: float, keeps: float) -> str | None:
