@@ -16,13 +16,15 @@ from scipy.linalg import lstsq
 from scipy.signal import lfilter
 
 from ..effects import Arx, Setting
-from ..errors import IdentificationError
+from ..errors import IdentificationError, ParameterError
 from ..record import Notice, Samples
 from .regressors import Signals, triangle
 
 _ALL = slice(None)
 LARGEST_POLE = 0.99999
 """Radius to which poles on or just outside the unit circle are drawn back."""
+DRAWN_IN = 0.9999
+"""Radius of the largest pole where rounding does not allow that."""
 
 PATIENCE, GAINS = 3, 0.99
 """Iterations without a gain after which no more are made, and the share of the error that a gain leaves at most."""
@@ -92,7 +94,11 @@ def _reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
         return a, b, 0
     radius = np.abs(poles[outside])
     poles[outside] *= np.minimum(1.0 / radius, LARGEST_POLE) / radius
-    return np.real(np.poly(poles))[1:], b / np.prod(np.maximum(radius, 1.0)), int(outside.sum())
+    a = np.real(np.poly(poles))[1:]
+    # poles that crowd near 1 come out of rounded coefficients elsewhere, and may be outside again: all are drawn in
+    while (largest := float(np.abs(np.roots(np.concatenate(([1.0], a)))).max())) >= 1.0:
+        a = a * (DRAWN_IN / largest) ** np.arange(1, a.size + 1)
+    return a, b / np.prod(np.maximum(radius, 1.0)), int(outside.sum())
 
 
 def _free_run_error(model: Dynamics, signals: Signals) -> float:
@@ -130,7 +136,8 @@ def identify_arx(
     Raises
     ------
     IdentificationError
-        If a record is shorter than the orders, the input does not move, or the orders make no sense.
+        If a record is shorter than the orders, the input does not move, the orders make no sense, or the output does
+        not follow the input.
 
     Notes
     -----
@@ -151,7 +158,14 @@ def identify_arx(
             theta, _ = _solve(triangle(whitened, orders, delay))
         a, b, mirrored = _reflected(theta[:na], theta[na:])
         told = (Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),)
-        arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
+        try:
+            arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
+        except ParameterError:  # the iterations run away
+            arx = None
+        if arx is None or not 1.0 + a.sum() > 0.0:
+            if not candidates:
+                raise IdentificationError("ARX: got no dynamics that settle, expected an output that follows the input")
+            break
         model = Dynamics(arx, sample_period, one_step, notices=told if mirrored else ())
         candidates.append(replace(model, free_run_error=_free_run_error(model, signals)))
         errors = [c.free_run_error for c in candidates]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.held_out import Score, held_out
+from piezo_hysteresis.discrepancy.held_out import Score, held_out, indispensable
 from piezo_hysteresis.identification.normal_equations import Gram
 
 RANDOM = np.random.default_rng(5)
@@ -54,6 +54,14 @@ def test_a_direction_that_the_other_records_do_not_see_stays_where_it_is(problem
     with_it = held_out(products(only_here, measured), FLOORS, columns)
     without = held_out(products(designs, measured), FLOORS, COLUMNS)
     assert with_it.ratios[0] == pytest.approx(without.ratios[0], rel=1e-9)
+
+
+def test_the_one_record_that_tells_a_number_is_indispensable(problem):
+    designs, measured = problem
+    for tell, wanted in ((range(4), ()), ((2, 3), ()), ((2,), (2,))):
+        seen = [np.column_stack((x, float(i in tell) * RANDOM.normal(size=len(x)))) for i, x in enumerate(designs)]
+        columns = np.vstack((np.eye(4), np.zeros((1, 4))))
+        assert indispensable(products(seen, measured), FLOORS, columns) == wanted
 
 
 def test_records_that_only_carry_the_state_do_not_count(problem):
