@@ -14,7 +14,7 @@ from ..identification.delay import identify_delay
 from ..identification.dynamics import delay_of
 from ..identification.hysteresis import fit_hysteresis
 from ..identification.identify import identify
-from ..identification.linear_start import dynamics_behind, follower, hysteresis_signals, with_dynamics
+from ..identification.linear_start import ITERATIONS, dynamics_behind, follower, hysteresis_signals, with_dynamics
 from ..identification.roles import roles_of
 from ..model import Model
 from ..record import Experiment, Record
@@ -23,7 +23,7 @@ ORDERS = (8, 8)
 """na and nb, as in the paper; the joint fit leaves at zero what the data do not ask for."""
 
 
-def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
+def start_model(records: Sequence[Record], fitted: Collection[int], iterations: int = ITERATIONS) -> Model:
     """Hysteresis from the slow loops, delay from the steps, dynamics from the broadband records.
 
     Parameters
@@ -32,6 +32,8 @@ def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
         The experiment, in order.
     fitted : collection of int
         Indices of the records that may be used.
+    iterations : int
+        With which the dynamics are found, at most.
     """
     experiment = Experiment(tuple(records))
     roles = roles_of(experiment)
@@ -53,7 +55,7 @@ def start_model(records: Sequence[Record], fitted: Collection[int]) -> Model:
     delay = delay or delay_of(hysteresis_signals(start, records, broadband))
     for chosen in (broadband, [i for i in at_full_rate if not roles.contents[i].is_slow]):
         try:
-            return with_dynamics(start, dynamics_behind(start, records, chosen, delay, ORDERS).arx)
+            return with_dynamics(start, dynamics_behind(start, records, chosen, delay, ORDERS, iterations).arx)
         except IdentificationError:  # noise without low frequencies, or behind narrow plays, leaves the dc gain open
             continue
     return start.with_effect(follower(start, delay, ORDERS))

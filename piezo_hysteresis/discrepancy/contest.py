@@ -89,7 +89,7 @@ def settled(candidate: Candidate, before: Score) -> Candidate:
         candidate = proceed(candidate, LATER)
         if candidate.score.excess <= ADEQUATE or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:
             break
-        candidate = restart(candidate, FIRST)
+        candidate = restart(candidate, LATER)
         assert candidate.fit is not None
         if candidate.fit.cost > WORTHWHILE * cost:
             break

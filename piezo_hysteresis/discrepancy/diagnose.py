@@ -27,7 +27,7 @@ from .localise import localise
 from .next_experiment import decide
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
-from .refit import joint, restart
+from .refit import FEW_ITERATIONS, joint, restart
 from .sampling import at_period, common_period, shortened, slowed
 from .selection import NAMED, select
 from .split import reporting
@@ -105,6 +105,10 @@ def diagnose(
     baseline = joint(start, evidence, LAST, PRECISE)
     evidence = with_indispensable(baseline.model, evidence)
     score = score_model(baseline.model, evidence)
+    if model is None and score.excess > ADEQUATE:  # what is missing may have led the iterations astray
+        other = joint(exact(start_model(records, fitted, FEW_ITERATIONS)), evidence, LAST, PRECISE)
+        if other.cost < baseline.cost:
+            baseline, score = other, score_model(other.model, evidence)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
 
     tell("where", 0.35)

@@ -16,7 +16,7 @@ from ..effects import Arx, MainsHum
 from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ..identification.dynamics import identify_arx
 from ..identification.fit import Fit, fit
-from ..identification.linear_start import dynamics_behind, hysteresis_signals, with_dynamics
+from ..identification.linear_start import ITERATIONS, dynamics_behind, hysteresis_signals, with_dynamics
 from ..model import Model
 from .candidates import Candidate, free_numbers, score_model
 from .evidence import Evidence
@@ -24,8 +24,8 @@ from .held_out import Score
 
 LINEAR = ("lag", "dynamics")
 """Families that dynamics of an order high enough can hold."""
-IMITATIONS = 12
-"""Steiglitz-McBride iterations at most with which dynamics imitate others."""
+FEW_ITERATIONS = 3
+"""Steiglitz-McBride iterations of dynamics that are tried beside those of more."""
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Periods of the mains in a record that tells its amplitude, sample period in periods, and records."""
 STEADY = 0.3
@@ -102,8 +102,8 @@ def restart(candidate: Candidate, max_iterations: int) -> Candidate:
     The dynamics of the model before were bent by the effect it lacked; from there a joint fit has a long way to go.
     """
     assert candidate.fit is not None
-    anew = _behind_anew(candidate.fit.model, candidate)
-    return candidate if anew is None else better(_refitted(anew, candidate, max_iterations), candidate)
+    anew = _behind_anew(candidate.fit.model, candidate.evidence)
+    return candidate if anew is None else better(_refitted(anew.model, candidate, max_iterations), candidate)
 
 
 def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
@@ -112,28 +112,28 @@ def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> 
     Every start is judged behind dynamics found anew: noise that a limit cuts to pieces bends the dynamics so much that
     every size has a valley of its own.
     """
-    found = []
-    for start in type(candidate.effect).starts(candidate.evidence.extent):
-        anew = _behind_anew(model.with_effect(start), candidate)
-        if anew is not None:
-            with suppress(DivergenceError):
-                found.append(Fitted(anew, score_model(anew, candidate.evidence)))
-    best = min(found, key=lambda f: f.score.cost, default=None)
+    starts = type(candidate.effect).starts(candidate.evidence.extent)
+    found = [_behind_anew(model.with_effect(start), candidate.evidence) for start in starts]
+    best = min((f for f in found if f is not None), key=lambda f: f.score.cost, default=None)
     return None if best is None else _refitted(best.model, candidate, max_iterations)
 
 
-def _behind_anew(model: Model, candidate: Candidate) -> Model | None:
-    """The model with dynamics found anew; None where the records do not tell them."""
-    evidence, arx = candidate.evidence, model["arx"]
-    broadband = evidence.broadband()
+def _behind_anew(model: Model, evidence: Evidence) -> Fitted | None:
+    """The model with dynamics found anew; None where the records do not tell them.
+
+    Iterations that describe the broadband records better, by a lack that is still there, may describe the others worse.
+    """
+    broadband, arx = evidence.broadband(), model["arx"]
     if not broadband or not isinstance(arx, Arx):
         return None
     orders = (arx.array("a").size, arx.array("b").size)
-    try:
-        found = dynamics_behind(model, evidence.records, broadband, round(arx["delay"]), orders)
-        return with_dynamics(model, found.arx)
-    except (DivergenceError, ParameterError, ModelError, IdentificationError):
-        return None
+    found = []
+    for iterations in (FEW_ITERATIONS, ITERATIONS):
+        with suppress(DivergenceError, ParameterError, ModelError, IdentificationError):
+            dynamics = dynamics_behind(model, evidence.records, broadband, round(arx["delay"]), orders, iterations)
+            anew = with_dynamics(model, dynamics.arx)
+            found.append(Fitted(anew, score_model(anew, evidence)))
+    return min(found, key=lambda f: f.score.cost, default=None)
 
 
 def better(anew: Candidate | None, candidate: Candidate) -> Candidate:
@@ -228,7 +228,7 @@ def _absorbed(model: Model, extended: Model, evidence: Evidence) -> Model | None
     signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
     try:
         orders = (arx.array("a").size, arx.array("b").size)
-        found = identify_arx(signals, round(arx["delay"]), model.sample_period, orders, IMITATIONS)
+        found = identify_arx(signals, round(arx["delay"]), model.sample_period, orders, ITERATIONS)
         return with_dynamics(model, found.arx)
     except (IdentificationError, ParameterError, DivergenceError):
         return None

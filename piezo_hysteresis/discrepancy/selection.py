@@ -23,6 +23,8 @@ from .steps import MANY, Rejection, Selection, Step, typical
 
 ALONE = 4.0
 """Residual in floors up to which one record alone asks for no further effect."""
+DECISIVE = 0.5
+"""Gain over the model fitted anew without an effect from which it needs no other proof that it is not off."""
 KEEPS = (0.8, 0.5)
 """Share of V beyond noise that may remain after the first accepted effect, and after further ones."""
 NAMED = 0.6
@@ -125,7 +127,13 @@ def _turn(
     evidence = evidence.with_peaks(residuals(model, evidence.records, evidence.nuisance))
     present = {e.public_name() for e in model.effects}
     screened = screen(model, evidence, [e for e in effects if e.public_name() not in present])
-    likely = [c for k, c in enumerate(screened[:REFITS]) if k < 2 or before.cost - c.score.cost > HOPELESS]
+    likely = [
+        c
+        for k, c in enumerate(screened)
+        # forms of the same effect are told apart by their refits
+        if (k < REFITS or c.effect.public_name() == screened[0].effect.public_name())
+        and (k < 2 or before.cost - c.score.cost > HOPELESS)
+    ]
     refits = contest(model, likely, before, tell)
     if not refits:
         return None
@@ -177,11 +185,12 @@ def _judged(
 
 def _objection(best: Candidate, alone: Fitted | None, null: float, keeps: float) -> str | None:
     """Why a refit that gains enough is no effect, beside the model fitted anew without it; None where it is one."""
+    owed = 0.0
     if alone is not None:
         owed = alone.score.cost - best.score.cost
         if owed < LEAST_GAIN or _left(best.score, alone.score, null) > keeps:
             return f"gains {owed:.2f} over the model fitted anew without it"
-    if may_be_off(best):
+    if owed < DECISIVE and may_be_off(best):
         return "all its numbers could as well be off"
     if not is_seen(best):
         return "changes no record by as much as half its floor"

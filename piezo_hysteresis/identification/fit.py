@@ -18,6 +18,8 @@ from .step import bounded_step
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
+TRUSTED = 1.0
+"""Damping up to which a small decrease is a sign of the end."""
 MAX_DAMPING = 1e10
 
 
@@ -197,7 +199,7 @@ def fit(
         damping = max(damping / 10.0, 1e-12)
         total = weighted(current, sizes)
         iterations += 1
-        converged = decrease < tolerance
+        converged = decrease < tolerance and damping < TRUSTED  # a step that was held back tells nothing
         if progress is not None:
             progress("joint fit", iterations / max_iterations)
     return Fit(

@@ -32,7 +32,12 @@ def hysteresis_signals(model: Model, records: Sequence[Record], wanted: Collecti
 
 
 def dynamics_behind(
-    model: Model, records: Sequence[Record], broadband: Collection[int], delay: int, orders: tuple[int, int]
+    model: Model,
+    records: Sequence[Record],
+    broadband: Collection[int],
+    delay: int,
+    orders: tuple[int, int],
+    iterations: int = ITERATIONS,
 ) -> Dynamics:
     """ARX from w of the model's hysteresis, its dc gain set to that of the model's `Arx`.
 
@@ -48,8 +53,10 @@ def dynamics_behind(
         d, samples.
     orders : (int, int)
         na and nb.
+    iterations : int
+        Steiglitz-McBride iterations at most.
     """
-    return identify_arx(hysteresis_signals(model, records, broadband), delay, model.sample_period, orders, ITERATIONS)
+    return identify_arx(hysteresis_signals(model, records, broadband), delay, model.sample_period, orders, iterations)
 
 
 def with_dynamics(model: Model, arx: Arx) -> Model:
