@@ -15,6 +15,7 @@ from std_msgs.msg import Float64, String
 from ..errors import RecordError, RecordingError
 from ..recording import BagWriter
 from .conversions import samples_from_cloud
+from .node_clock import now
 from .quality import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES
 
 TOPICS = {
@@ -113,7 +114,7 @@ class BagRecorder:
         if self.failure is not None:
             return
         try:
-            self._bag.write(topic, self._node.get_clock().now().nanoseconds, message)
+            self._bag.write(topic, now(self._node), message)
         except RecordingError as error:
             self.failure = error
         self.counts[name] += 1

@@ -25,6 +25,7 @@ from .conversions import SAMPLES as POINT
 from .conversions import SampleBlock, samples_from_cloud
 from .model_diagnostics import ModelDiagnostics
 from .model_topics import ModelTopics
+from .node_clock import now
 from .parameters import Row, Setting, declare, read
 from .process import run
 from .quality import DEEP, LATCHED
@@ -78,7 +79,7 @@ class ModelNode(Node):
         except PiezoError as error:
             self._diagnostics.problem(str(error))
             return
-        self._diagnostics.saw(block, self.get_clock().now().nanoseconds)
+        self._diagnostics.saw(block, now(self))
         if answer.model is not None and answer.prediction.size:
             kept = {name: getattr(block, name)[answer.first :] for name in POINT}
             self._topics.publish(replace(block, **kept), answer, predictor)
