@@ -16,8 +16,9 @@ from rosbags.typesys import Stores, get_typestore
 from ..errors import RecordingError
 from .damage import naming
 
-CHUNK_BYTES = 256 * 1024
-"""Messages are indexed and written in chunks of this size; a cut file loses at most the last one."""
+CHUNK_BYTES = 128 * 1024
+"""Messages are indexed and written in chunks of this size; a cut file loses at most the last one. Larger ones are given
+back to the operating system every time, and fetched from it page by page."""
 
 FLUSH_INTERVAL = 0.5
 """Longest time for which a message stays in memory while others arrive [s]: no message older than a second is lost."""
