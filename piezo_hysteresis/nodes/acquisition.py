@@ -12,12 +12,12 @@ import numpy as np
 
 from ..errors import PiezoError, StageError
 from ..stage.stage import Acquired, Samples, Stage, StreamingStage
-from .conversions import SampleBlock
 from .device_clock import DeviceClock
 from .drive import Drive, Event, Phase
 from .late_drive import LateDrive
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
+from .sample_block import SampleBlock
 from .time_base import TimeBase, read_together
 
 _WRAP = 1 << 32

@@ -8,14 +8,14 @@ from pathlib import Path
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
 
 from ..errors import RecordError, RecordingError
 from ..recording import BagWriter
-from .conversions import samples_from_cloud
+from .node_clock import now
 from .quality import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES
+from .sample_block import SampleReader
 
 TOPICS = {
     "samples": (PointCloud2, SAMPLES),
@@ -66,7 +66,7 @@ class BagRecorder:
         self.counts = dict.fromkeys(TOPICS, 0)
         self.failure: RecordingError | None = None
         self._last = time.monotonic()
-        self._newest = b""
+        self._newest, self._reader = b"", SampleReader()
         self._subscriptions = [self._subscribe(name) for name in TOPICS]
 
     @property
@@ -79,7 +79,7 @@ class BagRecorder:
         if not self._newest:
             return False
         try:
-            newest = int(samples_from_cloud(deserialize_message(self._newest, PointCloud2)).index[-1])
+            newest = int(self._reader.read(self._newest).index[-1])
         except RecordError:
             return False
         return (newest - index) % 2**32 < 2**31
@@ -113,7 +113,7 @@ class BagRecorder:
         if self.failure is not None:
             return
         try:
-            self._bag.write(topic, self._node.get_clock().now().nanoseconds, message)
+            self._bag.write(topic, now(self._node), message)
         except RecordingError as error:
             self.failure = error
         self.counts[name] += 1

@@ -28,6 +28,9 @@ _DATATYPES = {
 }
 _CODES = {word: code for code, word in _DATATYPES.items()}
 
+Wanted = tuple[tuple[str, str], ...]
+"""Field names with their numpy types."""
+
 
 def to_cloud(
     columns: Mapping[str, ArrayLike], layout: Mapping[str, str], stamp: Time, frame_id: str = "", *, dense: bool = True
@@ -91,6 +94,13 @@ def from_cloud(
     RecordError
         On a missing field, a wrong type, sizes that contradict one another, no point, or a value that is not finite.
     """
+    return unpacked(cloud.data, *stored_as(cloud, required, optional))
+
+
+def stored_as(
+    cloud: PointCloud2, required: Mapping[str, str], optional: Mapping[str, str] | None = None
+) -> tuple[np.dtype, Wanted]:
+    """Type of the points in the data of a cloud, and numpy types of the wanted fields; see `from_cloud`."""
     count = cloud.width * cloud.height
     step = cloud.point_step
     if count == 0:
@@ -105,8 +115,12 @@ def from_cloud(
         )
     fields = tuple(_Field(field.name, field.offset, field.datatype, field.count) for field in cloud.fields)
     given = tuple(required.items()), tuple(optional.items()) if optional else ()
-    dtype, wanted = _stored(fields, step, cloud.is_bigendian, *given)
-    points = np.frombuffer(cloud.data, dtype=dtype)
+    return _stored(fields, step, cloud.is_bigendian, *given)
+
+
+def unpacked(data: bytes | array.array[int] | memoryview, dtype: np.dtype, wanted: Wanted) -> dict[str, NDArray]:
+    """The wanted fields of the data of a cloud as contiguous arrays; RecordError on a value that is not finite."""
+    points = np.frombuffer(data, dtype=dtype)
     arrays: dict[str, NDArray] = {}
     for name, word in wanted:
         arrays[name] = values = points[name].astype(word)
@@ -141,13 +155,10 @@ class _Field(NamedTuple):
         return word
 
 
-_Wanted = tuple[tuple[str, str], ...]
-
-
 @lru_cache(maxsize=8)
 def _stored(
-    fields: tuple[_Field, ...], step: int, big_endian: bool, required: _Wanted, optional: _Wanted
-) -> tuple[np.dtype, _Wanted]:
+    fields: tuple[_Field, ...], step: int, big_endian: bool, required: Wanted, optional: Wanted
+) -> tuple[np.dtype, Wanted]:
     """The wanted fields of a point: looked for once, for a stream brings the same ones with every message."""
     wanted = dict(optional + required)
     order = ">" if big_endian else "<"

@@ -12,6 +12,7 @@ from .conversions import from_stamp
 from .driver_diagnostics import DriverDiagnostics
 from .driver_session import DriverSession
 from .driver_topics import DriverTopics
+from .node_clock import now
 from .phase_text import phase_name
 from .quality import COMMAND
 
@@ -52,16 +53,13 @@ class DriverCommands:
             raise StageError("the driver is not configured; configure and activate it")
         return self._attached
 
-    def _now(self) -> int:
-        return int(self._node.get_clock().now().nanoseconds)
-
     def _on_command(self, cloud: PointCloud2) -> None:
         name, stamp = cloud.header.frame_id[:_LONGEST_NAME], 0
         try:
             stamp = from_stamp(cloud.header.stamp)
             session, topics = self._stage()
             name = phase_name(cloud.header.frame_id)
-            waveform = session.check.waveform(cloud, self._now())
+            waveform = session.check.waveform(cloud, now(self._node))
             phase = session.streaming.play(waveform, name, stamp, session.check.first_step, topics.accepted)
         except PiezoError as error:
             self._refuse(name, stamp, error)

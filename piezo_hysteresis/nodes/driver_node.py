@@ -21,6 +21,7 @@ from .driver_diagnostics import DriverDiagnostics
 from .driver_session import DriverSession
 from .driver_settings import DRIVER, IN_FORCE, DriverSettings
 from .driver_topics import DriverTopics
+from .node_clock import now
 from .parameters import declare, read
 from .process import run
 from .quality import SAMPLES
@@ -94,7 +95,7 @@ class DriverNode(LifecycleNode):
         assert self._session is not None and self._topics is not None
         self._failure = None
         topics, session = self._topics, self._session
-        acquisition = session.start(self._now, topics.deliver, self._fail, lambda: topics.subscribers)
+        acquisition = session.start(lambda: now(self), topics.deliver, self._fail, lambda: topics.subscribers)
         self._diagnostics.watch(acquisition, session.settings.real_time_factor / session.sample_period)
         self._diagnostics.state(DiagnosticStatus.OK, "streaming", session.limits.name)
         return done
@@ -194,9 +195,6 @@ class DriverNode(LifecycleNode):
             if reason:
                 return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
-
-    def _now(self) -> int:
-        return int(self.get_clock().now().nanoseconds)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

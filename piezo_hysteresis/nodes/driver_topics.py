@@ -9,9 +9,10 @@ from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
 
 from .acquisition import Delivery
-from .conversions import SampleBlock, diagnostic, live, samples_to_cloud, to_stamp
+from .conversions import diagnostic, live, to_stamp
 from .drive import Event, Happening, Phase
 from .quality import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
+from .sample_block import SampleBlock, SampleWriter
 from .sending import send
 
 _STATES = {Happening.BEGAN: "playing", Happening.DONE: "done", Happening.STOPPED: "stopped"}
@@ -37,6 +38,7 @@ class DriverTopics:
         self._live_step = max(1, round(1 / (live_rate * sample_period)))
         self._next_live = 0
         self._first: dict[int, int] = {}
+        self._writer = SampleWriter()
         self._samples = node.create_lifecycle_publisher(
             PointCloud2, "samples", SAMPLES, qos_overriding_options=QoSOverridingOptions.with_default_policies()
         )
@@ -65,7 +67,7 @@ class DriverTopics:
         for event in begun:
             send(self._phase, String(data=str(event.phase)))
             self._tell(event, delivery.first)
-        if not send(self._samples, samples_to_cloud(delivery.block)):
+        if not send(self._samples, self._writer.write(delivery.block)):
             told = f"a block of {delivery.block.size} samples was not taken by the middleware; it is lost"
             self._node.get_logger().warning(told)
         for event in ended:

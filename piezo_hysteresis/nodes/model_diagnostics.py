@@ -12,7 +12,8 @@ from rclpy.node import Node
 from ..model import Model
 from ..model_parameters import model_hash
 from ..predictor import Predictor
-from .conversions import SampleBlock, diagnostic
+from .conversions import diagnostic
+from .sample_block import SampleBlock
 from .sending import send
 
 _LONGEST_REASON = 500

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from rcl_interfaces.msg import SetParametersResult
@@ -21,13 +20,13 @@ from ..parameter import Parameter
 from ..predictor import Predictor
 from ..recording.time_base import round_period
 from ..warmup import compile_kernels
-from .conversions import SAMPLES as POINT
-from .conversions import SampleBlock, samples_from_cloud
 from .model_diagnostics import ModelDiagnostics
 from .model_topics import ModelTopics
+from .node_clock import now
 from .parameters import Row, Setting, declare, read
 from .process import run
 from .quality import DEEP, LATCHED
+from .sample_block import SampleBlock, SampleReader
 
 _SOURCE = "model node"
 
@@ -51,6 +50,7 @@ class ModelNode(Node):
         self._model: Model | None = None
         self._predictor: Predictor | None = None
         self._before: SampleBlock | None = None
+        self._reader = SampleReader()
         self._topics = ModelTopics(self)
         self._diagnostics = ModelDiagnostics(self, self._values["residual_warn"], self._values["residual_error"])
         if self._values["model_file"]:
@@ -58,12 +58,12 @@ class ModelNode(Node):
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._apply)
         self.create_subscription(String, "model", self._on_model, LATCHED)
-        self.create_subscription(PointCloud2, "samples", self._on_samples, DEEP)
+        self.create_subscription(PointCloud2, "samples", self._on_samples, DEEP, raw=True)
         self.create_service(Trigger, "~/zero", self._on_zero)
 
-    def _on_samples(self, cloud: PointCloud2) -> None:
+    def _on_samples(self, message: bytes) -> None:
         try:
-            block = samples_from_cloud(cloud)
+            block = self._reader.read(message)
             predictor = self._predictor_for(block)
             if predictor is None:
                 return
@@ -78,10 +78,9 @@ class ModelNode(Node):
         except PiezoError as error:
             self._diagnostics.problem(str(error))
             return
-        self._diagnostics.saw(block, self.get_clock().now().nanoseconds)
+        self._diagnostics.saw(block, now(self))
         if answer.model is not None and answer.prediction.size:
-            kept = {name: getattr(block, name)[answer.first :] for name in POINT}
-            self._topics.publish(replace(block, **kept), answer, predictor)
+            self._topics.publish(block.after(answer.first), answer, predictor)
 
     def _predictor_for(self, block: SampleBlock) -> Predictor | None:
         """The predictor of the stream, made anew for another sample period; None before that is known."""

@@ -10,8 +10,9 @@ from std_msgs.msg import Float64
 from ..model import Model
 from ..model_parameters import hash_number
 from ..predictor import Prediction, Predictor
-from .conversions import SampleBlock, live, predicted_to_cloud, to_stamp
+from .conversions import live, to_stamp
 from .quality import COMMAND, SAMPLES
+from .sample_block import PredictionWriter, SampleBlock
 from .sending import send
 
 
@@ -28,6 +29,7 @@ class ModelTopics:
         self._live_rate = float(node.get_parameter("live_rate").value)
         self._next_live = 0
         self._named: tuple[Model, int] | None = None
+        self._writer = PredictionWriter()
         self._samples = node.create_publisher(
             PointCloud2,
             "predicted_samples",
@@ -44,7 +46,7 @@ class ModelTopics:
         assert answer.model is not None
         if self._named is None or self._named[0] is not answer.model:
             self._named = (answer.model, hash_number(answer.model))
-        told = predicted_to_cloud(
+        told = self._writer.write(
             block, answer.prediction, answer.residual, self._named[1], valid=not answer.warming_up
         )
         send(self._samples, told)

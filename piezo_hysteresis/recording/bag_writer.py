@@ -16,8 +16,9 @@ from rosbags.typesys import Stores, get_typestore
 from ..errors import RecordingError
 from .damage import naming
 
-CHUNK_BYTES = 256 * 1024
-"""Messages are indexed and written in chunks of this size; a cut file loses at most the last one."""
+CHUNK_BYTES = 128 * 1024
+"""Messages are indexed and written in chunks of this size; a cut file loses at most the last one. Larger ones are given
+back to the operating system every time, and fetched from it page by page."""
 
 FLUSH_INTERVAL = 0.5
 """Longest time for which a message stays in memory while others arrive [s]: no message older than a second is lost."""
@@ -58,6 +59,8 @@ class BagWriter:
         self._topics: dict[str, dict[str, Any]] = {}
         self._counts: dict[str, int] = {}
         self._first = self._last = 0
+        self._waiting: list[tuple[int, int, bytes, int, int]] = []
+        self._waiting_bytes = 0
         with naming(self.path, _EXPECTED):
             self.path.mkdir(parents=True)
             self._stream = self._file.open("xb")
@@ -146,19 +149,19 @@ class BagWriter:
         if topic not in self._channels:
             raise RecordingError(f"{self.path}: topic '{topic}' was not added; expected one of {list(self._channels)}")
         count = self._counts[topic]
-        with self._ending_on_failure():
-            self._mcap.add_message(self._channels[topic], time_ns, bytes(message), time_ns, count)
-            if time.monotonic() - self._flushed >= FLUSH_INTERVAL:
-                self.flush()
+        self._waiting.append((self._channels[topic], time_ns, bytes(message), time_ns, count))
+        self._waiting_bytes += len(message)
         self._counts[topic] = count + 1
         self._first = min(self._first, time_ns) if self._last else time_ns
         self._last = max(self._last, time_ns)
+        if self._waiting_bytes >= CHUNK_BYTES or time.monotonic() - self._flushed >= FLUSH_INTERVAL:
+            self.flush()
 
     def flush(self) -> None:
         """Hand everything written so far to the operating system, so that killing this process cannot lose it."""
         self._check_open()
         with self._ending_on_failure():
-            self._mcap.flush()
+            self._write_chunk()
         self._flushed = time.monotonic()
 
     def close(self) -> None:
@@ -166,12 +169,19 @@ class BagWriter:
         if not self._open:
             return
         with self._ending_on_failure():
-            self._mcap.flush()
+            self._write_chunk()
             self._mcap.add_metadata("rosbag2", {"serialized_metadata": yaml.safe_dump(self._information())})
             self._mcap.finish()
             self._stream.close()
             self._write_metadata()
         self._open = False
+
+    def _write_chunk(self) -> None:
+        """Write what waits: together, for between two blocks the processor forgets how to do it."""
+        waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
+        for message in waiting:
+            self._mcap.add_message(*message)
+        self._mcap.flush()
 
     def _check_open(self) -> None:
         if not self._open:

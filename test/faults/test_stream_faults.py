@@ -18,8 +18,9 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import String
 
 from piezo_hysteresis.model_file import dumps, save
-from piezo_hysteresis.nodes.conversions import samples_to_cloud, to_stamp, values_of
+from piezo_hysteresis.nodes.conversions import to_stamp, values_of
 from piezo_hysteresis.nodes.quality import LATCHED
+from piezo_hysteresis.nodes.sample_block import samples_to_cloud
 
 from .stream import FALSE, MODEL, PERIOD, SIZE, Stream, foreign, predictions, spoilt, with_bytes
 

@@ -25,8 +25,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 
-from piezo_hysteresis.nodes.conversions import SampleBlock, command_to_cloud, samples_from_cloud, values_of
+from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS, LATCHED
+from piezo_hysteresis.nodes.sample_block import SampleBlock, samples_from_cloud
 
 PATIENCE = 60.0
 

@@ -17,8 +17,9 @@ from piezo_hysteresis.model_file import dumps, load
 from piezo_hysteresis.model_parameters import from_parameters, hash_number
 from piezo_hysteresis.nodes.bag_recorder import BagRecorder
 from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import PREDICTED_SAMPLES, values_of
+from piezo_hysteresis.nodes.conversions import values_of
 from piezo_hysteresis.nodes.quality import LATCHED, SAMPLES
+from piezo_hysteresis.nodes.sample_block import PREDICTED_SAMPLES
 from piezo_hysteresis.recording import read
 from piezo_hysteresis.report.json_file import read_json
 from piezo_hysteresis.stage.plant import PlantParameters

@@ -21,9 +21,9 @@ from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model import Model
 from piezo_hysteresis.nodes.acquisition import Delivery
 from piezo_hysteresis.nodes.bag_recorder import TOPICS
-from piezo_hysteresis.nodes.conversions import SampleBlock
 from piezo_hysteresis.nodes.driver_topics import DriverTopics
 from piezo_hysteresis.nodes.model_topics import ModelTopics
+from piezo_hysteresis.nodes.sample_block import SampleBlock
 from piezo_hysteresis.predictor import Predictor
 
 CONFIG = Path(__file__).parents[2] / "config"

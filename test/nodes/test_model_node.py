@@ -17,8 +17,9 @@ from piezo_hysteresis.model import Model
 from piezo_hysteresis.model_file import dumps, save
 from piezo_hysteresis.model_parameters import hash_number, model_hash
 from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import PREDICTED_SAMPLES, SampleBlock, samples_to_cloud, values_of
+from piezo_hysteresis.nodes.conversions import values_of
 from piezo_hysteresis.nodes.quality import LATCHED, SAMPLES
+from piezo_hysteresis.nodes.sample_block import PREDICTED_SAMPLES, SampleBlock, samples_to_cloud
 from piezo_hysteresis.predictor import Predictor
 
 pytestmark = pytest.mark.nodes

@@ -20,8 +20,9 @@ from piezo_hysteresis.model import Model
 from piezo_hysteresis.model_file import save
 from piezo_hysteresis.nodes.bag_recorder import BagRecorder
 from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import PREDICTED_SAMPLES, values_of
+from piezo_hysteresis.nodes.conversions import values_of
 from piezo_hysteresis.nodes.quality import COMMAND_STATUS, DEEP
+from piezo_hysteresis.nodes.sample_block import PREDICTED_SAMPLES
 from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.recording import Bag, read, write
 

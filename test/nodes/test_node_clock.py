@@ -1,0 +1,37 @@
+"""The time of a node is the computer's, and simulated time where that is asked for."""
+
+import time
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.parameter import Parameter
+from rclpy.time import Time
+
+from piezo_hysteresis.nodes.node_clock import now
+
+pytestmark = pytest.mark.nodes
+
+
+@pytest.fixture
+def node():
+    context = Context()
+    rclpy.init(context=context)
+    node = rclpy.create_node("node_clock", context=context)
+    yield node
+    node.destroy_node()
+    context.shutdown()
+
+
+def test_between_two_looks_at_the_clock_of_the_computer(node):
+    before = time.time_ns()
+    assert before <= now(node) <= time.time_ns()
+    assert now(node) <= node.get_clock().now().nanoseconds
+
+
+def test_simulated_time_from_when_it_is_asked_for(node):
+    node.set_parameters([Parameter("use_sim_time", value=True)])
+    node.get_clock().set_ros_time_override(Time(nanoseconds=123))
+    assert now(node) == 123
+    node.set_parameters([Parameter("use_sim_time", value=False)])
+    assert now(node) > 123
