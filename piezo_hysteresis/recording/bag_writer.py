@@ -177,7 +177,7 @@ class BagWriter:
         self._open = False
 
     def _write_chunk(self) -> None:
-        """Write what waits: together, for between two blocks the processor forgets how to do it."""
+        """Write what waits, all at once: one by one, each between two blocks, takes longer."""
         waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
         for message in waiting:
             self._mcap.add_message(*message)
