@@ -52,13 +52,20 @@ def start_model(records: Sequence[Record], fitted: Collection[int], iterations: 
     reach = max(float(r.displacement.max() - r.displacement.min()) for r in records)
     frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1)), period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
-    delay = delay or delay_of(hysteresis_signals(start, records, broadband))
+    delay = delay or _delay_without_steps(start, records, broadband)
     for chosen in (broadband, [i for i in at_full_rate if not roles.contents[i].is_slow]):
         try:
             return with_dynamics(start, dynamics_behind(start, records, chosen, delay, ORDERS, iterations).arx)
         except IdentificationError:  # noise without low frequencies, or behind narrow plays, leaves the dc gain open
             continue
     return start.with_effect(follower(start, delay, ORDERS))
+
+
+def _delay_without_steps(model: Model, records: Sequence[Record], broadband: Collection[int]) -> int:
+    """The delay that noise shows, unless dynamics describe it better without one: hum hides the first response."""
+    found = delay_of(hysteresis_signals(model, records, broadband))
+    errors = {d: dynamics_behind(model, records, broadband, d, ORDERS).free_run_error for d in (1, found)}
+    return min(errors, key=errors.__getitem__)
 
 
 def exact(model: Model) -> Model:

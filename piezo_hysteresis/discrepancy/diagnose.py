@@ -28,7 +28,7 @@ from .next_experiment import decide
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
 from .refit import FEW_ITERATIONS, joint, restart
-from .sampling import at_period, common_period, shortened, slowed
+from .sampling import NOISE_WIDTH, at_period, common_period, quieted, shortened, slowed, voltage_noise
 from .selection import NAMED, select
 from .split import reporting
 from .steps import Selection
@@ -80,6 +80,9 @@ def diagnose(
         If the records are faster than the model.
     """
     tell = progress or (lambda word, fraction: None)
+    noise_of_drive = voltage_noise(experiment.records)
+    if noise_of_drive:
+        experiment = _quieted(experiment, noise_of_drive)
     records = tuple(slowed(r) for r in experiment.records)
     severe = [n for n in experiment.notices if n.severe]
     usable = [i for i, r in enumerate(records) if r.phase not in IDLE and not r.truncated]
@@ -153,6 +156,12 @@ def diagnose(
         next_experiment=decide(selection, evidence),
         notices=(*experiment.notices, *beyond_reach([records[i] for i in usable])),
     )
+
+
+def _quieted(experiment: Experiment, noise: float) -> Experiment:
+    told = f"the voltage was measured with {noise:.2g} V of noise; turns within {NOISE_WIDTH:g} times that are left out"
+    records = tuple(quieted(r, noise) for r in experiment.records)
+    return replace(experiment, records=records, notices=(*experiment.notices, Notice("voltage_noise", told)))
 
 
 def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:

@@ -20,6 +20,7 @@ ADEQUATE = 1.5
 """Mean R² up to which nothing is missing beyond noise."""
 RIDGE = 1e-9
 """Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
+TINY = 1e-200
 SPOILT = 0.2
 """Error from noise alone, in R², beyond which a record says nothing when it is left out."""
 FARTHEST = 100.0
@@ -90,7 +91,7 @@ def held_out(
         power.append(weight * gram.matrix[-1, -1])
     hessians, slopes = np.array(inner), np.array(cross)
     hessian, slope = hessians.sum(axis=0), slopes.sum(axis=0)
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    scale = _scale(hessian)
     left = np.array(spared, dtype=float) * (len(inner) > 1)
     steps = _solve(hessian - left[:, None, None] * hessians, slope - left[:, None] * slopes, scale)
     changes = np.einsum("rj,rjk,rk->r", steps, hessians, steps) - 2.0 * np.sum(steps * slopes, axis=1)
@@ -112,12 +113,20 @@ def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, column
     counted = [i for i, floor in enumerate(floors) if np.isfinite(floor)]
     hessians = [columns.T @ grams[i].matrix @ columns / (grams[i].size * floors[i] ** 2) for i in counted]
     total = np.sum(hessians, axis=0)
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(total), 1e-300))
+    scale = _scale(total)
     values, vectors = np.linalg.eigh(total * np.outer(scale, scale))
     known = values > RIDGE * values[-1]
+    if not known.any():
+        return ()
     whitened = vectors[:, known] / np.sqrt(values[known]) * scale[:, None]
     shares = [float(np.linalg.eigvalsh(whitened.T @ h @ whitened)[-1]) for h in hessians]
     return tuple(i for i, share in zip(counted, shares, strict=True) if share > SPOILT * grams[i].size * (1.0 - share))
+
+
+def _scale(hessian: Array) -> Array:
+    """Unit of every direction; none for one without influence, of which rounding may leave less than nothing."""
+    power = np.diag(hessian)
+    return np.where(power > TINY, 1.0 / np.sqrt(np.maximum(power, TINY)), 0.0)
 
 
 def _solve(matrices: Array, rights: Array, scale: Array) -> Array:

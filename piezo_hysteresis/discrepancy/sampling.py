@@ -14,11 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from ..effects.backlash import run_play
 from ..identification.content import content_of
 from ..record import Record
 
 Array = NDArray[np.float64]
 
+FEWEST_BENDS = 50
+"""Second differences of a voltage that tell its noise."""
+WHITE = 0.65
+"""Share of second differences that have another sign than the next: 0.73 in white noise, 0.5 by chance, 0 in curves."""
+MEDIAN_OF_NORMAL = 0.6745
+"""Of the size of a normal number."""
+NOISE_WIDTH = 3.0
+"""Standard deviations of the noise of a voltage within which it is not followed."""
 ENOUGH = 10_000
 """Samples of a record above which it is thinned out."""
 SLOWEST = 2e-3
@@ -33,6 +42,35 @@ MOST = 200_000
 """Samples of an interpolated record at most."""
 ALIKE = 0.1
 """Share by which the drive of a part may differ from that of the whole, in size and in speed."""
+
+
+def voltage_noise(records: Sequence[Record]) -> float:
+    """Standard deviation of the noise on a voltage that was measured [V]; 0 where it was commanded.
+
+    Noise makes second differences that change sign from one to the next; ramps, holds and rests that were commanded
+    have none at all.
+    """
+    least, is_white = np.inf, False
+    for record in records:
+        bends = np.diff(record.voltage, 2)
+        if bends.size < FEWEST_BENDS:
+            continue
+        size = float(np.median(np.abs(bends))) / (MEDIAN_OF_NORMAL * np.sqrt(6.0))  # of white noise, 1, −2, 1
+        if size < least:
+            least = size
+            is_white = bool(np.mean(bends[1:] * bends[:-1] < 0.0) > WHITE)
+    return least if is_white else 0.0
+
+
+def quieted(record: Record, noise: float) -> Record:
+    """The record with a voltage that does not follow noise of that size [V] back and forth.
+
+    A loop of hysteresis goes along with every small turn, and forgets on the way: the drive as it was measured is not
+    the drive that the stage has seen.
+    """
+    voltage = np.empty(record.size)
+    run_play(np.array(record.voltage), NOISE_WIDTH * noise, record.voltage[:1].copy(), voltage)
+    return replace(record, voltage=voltage)
 
 
 def slowed(record: Record) -> Record:
