@@ -39,6 +39,12 @@ def start_model(records: Sequence[Record], fitted: Collection[int], iterations: 
     roles = roles_of(experiment)
     loops = [i for i in roles.loops if i in fitted]
     broadband = [i for i in roles.broadband if i in fitted]
+    moving = [
+        i
+        for i in fitted
+        if records[i].sample_period < 1.001 * experiment.fastest_period and not roles.contents[i].is_slow
+    ]
+    broadband = broadband or moving  # many sines tell the dynamics too
     if not loops or not broadband:
         return identify(Experiment(experiment.records[: max(fitted) + 1]), held_out=("validation",)).model
     period = experiment.fastest_period
@@ -53,7 +59,7 @@ def start_model(records: Sequence[Record], fitted: Collection[int], iterations: 
     frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1)), period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or _delay_without_steps(start, records, broadband)
-    for chosen in (broadband, [i for i in at_full_rate if not roles.contents[i].is_slow]):
+    for chosen in (broadband, moving):
         try:
             return with_dynamics(start, dynamics_behind(start, records, chosen, delay, ORDERS, iterations).arx)
         except IdentificationError:  # noise without low frequencies, or behind narrow plays, leaves the dc gain open

@@ -99,7 +99,8 @@ def diagnose(
     spared = reporting(records, usable)
     fitted = [i for i in usable if i not in spared]
     noise, least, span = noise_floors(records), floors(records), stroke(records)
-    period = model.sample_period if model is not None else common_period(records)
+    at_full_rate = [r for r, given in zip(records, experiment, strict=True) if r.sample_period == given.sample_period]
+    period = model.sample_period if model is not None else common_period(at_full_rate or records)
     records = tuple(at_period(r, period) for r in records)
     start = exact(model or start_model(records, fitted))
     kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
