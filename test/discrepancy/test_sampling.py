@@ -1,11 +1,13 @@
 """Records are brought to the period and length that the search needs, and keep what their drive shows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.sampling import at_period, common_period, shortened, slowed
+from piezo_hysteresis.discrepancy.sampling import at_period, common_period, quieted, shortened, slowed, voltage_noise
 from piezo_hysteresis.record import Record
 
 FAST = 2e-5
@@ -73,3 +75,29 @@ def test_the_dynamics_set_the_period_and_what_is_faster_is_averaged():
     assert common_period((step, noise)) == 5 * FAST
     assert at_period(step, 5 * FAST).sample_period == 5 * FAST
     assert at_period(step, 5 * FAST).size == 400
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-3])
+def test_the_noise_of_a_measured_voltage_is_known_and_a_commanded_one_has_none(noise):
+    random = np.random.default_rng(0)
+    t = 1e-3 * np.arange(4000)
+    drives = (np.zeros(t.size), 8.0 * np.abs(t % 1.0 - 0.5), np.repeat([0.0, 3.0, 6.0, 2.0], 1000), np.sin(300.0 * t))
+    commanded = [Record(u, 1e-6 * u, 1e-3) for u in drives]
+    measured = [replace(r, voltage=r.voltage + noise * random.standard_normal(r.size)) for r in commanded]
+    assert voltage_noise(commanded) == 0.0
+    assert voltage_noise(commanded[3:]) == 0.0
+    assert voltage_noise(measured) == pytest.approx(noise, rel=0.1)
+
+
+def test_a_drive_is_followed_but_for_its_noise():
+    noise, t = 1e-3, 1e-4 * np.arange(40_000)
+    drive = 8.0 * np.abs(t % 1.0 - 0.5)
+    noisy = drive + noise * np.random.default_rng(1).standard_normal(t.size)
+    quiet = quieted(Record(noisy, 1e-6 * drive, 1e-4), noise).voltage
+
+    def way(u):
+        return np.abs(np.diff(u)).sum()
+
+    assert np.abs(quiet - drive).max() < 8.0 * noise
+    assert way(noisy) > 1.05 * way(drive)
+    assert way(quiet) == pytest.approx(way(drive), rel=0.01)
