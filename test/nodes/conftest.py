@@ -6,6 +6,7 @@ import os
 import random
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import cycle, islice
 from pathlib import Path
 
 import pytest
@@ -17,11 +18,14 @@ from piezo_hysteresis.nodes.stage_lock import StageLock
 
 from .lab import Lab
 
+DOMAINS = cycle(random.Random(os.getpid()).sample(range(1, 101), 100))
+"""Each in its turn: what a killed process has left in one is not met by the next test."""
+
 
 @contextmanager
 def opened(folder: Path) -> Iterator[Lab]:
-    """A lab in a ROS domain that nobody else tests in on this machine at the same time."""
-    for number in random.Random(os.getpid()).sample(range(1, 101), 100):
+    """A lab in a ROS domain that nobody else tests in on this machine at the same time, nor did just before."""
+    for number in islice(DOMAINS, 100):
         try:
             lock = StageLock([f"test in domain {number}"])
             break
