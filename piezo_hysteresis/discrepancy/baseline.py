@@ -7,6 +7,7 @@ order any linear effect would be a gain.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 
 from ..effects import Arx, BoucWen, Offset, PublishedBoucWen
 from ..errors import IdentificationError, ModelError
@@ -70,8 +71,11 @@ def start_model(records: Sequence[Record], fitted: Collection[int], iterations: 
 def _delay_without_steps(model: Model, records: Sequence[Record], broadband: Collection[int]) -> int:
     """The delay that noise shows, unless dynamics describe it better without one: hum hides the first response."""
     found = delay_of(hysteresis_signals(model, records, broadband))
-    errors = {d: dynamics_behind(model, records, broadband, d, ORDERS).free_run_error for d in (1, found)}
-    return min(errors, key=errors.__getitem__)
+    errors = {}
+    for delay in (found, 1):
+        with suppress(IdentificationError):  # dynamics that do not settle tell nothing about the delay
+            errors[delay] = dynamics_behind(model, records, broadband, delay, ORDERS).free_run_error
+    return min(errors, key=errors.__getitem__, default=found)
 
 
 def exact(model: Model) -> Model:

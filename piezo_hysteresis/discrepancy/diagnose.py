@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import CATALOGUE, Effect
-from ..errors import IdentificationError
+from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ..identification.carried import select as select_records
 from ..identification.fit import Fit, Progress
 from ..identification.normal_equations import Nuisance, residuals
@@ -110,9 +111,10 @@ def diagnose(
     evidence = with_indispensable(baseline.model, evidence)
     score = score_model(baseline.model, evidence)
     if model is None and score.excess > ADEQUATE:  # what is missing may have led the iterations astray
-        other = joint(exact(start_model(records, fitted, FEW_ITERATIONS)), evidence, LAST, PRECISE)
-        if other.cost < baseline.cost:
-            baseline, score = other, score_model(other.model, evidence)
+        with suppress(DivergenceError, IdentificationError, ModelError, ParameterError):
+            other = joint(exact(start_model(records, fitted, FEW_ITERATIONS)), evidence, LAST, PRECISE)
+            if other.cost < baseline.cost:
+                baseline, score = other, score_model(other.model, evidence)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
 
     tell("where", 0.35)
