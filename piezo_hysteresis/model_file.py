@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import yaml
+
 from .errors import ModelError
 from .model import Model
 from .model_parameters import PREFIX, SCALES, from_parameters, to_parameters
-from .parameter_file import LONGEST_TEXT, Entry, entry, parameters
+from .parameter_file import LONGEST_TEXT, Entry, entry, parameters, quoted
 
 _HEADER = """\
 # Model of a piezo stage: a ROS 2 parameter file, in SI units. Load it with --params-file, or give it to `piezo`.
@@ -49,7 +51,8 @@ def dumps(model: Model) -> str:
     if model.provenance:
         lines.append("      provenance:")
         for key in model.provenance:
-            line(8, key, named[f"{PREFIX}provenance.{key}"], _PROVENANCE.get(key, ""))
+            name = key if yaml.safe_load(key) == key else quoted(key)  # "no" and "on" are truth values to PyYAML
+            line(8, name, named[f"{PREFIX}provenance.{key}"], _PROVENANCE.get(key, ""))
     for effect in model.effects:
         rows = [p for p in effect.parameters if f"{PREFIX}{effect.name}.{p.name}" in named]
         if rows:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
 from piezo_hysteresis.effects import BY_NAME, CHAIN, Arx, BoucWen, Offset
@@ -65,6 +65,7 @@ def test_text_and_parameters_carry_any_model_bit_for_bit(model: Model) -> None:
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+@example(Model(MODEL.effects, 2e-5, provenance={"no": "", "on": "x", "run": "3"}))
 @given(models())
 def test_pyyaml_reads_the_same_numbers_as_rcl(model: Model) -> None:
     """`ros2 param load` goes through PyYAML, `--params-file` through rcl."""
