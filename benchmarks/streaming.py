@@ -2,9 +2,10 @@
 
 The driver plays sines and slow loops without a pause; this process is the recorder and writes every topic to a bag, in
 which the samples are counted afterwards. Latency counts from the last sample of a block to its residual in the
-recorder's hands. The exit code is 1 where a sample is missing, doubled, or was played at another voltage than was
-commanded, up to 500 kHz; beyond, the highest rate is sought that loses nothing. All processes take
-`config/large_blocks.xml`.
+recorder's hands. Beside it stands what three processes take that hand on as much by rclpy alone.
+
+The exit code is 1 where a sample is missing, doubled, or was played at another voltage than was commanded, up to
+500 kHz; beyond, the highest rate is sought that loses nothing. All processes take `config/large_blocks.xml`.
 
     python -m benchmarks.streaming --rate 50e3 200e3 --seconds 30
 """
@@ -26,6 +27,7 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
 
 from benchmarks.figures import Cell, Figures, alone
+from benchmarks.relay import processor_time, relayed
 from benchmarks.simulation import ARX
 from benchmarks.stream_recorder import Command, StreamRecorder
 from examples.demo.processes import Processes
@@ -47,6 +49,8 @@ PROMISED = 500e3
 """Rate up to which a lost sample is a failure [Hz]."""
 FASTER = 2.0**0.5
 """Step of the search for the highest rate."""
+LIMIT = ("rclpy alone, CPU of all, % of a core", "rclpy alone, latency p99, ms")
+"""See `benchmarks.relay`."""
 STEP = 20.0 / 2**16
 """Of the 16-bit converter of the simulated stage [V]: the recording holds what was applied."""
 
@@ -58,12 +62,6 @@ def waveform(rate: float, duration: float) -> np.ndarray:
     loops = triangle(limits, (1.0,) * max(1, round(half)), 1.0)
     parts = (loops, sine(limits, 100.0, half))
     return np.concatenate([limits.from_safe_to_safe(part) for part in parts])
-
-
-def processor_time(pid: int) -> float:
-    """User and system time of a process so far [s]."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def memory(pid: int) -> float:
@@ -214,7 +212,9 @@ def run(options: argparse.Namespace) -> list[Figures]:
     try:
         for rate, duration, axes in cases:
             column, failed = tried(rate, duration, axes)
-            columns += [] if column is None else [column]
+            if column is not None:
+                limit = dict(zip(LIMIT, relayed(rate, short) if axes == 1 else ("", ""), strict=True))
+                columns.append({**column, **limit})
             failures += failed if rate <= PROMISED else []
             held = held if failed else max(held, rate)
         if held and not options.no_search:

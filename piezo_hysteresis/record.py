@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg.blas import ddot  # numpy's would warn of squares that are too large
 
 from .errors import RecordError
 
@@ -15,10 +16,8 @@ Samples = NDArray[np.float64]
 
 
 def are_finite(samples: Samples) -> bool:
-    """Whether every sample is; the sum of squares tells at once, unless it is too large itself."""
-    with np.errstate(over="ignore"):
-        squares = np.dot(samples, samples)
-    return math.isfinite(squares) or bool(np.isfinite(samples).all())
+    """Whether every sample, of at least one, is; the sum of squares tells at once, unless it is too large itself."""
+    return math.isfinite(ddot(samples, samples)) or bool(np.isfinite(samples).all())
 
 
 def _channel(name: str, values: ArrayLike, length: int | None) -> Samples:

@@ -6,7 +6,7 @@ order any linear effect would be a gain.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 
 from ..effects import Arx, BoucWen, Offset, PublishedBoucWen
@@ -15,7 +15,14 @@ from ..identification.delay import identify_delay
 from ..identification.dynamics import delay_of
 from ..identification.hysteresis import fit_hysteresis
 from ..identification.identify import identify
-from ..identification.linear_start import ITERATIONS, dynamics_behind, follower, hysteresis_signals, with_dynamics
+from ..identification.linear_start import (
+    FEW_ITERATIONS,
+    ITERATIONS,
+    dynamics_behind,
+    follower,
+    hysteresis_signals,
+    with_dynamics,
+)
 from ..identification.roles import roles_of
 from ..model import Model
 from ..record import Experiment, Record
@@ -24,8 +31,10 @@ ORDERS = (8, 8)
 """na and nb, as in the paper; the joint fit leaves at zero what the data do not ask for."""
 
 
-def start_model(records: Sequence[Record], fitted: Collection[int], iterations: int = ITERATIONS) -> Model:
+def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:
     """Hysteresis from the slow loops, delay from the steps, dynamics from the broadband records.
+
+    What is missing may lead the iterations of the dynamics astray: after the model from many there is one from few.
 
     Parameters
     ----------
@@ -33,23 +42,23 @@ def start_model(records: Sequence[Record], fitted: Collection[int], iterations: 
         The experiment, in order.
     fitted : collection of int
         Indices of the records that may be used.
-    iterations : int
-        With which the dynamics are found, at most.
+
+    Yields
+    ------
+    Model
+        Each to be fitted jointly.
     """
     experiment = Experiment(tuple(records))
     roles = roles_of(experiment)
     loops = [i for i in roles.loops if i in fitted]
     broadband = [i for i in roles.broadband if i in fitted]
-    moving = [
-        i
-        for i in fitted
-        if records[i].sample_period < 1.001 * experiment.fastest_period and not roles.contents[i].is_slow
-    ]
-    broadband = broadband or moving  # many sines tell the dynamics too
-    if not loops or not broadband:
-        return identify(Experiment(experiment.records[: max(fitted) + 1]), held_out=("validation",)).model
     period = experiment.fastest_period
     at_full_rate = [i for i in fitted if records[i].sample_period < 1.001 * period]
+    moving = [i for i in at_full_rate if not roles.contents[i].is_slow]
+    broadband = broadband or moving  # many sines tell the dynamics too
+    if not loops or not broadband:
+        yield identify(Experiment(experiment.records[: max(fitted) + 1]), held_out=("validation",)).model
+        return
     fast = [records[i] for i in at_full_rate]
     try:
         delay = max(1, identify_delay([r for r in fast if r.phase.startswith("step")] or fast).samples)
@@ -60,11 +69,16 @@ def start_model(records: Sequence[Record], fitted: Collection[int], iterations: 
     frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1)), period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or _delay_without_steps(start, records, broadband)
-    for chosen in (broadband, moving):
-        try:
+    for iterations in (ITERATIONS, FEW_ITERATIONS):
+        yield _with_dynamics(start, records, (broadband, moving), delay, iterations)
+
+
+def _with_dynamics(
+    start: Model, records: Sequence[Record], choices: Sequence[Collection[int]], delay: int, iterations: int
+) -> Model:
+    for chosen in choices:
+        with suppress(IdentificationError):  # noise without low frequencies, or behind plays, leaves the dc gain open
             return with_dynamics(start, dynamics_behind(start, records, chosen, delay, ORDERS, iterations).arx)
-        except IdentificationError:  # noise without low frequencies, or behind narrow plays, leaves the dc gain open
-            continue
     return start.with_effect(follower(start, delay, ORDERS))
 
 

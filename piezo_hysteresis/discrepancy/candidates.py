@@ -79,16 +79,19 @@ def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
 
 def score_model(model: Model, evidence: Evidence) -> Score:
     """Score of a fitted model on records left out."""
-    names = free_numbers(model, evidence.nuisance)
-    products = grams(model, evidence.records, names, evidence.nuisance)
-    return held_out(products, evidence.floors, directions(model, names), evidence.alone)
+    return held_out(*_products(model, evidence), evidence.alone)
 
 
-def with_indispensable(model: Model, evidence: Evidence) -> Evidence:
-    """The evidence, of which records that alone tell a number of the model are never left out."""
+def score_baseline(model: Model, evidence: Evidence) -> tuple[Evidence, Score]:
+    """The evidence, of which records that alone tell a number of the model are never left out, and the score."""
+    products = _products(model, evidence)
+    alone = indispensable(*products)
+    return replace(evidence, alone=alone), held_out(*products, alone)
+
+
+def _products(model: Model, evidence: Evidence) -> tuple[list[Gram], Array, Array]:
     names = free_numbers(model, evidence.nuisance)
-    products = grams(model, evidence.records, names, evidence.nuisance)
-    return replace(evidence, alone=indispensable(products, evidence.floors, directions(model, names)))
+    return grams(model, evidence.records, names, evidence.nuisance), evidence.floors, directions(model, names)
 
 
 def screen(model: Model, evidence: Evidence, effects: Iterable[type[Effect]]) -> list[Candidate]:

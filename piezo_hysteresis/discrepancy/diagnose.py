@@ -17,8 +17,8 @@ from ..identification.normal_equations import Nuisance, residuals
 from ..identification.roles import CARRYING
 from ..model import Model
 from ..record import Experiment, Notice
-from .baseline import exact, start_model
-from .candidates import score_model, with_indispensable
+from .baseline import exact, start_models
+from .candidates import score_baseline, score_model
 from .diagnosis import Diagnosis, Verdict
 from .evidence import Evidence, extent_of
 from .few_records import diagnose_few
@@ -28,7 +28,7 @@ from .localise import localise
 from .next_experiment import decide
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
-from .refit import FEW_ITERATIONS, joint, restart
+from .refit import joint, restart
 from .sampling import NOISE_WIDTH, at_period, common_period, quieted, shortened, slowed, voltage_noise
 from .selection import NAMED, select
 from .split import reporting
@@ -103,18 +103,19 @@ def diagnose(
     at_full_rate = [r for r, given in zip(records, experiment, strict=True) if r.sample_period == given.sample_period]
     period = model.sample_period if model is not None else common_period(at_full_rate or records)
     records = tuple(at_period(r, period) for r in records)
-    start = exact(model or start_model(records, fitted))
+    starts = iter((model,)) if model is not None else start_models(records, fitted)
+    start = exact(next(starts))
     kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
     evidence = Evidence(tuple(kept), np.array(sizes), Nuisance(), extent_of([records[i] for i in usable], start))
     tell("baseline, jointly", 0.25)
     baseline = joint(start, evidence, LAST, PRECISE)
-    evidence = with_indispensable(baseline.model, evidence)
-    score = score_model(baseline.model, evidence)
-    if model is None and score.excess > ADEQUATE:  # what is missing may have led the iterations astray
+    evidence, score = score_baseline(baseline.model, evidence)
+    if score.excess > ADEQUATE:
         with suppress(DivergenceError, IdentificationError, ModelError, ParameterError):
-            other = joint(exact(start_model(records, fitted, FEW_ITERATIONS)), evidence, LAST, PRECISE)
-            if other.cost < baseline.cost:
-                baseline, score = other, score_model(other.model, evidence)
+            for anew in starts:
+                other = joint(exact(anew), evidence, LAST, PRECISE)
+                if other.cost < baseline.cost:
+                    baseline, score = other, score_model(other.model, evidence)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
 
     tell("where", 0.35)

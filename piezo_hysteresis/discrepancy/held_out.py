@@ -80,19 +80,13 @@ def held_out(
     alone : collection of int
         Indices of records whose kind has no other: they are judged with the parameters from all.
     """
-    inner, cross, power, spared = [], [], [], []
-    for index, (gram, floor) in enumerate(zip(grams, floors, strict=True)):
-        if not np.isfinite(floor):
-            continue
-        spared.append(index not in alone)
-        weight = 1.0 / (gram.size * floor * floor)
-        inner.append(weight * columns.T @ gram.matrix @ columns)
-        cross.append(weight * columns.T @ gram.matrix[:, -1])
-        power.append(weight * gram.matrix[-1, -1])
-    hessians, slopes = np.array(inner), np.array(cross)
+    counted, products = _counted(grams, floors)
+    hessians = np.array([columns.T @ p @ columns for p in products])
+    slopes = np.array([columns.T @ p[:, -1] for p in products])
+    power = np.array([p[-1, -1] for p in products])
     hessian, slope = hessians.sum(axis=0), slopes.sum(axis=0)
     scale = _scale(hessian)
-    left = np.array(spared, dtype=float) * (len(inner) > 1)
+    left = np.array([i not in alone for i in counted], dtype=float) * (len(counted) > 1)
     steps = _solve(hessian - left[:, None, None] * hessians, slope - left[:, None] * slopes, scale)
     changes = np.einsum("rj,rjk,rk->r", steps, hessians, steps) - 2.0 * np.sum(steps * slopes, axis=1)
     squares = np.clip(np.array(power) + changes, 0.0, FARTHEST * np.maximum(1.0, power))
@@ -110,8 +104,8 @@ def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, column
     grams, floors, columns
         As for `held_out`.
     """
-    counted = [i for i, floor in enumerate(floors) if np.isfinite(floor)]
-    hessians = [columns.T @ grams[i].matrix @ columns / (grams[i].size * floors[i] ** 2) for i in counted]
+    counted, products = _counted(grams, floors)
+    hessians = [columns.T @ product @ columns for product in products]
     total = np.sum(hessians, axis=0)
     scale = _scale(total)
     values, vectors = np.linalg.eigh(total * np.outer(scale, scale))
@@ -121,6 +115,12 @@ def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, column
     whitened = vectors[:, known] / np.sqrt(values[known]) * scale[:, None]
     shares = [float(np.linalg.eigvalsh(whitened.T @ h @ whitened)[-1]) for h in hessians]
     return tuple(i for i, share in zip(counted, shares, strict=True) if share > SPOILT * grams[i].size * (1.0 - share))
+
+
+def _counted(grams: Sequence[Gram], floors: Sequence[float] | Array) -> tuple[list[int], list[Array]]:
+    """Indices of the records that count, and their inner products in squares of the floor."""
+    counted = [i for i, floor in enumerate(floors) if np.isfinite(floor)]
+    return counted, [grams[i].matrix / (grams[i].size * floors[i] ** 2) for i in counted]
 
 
 def _scale(hessian: Array) -> Array:

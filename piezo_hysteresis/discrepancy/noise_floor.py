@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import periodogram
 from scipy.signal.windows import hann
 
+from ..identification.content import noise_on_motion
 from ..record import Record
 
 Array = NDArray[np.float64]
@@ -24,8 +25,6 @@ MAINS = (50.0, 60.0)
 """Mains frequencies [Hz]."""
 ALIKE, UNLIKE = 1e-6, 0.1
 """Share of the power of the drive by which it may differ from itself one period later, and differs in between."""
-GAUSSIAN = 1.4826
-"""Standard deviation over median absolute value."""
 FASTEST = 3
 """Periodic records, the fastest, from which jitter is taken: the one in which least else differs between periods."""
 UNUSUAL = 2.0
@@ -52,7 +51,7 @@ def white_noise(record: Record) -> float:
     # a periodogram is exponentially distributed: its median is ln 2 of its mean
     at_top = float(np.sqrt(np.median(density[top] / response[top]) / np.log(2.0) / 2.0))
     # jumps fill all of the spectrum, but few of the samples; fast motion is in all samples, but not at the top
-    return min(at_top, float(np.median(np.abs(np.diff(record.displacement, 3)))) * GAUSSIAN / np.sqrt(20.0))
+    return min(at_top, noise_on_motion(record.displacement, 3))
 
 
 def period_scatter(record: Record) -> float | None:

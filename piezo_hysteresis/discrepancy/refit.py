@@ -16,7 +16,13 @@ from ..effects import Arx, MainsHum
 from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ..identification.dynamics import identify_arx
 from ..identification.fit import Fit, fit
-from ..identification.linear_start import ITERATIONS, dynamics_behind, hysteresis_signals, with_dynamics
+from ..identification.linear_start import (
+    FEW_ITERATIONS,
+    ITERATIONS,
+    dynamics_behind,
+    hysteresis_signals,
+    with_dynamics,
+)
 from ..model import Model
 from .candidates import Candidate, free_numbers, score_model
 from .evidence import Evidence
@@ -24,8 +30,6 @@ from .held_out import Score
 
 LINEAR = ("lag", "dynamics")
 """Families that dynamics of an order high enough can hold."""
-FEW_ITERATIONS = 3
-"""Steiglitz-McBride iterations of dynamics that are tried beside those of more."""
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Periods of the mains in a record that tells its amplitude, sample period in periods, and records."""
 STEADY = 0.3

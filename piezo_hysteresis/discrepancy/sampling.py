@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from ..effects.backlash import run_play
-from ..identification.content import content_of
+from ..identification.content import content_of, noise_on_motion
 from ..record import Record
 
 Array = NDArray[np.float64]
@@ -24,8 +24,6 @@ FEWEST_BENDS = 50
 """Second differences of a voltage that tell its noise."""
 WHITE = 0.65
 """Share of second differences that have another sign than the next: 0.73 in white noise, 0.5 by chance, 0 in curves."""
-MEDIAN_OF_NORMAL = 0.6745
-"""Of the size of a normal number."""
 NOISE_WIDTH = 3.0
 """Standard deviations of the noise of a voltage within which it is not followed."""
 ENOUGH = 10_000
@@ -55,7 +53,7 @@ def voltage_noise(records: Sequence[Record]) -> float:
         bends = np.diff(record.voltage, 2)
         if bends.size < FEWEST_BENDS:
             continue
-        size = float(np.median(np.abs(bends))) / (MEDIAN_OF_NORMAL * np.sqrt(6.0))  # of white noise, 1, −2, 1
+        size = noise_on_motion(record.voltage, 2)
         if size < least:
             least = size
             is_white = bool(np.mean(bends[1:] * bends[:-1] < 0.0) > WHITE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,8 @@ MARKED = 0.95
 """Share of the power of dv/dt by which bandwidth and lines are counted."""
 UNMEASURED = 5e-4
 """Share of the range below which the highest frequencies of a drive are noise of its recorder, no excitation."""
+GAUSSIAN = 1.4826
+"""Standard deviation over median absolute value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +112,22 @@ def noise_of(record: Record, fewest: int = 64) -> float:
         return float(np.std(rest))
     if y.size < 8:
         return 0.0
-    return float(1.4826 * np.median(np.abs(np.diff(y, 3))) / np.sqrt(20.0))
+    return noise_on_motion(y, 3)
+
+
+def noise_on_motion(values: Samples, order: int) -> float:
+    """Standard deviation of the noise on a smooth motion, from differences of the order given: robust, and white.
+
+    The differences have the squares of the binomial coefficients for power, in all C(2 order, order).
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).normal(0.0, 0.1, 100_000)
+    >>> round(noise_on_motion(np.sin(np.arange(100_000) / 300.0) + noise, 3), 2)
+    0.1
+    """
+    typical = np.median(np.abs(np.diff(values, order)))
+    return float(GAUSSIAN * typical / np.sqrt(math.comb(2 * order, order)))
 
 
 def excited_part(record: Record, window: int = 64) -> Record:

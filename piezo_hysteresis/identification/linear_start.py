@@ -20,6 +20,8 @@ from .regressors import Signals
 
 ITERATIONS = 12
 """Steiglitz-McBride iterations of the start at most: weak, lightly damped modes come last."""
+FEW_ITERATIONS = 3
+"""Those tried beside, for what is missing may lead the many astray."""
 
 
 def hysteresis_signals(model: Model, records: Sequence[Record], wanted: Collection[int]) -> Signals:

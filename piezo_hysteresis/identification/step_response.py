@@ -78,10 +78,11 @@ def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
             f"quiet samples before it and {4 * every} after it; record a step phase"
         )
     resolution = _resolution({id(r): r for r, _ in edges}.values())
-    scatters = np.array([_scatter(record, edge, every) for record, edge in edges])
+    bases = [_BaseLine.before(record, edge, every, BEFORE[0]) for record, edge in edges]
+    scatters = np.sqrt([base.squares / (base.size - 2) for base in bases])
     swing = max(float(np.ptp(record.displacement)) for record, _ in edges)
     quietest = max(float(scatters.min()), resolution / np.sqrt(12.0), NEGLIGIBLE * swing)
-    freedom = min(BEFORE[0], *(edge.quiet_before // every for _, edge in edges)) - 2
+    freedom = min(base.size for base in bases) - 2
     by_chance = float(np.sqrt(f.isf(RARE, freedom, freedom)))
     edges = [e for e, scatter in zip(edges, scatters, strict=True) if scatter <= max(QUIET, by_chance) * quietest]
     # A stage that still rings is not straight over a long base line; a short one is noisy.
@@ -99,11 +100,40 @@ def _resolution(records: Iterable[Record]) -> float:
     return finest if finest < np.inf else 0.0
 
 
-def _scatter(record: Record, edge: Edge, every: int) -> float:
-    """Rms of the displacement before an edge about a line [m]."""
-    behind = np.arange(-min(BEFORE[0], edge.quiet_before // every), 0)
-    base = record.displacement[edge.start + every * behind]
-    return float(np.sqrt(np.sum((base - np.polyval(np.polyfit(behind, base, 1), behind)) ** 2) / (base.size - 2)))
+@dataclass(frozen=True, slots=True)
+class _BaseLine:
+    """The straight line through the displacement before an edge."""
+
+    samples: Samples
+
+    @classmethod
+    def before(cls, record: Record, edge: Edge, every: int, most: int) -> _BaseLine:
+        size = min(most, edge.quiet_before // every)
+        return cls(record.displacement[edge.start - every * np.arange(size, 0, -1)])
+
+    @property
+    def size(self) -> int:
+        return self.samples.size
+
+    @property
+    def places(self) -> Samples:
+        """Places of the samples, from their middle."""
+        return np.arange(float(self.size)) - 0.5 * (self.size - 1)
+
+    @property
+    def slope(self) -> float:
+        return float(self.places @ self.samples / (self.places @ self.places))
+
+    @property
+    def squares(self) -> float:
+        """Sum of squares about the line [m²]; its degrees of freedom are `size - 2`."""
+        off = self.samples - self.samples.mean() - self.slope * self.places
+        return float(off @ off)
+
+    def at(self, ahead: Samples) -> tuple[Samples, Samples]:
+        """The line at so many samples from the first behind it [m], and its variance for white noise of variance 1."""
+        away = ahead + 0.5 * (self.size + 1)
+        return self.samples.mean() + self.slope * away, 1.0 / self.size + away**2 / (self.places @ self.places)
 
 
 def _averaged(
@@ -116,19 +146,15 @@ def _averaged(
     squares, freedom = 0.0, 0
     missed, expected = 0.0, 0.0
     for record, edge in edges:
-        before = min(most, edge.quiet_before // every)
-        behind = np.arange(-before, 0)
-        base = record.displacement[edge.start + every * behind]
-        level, slope = base.mean(), behind @ (base - base.mean()) / np.sum((behind - behind.mean()) ** 2)
-        away = ahead - behind.mean()
-        line = level + slope * away
-        squares += float(np.sum((base - level - slope * (behind - behind.mean())) ** 2))
-        freedom += before - 2
+        base = _BaseLine.before(record, edge, every, most)
+        squares += base.squares
+        freedom += base.size - 2
+        line, uncertain = base.at(ahead.astype(np.float64))
         weighted += edge.height * (record.displacement[edge.start + every * ahead] - line)
         weight += edge.height**2
-        off, spread = _foretold(base)
+        off, spread = _foretold(base.samples)
         missed, expected = missed + edge.height * off, expected + edge.height**2 * spread
-        variance += edge.height**2 * (1.0 + 1.0 / before + away**2 / np.sum((behind - behind.mean()) ** 2))
+        variance += edge.height**2 * (1.0 + uncertain)
     noise = max(squares / freedom, resolution**2 / 12.0)
     # What rings before the edges goes on behind them, alike in all of them: no averaging removes it.
     ringing = max(1.0, abs(missed) / max(SCATTER * float(np.sqrt(noise * expected)), 1e-300))
@@ -148,11 +174,6 @@ def _foretold(base: Samples) -> tuple[float, float]:
         Its variance for white noise of variance 1.
     """
     split = 3 * base.size // 4
-    early, late = np.arange(split), np.arange(split, base.size)
-    centre, square = early.mean(), np.sum((early - early.mean()) ** 2)
-    slope = (early - centre) @ base[:split] / square
-    away = late.mean() - centre
-    return (
-        float(base[split:].mean() - base[:split].mean() - slope * away),
-        float(1.0 / late.size + 1.0 / split + away**2 / square),
-    )
+    late = base[split:]
+    line, uncertain = _BaseLine(base[:split]).at(np.array([0.5 * (late.size - 1)]))
+    return float(late.mean() - line[0]), float(1.0 / late.size + uncertain[0])

@@ -20,8 +20,6 @@ from .recorded_playback import RecordedPlayback
 from .sample_block import SampleBlock
 from .time_base import TimeBase, read_together
 
-_WRAP = 1 << 32
-
 Source = Playback | RecordedPlayback
 
 
@@ -221,7 +219,7 @@ class Acquisition:
             time=np.arange(count) * np.float64(self._time_base.sample_period),
             voltage=acquired.voltage,
             displacement=acquired.displacement,
-            index=((first + np.arange(count)) % _WRAP).astype(np.uint32),
+            index=np.arange(first, first + count).astype(np.uint32),  # modulo 2^32
             phase=drive.phase,
             stage=self.stage.description.name,
             follows_gap=first > self.index,

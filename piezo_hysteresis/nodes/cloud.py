@@ -50,8 +50,7 @@ def to_cloud(
     dense : bool
         False where samples before the first one were never measured.
     """
-    dtype = np.dtype([(name, "<" + word) for name, word in layout.items()])
-    points = np.empty(np.shape(next(iter(columns.values()))), dtype)
+    points = np.empty(np.shape(next(iter(columns.values()))), point_type(layout))
     fields, offset = [], 0
     for name, word in layout.items():
         points[name] = columns[name]
@@ -70,6 +69,11 @@ def to_cloud(
         data=data,
         is_dense=dense,
     )
+
+
+def point_type(layout: Mapping[str, str]) -> np.dtype:
+    """Type of the points that `to_cloud` packs."""
+    return np.dtype([(name, "<" + word) for name, word in layout.items()])
 
 
 def from_cloud(

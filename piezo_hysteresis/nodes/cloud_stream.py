@@ -14,7 +14,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2
 
 from ..errors import RecordError
-from .cloud import from_cloud, stored_as, to_cloud, unpacked
+from .cloud import from_cloud, point_type, stored_as, to_cloud, unpacked
 
 _STAMP = struct.Struct("=iI")
 _STAMP_AT = 4
@@ -80,8 +80,7 @@ class CloudWriter:
     def _begin(self, size: int, frame_id: str) -> None:
         blank = {name: np.zeros(size, word) for name, word in self._layout.items()}
         self._frame = _Frame(to_cloud(blank, self._layout, Time(), frame_id))
-        dtype = np.dtype([(name, "<" + word) for name, word in self._layout.items()])
-        points = np.frombuffer(self._frame.message, dtype, size, self._frame.start)
+        points = np.frombuffer(self._frame.message, point_type(self._layout), size, self._frame.start)
         self._fields = {name: points[name] for name in self._layout}
 
 
