@@ -236,6 +236,10 @@ class Experiment:
         """Smallest sample period [s]."""
         return min(r.sample_period for r in self.records)
 
+    def noting(self, *notices: Notice) -> Experiment:
+        """The same records, with more notices."""
+        return replace(self, notices=(*self.notices, *notices))
+
     def named(self, *phases: str) -> tuple[Record, ...]:
         """Records whose phase name is, or begins with, one of `phases`.
 

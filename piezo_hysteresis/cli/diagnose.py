@@ -7,7 +7,6 @@ from pathlib import Path
 
 from .. import model_file
 from ..discrepancy import Diagnosis, diagnose
-from ..record import Experiment
 from ..report.answer_tables import effect_table, gap_table, rejection_table, where_table
 from ..report.comparison import Comparison, compare
 from ..report.json_file import write_json
@@ -48,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         write_json(args.json, answer)
     if args.report is not None:
         with progress("report") as tell:
-            drawn = page(_comparison(experiment, found), fit=found.fit, answer=answer, progress=tell)
+            drawn = page(_comparison(found), fit=found.fit, answer=answer, progress=tell)
         drawn.save(Path(args.report).expanduser())
     out = console()
     said = answer_verdict(answer)
@@ -57,14 +56,14 @@ def run(args: argparse.Namespace) -> int:
         out.print(sentence)
     out.print()
     show(effect_table(answer), where_table(answer), gap_table(answer), rejection_table(answer))
-    show_notices(experiment.notices)
+    show_notices(found.experiment.notices)
     for written in (path, args.json, args.report):
         if written:
             out.print(f"wrote {written}")
     return 0
 
 
-def _comparison(experiment: Experiment, found: Diagnosis) -> Comparison:
+def _comparison(found: Diagnosis) -> Comparison:
     models, nuisances = {}, {}
     if found.baseline is not None:
         models["before"] = found.baseline
@@ -74,4 +73,4 @@ def _comparison(experiment: Experiment, found: Diagnosis) -> Comparison:
         free = found.selection.accepted[-1].best.evidence.nuisance
         # hum has an amplitude and a phase of its own in every record
         nuisances = {"after": free} if free.hum_frequency is not None else {}
-    return compare(experiment, models, nuisances)
+    return compare(found.experiment, models, nuisances)

@@ -158,14 +158,14 @@ def diagnose(
         where=where,
         gap=gap,
         next_experiment=decide(selection, evidence),
-        notices=(*experiment.notices, *beyond_reach([records[i] for i in usable])),
+        experiment=experiment.noting(*beyond_reach([records[i] for i in usable])),
     )
 
 
 def _quieted(experiment: Experiment, noise: float) -> Experiment:
     told = f"the voltage was measured with {noise:.2g} V of noise; turns within {NOISE_WIDTH:g} times that are left out"
     records = tuple(quieted(r, noise) for r in experiment.records)
-    return replace(experiment, records=records, notices=(*experiment.notices, Notice("voltage_noise", told)))
+    return replace(experiment, records=records).noting(Notice("voltage_noise", told))
 
 
 def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:
@@ -205,4 +205,4 @@ def _verdict(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[
 
 def _undecided(experiment: Experiment, model: Model | None, severe: list[Notice]) -> Diagnosis:
     reason = f"No verdict: {severe[0].message}."
-    return Diagnosis(Verdict.UNKNOWN, reason, model, model, None, None, (), None, None, experiment.notices)
+    return Diagnosis(Verdict.UNKNOWN, reason, model, model, None, None, (), None, None, experiment)

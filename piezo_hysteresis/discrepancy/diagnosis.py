@@ -8,7 +8,7 @@ from typing import Any
 
 from ..identification.fit import Fit
 from ..model import Model
-from ..record import Notice
+from ..record import Experiment
 from .gap import Gap
 from .localise import Place
 from .next_experiment import NextExperiment
@@ -49,8 +49,9 @@ class Diagnosis:
         Before and after.
     next_experiment : NextExperiment or None
         What would separate explanations that the data could not.
-    notices : tuple of Notice
-        Quality of the data.
+    experiment : Experiment
+        As it was compared: a voltage that was measured is followed but for its noise. Its notices tell the quality of
+        the data, and what they cannot show.
     """
 
     verdict: Verdict
@@ -62,7 +63,7 @@ class Diagnosis:
     where: tuple[Place, ...]
     gap: Gap | None
     next_experiment: NextExperiment | None
-    notices: tuple[Notice, ...]
+    experiment: Experiment
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -156,7 +157,8 @@ class Diagnosis:
             if self.next_experiment is None
             else {"phase": self.next_experiment.phase, "separates": list(self.next_experiment.separates)},
             "data_quality": [
-                {"kind": n.kind, "phase": n.phase, "message": n.message, "severe": n.severe} for n in self.notices
+                {"kind": n.kind, "phase": n.phase, "message": n.message, "severe": n.severe}
+                for n in self.experiment.notices
             ],
             "model": model_file,
         }
@@ -180,5 +182,5 @@ class Diagnosis:
         if self.next_experiment is not None:
             pair = " and ".join(self.next_experiment.separates)
             lines.append(f"  next: record '{self.next_experiment.phase}' to separate {pair}")
-        lines += [f"  {n.kind}: {n.message}" for n in self.notices if n.severe]
+        lines += [f"  {n.kind}: {n.message}" for n in self.experiment.notices if n.severe]
         return "\n".join(lines)

@@ -124,7 +124,7 @@ def diagnose_few(
         where=where,
         gap=gap,
         next_experiment=decide(selection, evidence),
-        notices=(*experiment.notices, *lacking),
+        experiment=experiment.noting(*lacking),
     )
 
 

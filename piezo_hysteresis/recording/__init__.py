@@ -120,7 +120,7 @@ def read(
         held = ", ".join(dict.fromkeys(r.phase for r in records))
         raise RecordingError(f"{paths[0]}: decimate: no phase {min(unknown)!r}, expected one of {held}")
     experiment = Experiment(tuple(records), ", ".join(str(Path(path).expanduser()) for path in paths))
-    return replace(experiment, notices=(*notices, *inspect(experiment)))
+    return experiment.noting(*notices, *inspect(experiment))
 
 
 def _one(place: Path, chosen: Format, layout: Layout) -> Experiment:
@@ -135,7 +135,7 @@ def _one(place: Path, chosen: Format, layout: Layout) -> Experiment:
     midway = {i for i, r in enumerate(records) if is_within_its_loop(r)}
     told = [Notice("truncated", _WITHIN, records[i].phase) for i in sorted(midway)]
     records = tuple(replace(r, truncated=True) if i in midway else r for i, r in enumerate(records))
-    return replace(experiment, records=records, notices=(*experiment.notices, *told))
+    return replace(experiment, records=records).noting(*told)
 
 
 def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str | None = None) -> None:

@@ -1,10 +1,10 @@
-"""How a phase begins: whether its first samples agree with a stage that had settled before."""
+"""How phases begin: whether their first samples agree with a stage that had settled before, and with one another."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..record import Notice, Record
+from ..record import Experiment, Notice, Record
 from .waveform import turning_points
 
 _OPENING = 0.1
@@ -14,6 +14,8 @@ _INSIDE = 0.1
 _SAME = 0.02
 _ON_BRANCH = 0.2
 _NOISE = 8.0
+_SAME_VOLTAGE = 1e-3
+_APART = 0.01
 
 
 def is_within_its_loop(record: Record) -> bool:
@@ -73,3 +75,24 @@ def onset(record: Record) -> list[Notice]:
         "give initial_voltage"
     )
     return [Notice("not_at_rest", text, record.phase)]
+
+
+def origins(experiment: Experiment) -> list[Notice]:
+    """Notice ``origins_differ`` where two records begin at rest at one voltage, but not at one displacement."""
+    records = [r for r in experiment if not (r.continues or r.truncated) and r.size >= 20]
+    span = float(np.ptp([(r.voltage.max(), r.voltage.min()) for r in records] or 0.0))
+    stroke = max((float(np.ptp(r.displacement)) for r in records), default=0.0)
+    settled = [r for r in records if abs(r.voltage[0] - r.settled_voltage) <= _SAME_VOLTAGE * span]
+    for i, record in enumerate(settled):
+        alike = [r for r in settled[:i] if abs(r.voltage[0] - record.voltage[0]) <= _SAME_VOLTAGE * span]
+        if not alike:
+            continue
+        apart = abs(float(record.displacement[0] - alike[0].displacement[0]))
+        noise = max(float(np.median(np.abs(np.diff(r.displacement, 2)))) / 2.4 for r in (record, alike[0]))
+        if apart > max(_APART * stroke, _NOISE * noise):
+            text = (
+                f"begins at {record.voltage[0]:.4g} V as {alike[0].phase} does, but {apart:.3g} m from there: a zero "
+                "taken anew, a stage that had not settled, or drift; the model has one zero and starts from rest"
+            )
+            return [Notice("origins_differ", text, record.phase)]
+    return []

@@ -9,7 +9,7 @@ import numpy as np
 from ..record import Experiment, Notice, Record, Samples
 from .channel_defects import channel_defects
 from .lag import lag_notices, lag_of
-from .onset import onset
+from .onset import onset, origins
 from .waveform import phase_name
 
 DISPLACEMENT_RANGE = (1e-9, 2e-3)
@@ -37,8 +37,8 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
     -------
     tuple of Notice
         Kinds: ``units``, ``scale``, ``constant``, ``sample_period``, ``time_base``, ``clipped``, ``stuck``,
-        ``dropout``, ``quantisation``, ``leads``, ``late``, ``polarity``, ``not_at_rest``. What reading finds (``gap``,
-        ``duplicate``, …) stands in `Experiment.notices`.
+        ``dropout``, ``quantisation``, ``leads``, ``late``, ``polarity``, ``not_at_rest``,
+        ``origins_differ``. What reading finds (``gap``, ``duplicate``, …) stands in `Experiment.notices`.
     """
     spans = np.array([[np.ptp(r.voltage), np.ptp(r.displacement)] for r in experiment])
     largest = float(spans[:, 0].max())
@@ -52,7 +52,7 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
     notices += [n for n in _polarity_and_lead(moving) if n.kind not in {told.kind for told in late}]
     for record in experiment:
         notices += onset(record)
-    return tuple(notices)
+    return (*notices, *origins(experiment))
 
 
 def _units(experiment: Experiment, spans: Samples) -> list[Notice]:

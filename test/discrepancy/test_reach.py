@@ -41,3 +41,15 @@ def test_noise_shows_dynamics_and_a_phase_that_comes_again_shows_drift():
     noise = record(np.random.default_rng(1).normal(size=4000), 2e-5, "noise")
     assert "extra_resonance" not in told(noise)
     assert "drift" not in told(noise, noise)
+
+
+def test_loops_of_two_sizes_show_memory_at_any_sample_period_and_noise_beside_them_does_not():
+    noise = record(np.random.default_rng(1).normal(size=4000), 2e-5, "noise")
+    assert "hysteresis_memory" in told(record(loops(4.0, 4.0)), noise)
+    assert "hysteresis_memory" in told(record(np.sin(3.0 * np.pi * TIME)), noise)
+    assert "hysteresis_memory" not in told(record(loops(4.0, 2.0), 1e-4))
+
+
+def test_slow_loops_that_come_again_show_drift_whatever_they_are_called():
+    assert "drift" not in told(record(loops(4.0), phase="run_a"), record(loops(2.0), phase="again"))
+    assert "drift" in told(record(loops(4.0), phase="run_a"))

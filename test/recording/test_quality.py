@@ -1,5 +1,7 @@
 """Defects are found where they are, and good data are left alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -221,6 +223,17 @@ def test_a_start_that_is_not_settled_contradicts_rest():
     assert "not_at_rest" in kinds(late)
     assert "not_at_rest" not in kinds(Record(late.voltage, late.displacement, PERIOD, "x", initial_voltage=0.0))
     assert "not_at_rest" not in kinds(Record(late.voltage, late.displacement, PERIOD, "x", truncated=True))
+
+
+def test_records_that_begin_alike_at_different_displacements_are_told():
+    drive = sine()
+    y = stage(drive)
+    first, again = (Record(drive, y + zero, PERIOD, "x") for zero in (0.0, 0.02 * np.ptp(y)))
+    assert "origins_differ" in kinds(first, again)
+    assert "origins_differ" not in kinds(first, first)
+    assert "origins_differ" not in kinds(first, replace(again, continues=True))
+    elsewhere = Record(drive[400:], y[400:], PERIOD, "x")
+    assert "origins_differ" not in kinds(first, elsewhere)
 
 
 @pytest.mark.parametrize("kind", ["sine", "triangle"])
