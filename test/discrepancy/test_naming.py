@@ -50,6 +50,19 @@ def test_what_is_in_no_catalogue_is_unknown():
     assert "does not explain" in found.reason
 
 
+def test_what_only_records_set_aside_show_is_not_passed_over():
+    experiment = replace(hidden(plant="independent"), group="effect_free").experiment()
+    aside = {p.index for p in answered(replace(hidden(plant="independent"), group="effect_free")).gap.per_phase}
+    swing = np.ptp(experiment.named("triangle")[0].displacement)
+    records = tuple(
+        replace(r, displacement=r.displacement + 2e-3 * swing * np.sin(np.arange(r.size) / 5.0)) if i in aside else r
+        for i, r in enumerate(experiment)
+    )
+    found = diagnose(replace(experiment, records=records))
+    assert found.verdict is Verdict.UNKNOWN
+    assert "set aside" in found.reason
+
+
 def test_without_the_true_family_nothing_else_takes_the_blame():
     library = ("thermal_drift", "gain_drift", "extra_delay", "axis_coupling")
     found = diagnose(hidden("creep").experiment(), effects=[BY_NAME[n] for n in library])

@@ -1,0 +1,61 @@
+"""What block averages hide of a drive is made good from the averages around it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from piezo_hysteresis.discrepancy.coarseness import coarseness, sharp_drive
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Record
+
+PERIOD = 1e-4
+STAGE = Model((BoucWen(A=0.4, beta=0.6, gamma=-0.1), Arx(a=(-0.5,), b=(0.5,), delay=1.0)), PERIOD, 10.0, 1e-5)
+
+
+def triangle(shift):
+    time = PERIOD * np.arange(40_000)
+    return 10.0 * (1.0 - np.abs(2.0 * np.mod(time + shift, 1.0) - 1.0)) * (time >= 1.0 - shift)
+
+
+def staircase(ramp):
+    levels = np.array([0.0, 4.0, 9.0, 3.0, 6.0])
+    time = PERIOD * np.arange(50_000)
+    jumps = np.clip((time[:, None] - np.arange(1.0, 5.0) - 0.0437) / ramp, 0.0, 1.0)
+    return jumps @ np.diff(levels)
+
+
+def averaged(drive, factor):
+    (displacement,) = STAGE.simulate([Record(drive, np.zeros(drive.size), PERIOD)])
+    return Record(drive, displacement, PERIOD).decimate(factor)
+
+
+@pytest.mark.parametrize(
+    ("drive", "factor"),
+    [(triangle(0.003), 100), (triangle(0.0061), 200), (staircase(1e-4), 1000), (staircase(0.05), 1000)],
+)
+def test_most_of_what_averages_miss_is_made_good(drive, factor):
+    slow = averaged(drive, factor)
+    (change,), (point,) = coarseness(STAGE, [slow]), STAGE.simulate([slow])
+    missed = np.std(slow.displacement - point)
+    assert missed > 2e-4 * np.ptp(slow.displacement)
+    assert np.std(slow.displacement - point - change) < 0.4 * missed
+
+
+def test_records_that_are_not_slow_are_left_alone():
+    drive = np.random.default_rng(0).normal(size=500)
+    record = Record(drive, 1e-6 * drive, PERIOD)
+    assert not coarseness(STAGE, [record])[0].any()
+
+
+@given(
+    arrays(np.float64, st.integers(1, 30), elements=st.floats(-10.0, 10.0, allow_subnormal=False)),
+    st.sampled_from([2, 4, 10, 16]),
+    st.booleans(),
+)
+def test_averages_are_kept(averages, parts, abrupt):
+    drive = sharp_drive(averages, float(averages[0]), parts, abrupt=abrupt)
+    assert drive.size == parts * averages.size
+    np.testing.assert_allclose(drive.reshape(-1, parts).mean(axis=1), averages, atol=1e-9)
