@@ -47,8 +47,9 @@ UNSURE = 0.3
 """Share of what slow samples have lost that counts as floor: the rest is made good."""
 NOISY, WORTHWHILE = 1.1, 0.95
 """Cost over that of noise from which it is begun anew, and share of it that may be left for another time."""
-UNFORESEEN = 1.5
-"""Gap on records set aside, in floors, from which something is missing although those that were fitted lack nothing."""
+FORESEEN, UNFORESEEN = 1.1, 1.5
+"""Gap on records set aside, in floors: up to the first nothing is missing, though some that were fitted are not quite
+foretold by the others; from the second something is, though those lack nothing."""
 IDLE = ("idle", "hold", *CARRYING)
 """Phases that only bring the stage from one state to another."""
 
@@ -198,7 +199,9 @@ def _verdict(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[
             else f"a gap of {gap.after / gap.floor:.1f} floors remains unexplained"
         )
         return Verdict.NAMED, f"The model misses {names}: {100 * closed:.0f} % of the gap is explained; {rest}."
-    if selection.score.excess <= ADEQUATE and not selection.accepted:
+    many = gap.unseen and len(gap.per_phase) >= FEWEST
+    foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
+    if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):
         if gap.after > UNFORESEEN * gap.floor:
             told = f"those set aside, where a gap of {gap.after / gap.floor:.1f} floors remains"
             return Verdict.UNKNOWN, f"No name: nothing is missing on the records that were fitted, but on {told}."

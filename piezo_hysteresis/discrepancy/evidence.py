@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import MainsHum
-from ..effects.extent import Extent
+from ..effects.extent import ROOM, Extent
 from ..identification.content import content_of
 from ..identification.normal_equations import Nuisance
 from ..model import Model
@@ -70,6 +70,7 @@ class Evidence:
 
 def extent_of(records: Sequence[Record], model: Model) -> Extent:
     """What the records span."""
+    known = [float(r.temperature.mean()) for r in records if r.temperature is not None]
     return Extent(
         voltage_min=min(float(r.voltage.min()) for r in records),
         voltage_max=max(float(r.voltage.max()) for r in records),
@@ -79,6 +80,7 @@ def extent_of(records: Sequence[Record], model: Model) -> Extent:
         fastest_period=min(r.sample_period for r in records),
         duration=max(r.start_time + r.duration for r in records) - min(r.start_time for r in records),
         longest_record=max(r.duration for r in records),
+        temperature=round(float(np.mean(known)), 2) if known else ROOM,
     )
 
 

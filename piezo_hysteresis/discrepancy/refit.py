@@ -168,13 +168,19 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
 
 
 def is_seen(candidate: Candidate) -> bool:
-    """Whether the effect changes any record by so much as could be seen; hum, free per record, has its own rule."""
+    """Whether the effect changes any record by so much as could be seen; hum, free per record, has its own rule.
+
+    A change that is the same in all records is the sensor's zero.
+    """
     assert candidate.fit is not None
     evidence, model = candidate.evidence, candidate.fit.model
     with_it, without_it = model.simulate(evidence.records), model.without(candidate.name).simulate(evidence.records)
+    changes = [first - second for first, second in zip(with_it, without_it, strict=True)]
+    counted = [(c, floor) for c, floor in zip(changes, evidence.floors, strict=True) if np.isfinite(floor)]
+    means = np.array([c.mean() for c, _ in counted])
+    zeros = means if evidence.nuisance.offset else np.full(means.size, means.mean())
     return candidate.name == MainsHum.name or any(
-        np.std(first - second) > SEEN * floor
-        for first, second, floor in zip(with_it, without_it, evidence.floors, strict=True)
+        np.sqrt(np.mean((c - zero) ** 2)) > SEEN * floor for (c, floor), zero in zip(counted, zeros, strict=True)
     )
 
 

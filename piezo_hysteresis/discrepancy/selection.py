@@ -126,7 +126,9 @@ def _turn(
     tell("score test of the catalogue", 0.0)
     evidence = evidence.with_peaks(residuals(model, evidence.records, evidence.nuisance))
     present = {e.public_name() for e in model.effects}
-    screened = screen(model, evidence, [e for e in effects if e.public_name() not in present])
+    twins = {e.name: t.name for e in effects for t in model.effects if e.twin == t.name or t.twin == e.name}
+    absent = [e for e in effects if e.public_name() not in present and e.name not in twins]
+    screened = screen(model, evidence, absent)
     likely = [
         c
         for k, c in enumerate(screened)
@@ -142,7 +144,10 @@ def _turn(
         refits = sorted([*refits, *late], key=lambda c: c.score.cost)
         best, alone, objection = _judged(refits, before, null, keeps)
     accepted, rivals = objection is None, list[Candidate]()
-    rejected = [] if objection is None else [Rejection(best.name, objection)]
+    rejected = [
+        Rejection(name, f"on slow drive one with {twin}, which is in the model") for name, twin in twins.items()
+    ]
+    rejected += [] if objection is None else [Rejection(best.name, objection)]
     better = alone is not None and before.cost - alone.score.cost > 0.5 * LEAST_GAIN
     renewed = alone if better and not accepted else None
     for candidate in refits:

@@ -87,6 +87,8 @@ class Effect(ABC):
     """Effect whose kernel holds this one as a term (terms of the Bouc-Wen loop, softening of the ARX mode)."""
     channel: ClassVar[str | None] = None
     """Extra channel of the record that is needed: ``other_displacement`` or ``temperature``."""
+    twin: ClassVar[str | None] = None
+    """Effect that is one with this one on slow drive: what remains beside the one is the form of it, not the other."""
     equation: ClassVar[str]
     signature: ClassVar[str]
     source: ClassVar[str]

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+ROOM = 293.15
+"""Temperature where none was recorded [K]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Extent:
@@ -27,6 +30,8 @@ class Extent:
         Duration of the longest record [s].
     peaks : tuple of float
         Frequencies at which the residual stands out of the displacement [Hz], highest first.
+    temperature : float
+        Mean over the records that have one [K].
     """
 
     voltage_min: float
@@ -38,6 +43,7 @@ class Extent:
     duration: float
     longest_record: float
     peaks: tuple[float, ...] = ()
+    temperature: float = ROOM
 
     @property
     def span(self) -> float:

@@ -32,6 +32,7 @@ class Softening(Term):
     family = "dynamics"
     place = Place.DYNAMICS
     host = "arx"
+    twin = "sensor_nonlinearity"
     equation = "m ẍ + c ẋ + k x (1 + k2 |x| + k3 x²) = k w"
     signature = "a resonance that moves with amplitude: large chirps across it; statically a sensor cubic"
     source = "Duffing oscillator on the modal coordinate"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from ..parameter import Parameter
 from .block import Array, Block
 from .channel_block import ChannelBlock
 from .effect import Effect, Place, Setting
+from .extent import Extent
 
 
 class ThermalExpansion(Effect):
@@ -39,6 +42,11 @@ class ThermalExpansion(Effect):
             "T0", "T0", "K", 293.15, 0.0, 1e3, "reference temperature", "convention, 20 °C", scale=10.0, fixed=True
         ),
     )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Switched off, about the mean temperature: far from it the expansion would be one with the sensor zero."""
+        return (cls(T0=extent.temperature),)
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         return ThermalExpansionBlock(self["kappa"], self["T0"])
