@@ -14,6 +14,7 @@ _INSIDE = 0.1
 _SAME = 0.02
 _ON_BRANCH = 0.2
 _NOISE = 8.0
+_FIRST = 8
 _SAME_VOLTAGE = 1e-3
 _APART = 0.01
 
@@ -21,8 +22,9 @@ _APART = 0.01
 def is_within_its_loop(record: Record) -> bool:
     """True where a periodic record begins in motion, its displacement already where it is a period later.
 
-    A stage that had settled at the first voltage begins between the branches of its loop; one that was cycling before
-    begins on a branch. Where both are the same, at the end of a swing, the stage is taken to have settled.
+    A stage that had settled at the first voltage begins between the branches of its loop, and a little after the drive;
+    one that was cycling before begins on a branch, in motion. Where both are the same, at the end of a swing, the stage
+    is taken to have settled.
     """
     if record.continues or record.truncated or record.initial_voltage is not None or record.size < 64:
         return False
@@ -42,7 +44,10 @@ def is_within_its_loop(record: Record) -> bool:
     width = abs(float(y[back] - y[period]))
     noise = float(np.median(np.abs(np.diff(y, 3)))) / 3.0
     off = abs(float(np.mean(y[:opening] - y[period : period + opening])))
-    return bool(width > 10.0 * noise and off < _ON_BRANCH * width)
+    few = min(opening, _FIRST)
+    moves, later = float(y[few] - y[0]), float(y[period + few] - y[period])
+    starts = abs(moves - later) > 0.5 * abs(later) > 3.0 * noise
+    return bool(width > 10.0 * noise and off < _ON_BRANCH * width and not starts)
 
 
 def onset(record: Record) -> list[Notice]:

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import inspect, read, write
 from piezo_hysteresis.recording.lag import lag_of
+from piezo_hysteresis.recording.onset import is_within_its_loop
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
 PERIOD = 1e-4
@@ -223,6 +224,16 @@ def test_a_start_that_is_not_settled_contradicts_rest():
     assert "not_at_rest" in kinds(late)
     assert "not_at_rest" not in kinds(Record(late.voltage, late.displacement, PERIOD, "x", initial_voltage=0.0))
     assert "not_at_rest" not in kinds(Record(late.voltage, late.displacement, PERIOD, "x", truncated=True))
+
+
+@pytest.mark.parametrize("frequency", [10.0, 50.0, 100.0, 200.0, 400.0])
+def test_a_fast_sine_begins_within_its_loop_only_where_it_was_running_before(frequency):
+    time = 2e-5 * np.arange(int(12 / frequency / 2e-5))
+    settled = SimulatedStage(seed=1).play(5.0 + 2.0 * np.sin(2 * np.pi * frequency * time), phase="sine")
+    assert not is_within_its_loop(settled)
+    cut = round(5.0 / frequency / 2e-5)
+    late = Record(settled.voltage[cut:], settled.displacement[cut:], settled.sample_period, "sine")
+    assert is_within_its_loop(late)
 
 
 def test_records_that_begin_alike_at_different_displacements_are_told():
