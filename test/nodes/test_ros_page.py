@@ -124,6 +124,11 @@ def test_the_security_policy_allows_what_a_node_uses_and_nothing_more(nodes, nod
     assert policy.get("request", set()) == of("client")
 
 
+def test_no_comment_of_the_policy_stands_where_sros2_looks_for_enclaves():
+    whole = ElementTree.parse(POLICY, ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True)))
+    assert [e.tag for e in whole.getroot().find("enclaves")] == ["enclave"] * 5
+
+
 def test_the_policy_has_a_key_for_who_drives_and_one_for_who_looks():
     operator, observer = allowed("operator"), allowed("observer")
     assert {"/command", "/set_voltage"} <= operator["publish"]
