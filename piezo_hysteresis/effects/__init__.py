@@ -33,6 +33,7 @@ from .rate_dependent_hysteresis import RateDependentHysteresis
 from .sensor_bandwidth import SensorBandwidth
 from .sensor_nonlinearity import SensorNonlinearity
 from .softening import Softening
+from .softening_of_one_mode import SofteningOfOneMode
 from .thermal_drift import ThermalDrift
 from .thermal_expansion import ThermalExpansion
 
@@ -55,6 +56,7 @@ CHAIN: tuple[type[Effect], ...] = (
     ExtraDelay,
     Arx,
     Softening,
+    SofteningOfOneMode,
     ExtraResonance,
     SensorNonlinearity,
     GainDrift,
@@ -122,6 +124,7 @@ __all__ = [
     "SensorNonlinearity",
     "Setting",
     "Softening",
+    "SofteningOfOneMode",
     "Term",
     "ThermalDrift",
     "ThermalExpansion",

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ParameterError
+from ..errors import ModelError, ParameterError
 from ..parameter import Parameter
 from .arx_block import ArxBlock, dc_gain_slopes
-from .block import Array, Block, SeriesBlock
+from .block import Array, Block
 from .effect import Effect, Place, Setting
 from .lag import LagBlock
-from .softened_block import SoftenedBlock, StaticSoftening
+from .softened_block import SlowSoftenedBlock, SoftenedBlock, StaticSoftening
+from .softening import Softening
 
 LONGEST_DELAY = 1e6
 """Longest dead time, and longest group delay near dc [samples]."""
@@ -91,10 +92,16 @@ class Arx(Effect):
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         names = tuple(f"{self.name}.{n}" for n in self.free_names())
-        softening = [(term["k2"], term["k3"]) for term in terms]
+        fast = ArxBlock(names, self.array("a"), self.array("b"), self["delay"])
+        softening = [
+            (StaticSoftening(t.name, t["k2"], t["k3"]), t.path(fast, self["delay"]))
+            for t in terms
+            if isinstance(t, Softening)
+        ]
+        if len(softening) > 1:
+            raise ModelError(f"arx: got {len(softening)} forms of softening, expected one")
         if not setting.is_slow:
-            arx = ArxBlock(names, self.array("a"), self.array("b"), self["delay"])
-            return SoftenedBlock(arx, self["delay"], *softening[0]) if softening else arx
+            return SoftenedBlock(fast, *softening[0]) if softening else fast
         a, b, ratio = self.array("a"), self.array("b"), setting.model_period / setting.sample_period
         at_a, at_b = 1.0 + a.sum(), b.sum()
         power = np.arange(1, a.size + 1)
@@ -107,4 +114,4 @@ class Arx(Effect):
             )
         lag = max(0.0, ratio * self.group_delay)
         slow = LagBlock(names, self.dc_gain, lag, dc_gain_slopes(a, b), lag_slopes)
-        return SeriesBlock((StaticSoftening(*softening[0]), slow)) if softening else slow
+        return SlowSoftenedBlock(slow, fast, *softening[0]) if softening else slow

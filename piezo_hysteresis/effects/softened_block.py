@@ -1,52 +1,20 @@
 """The ARX with a dominant mode whose stiffness changes with deflection.
 
-G is split into its dominant mode M = g/(1 + m1 z⁻¹ + m2 z⁻²), g = 1 + m1 + m2, and the rest R = G/M. With the force
-N(x) = k2 |x| x + k3 x³ the modal coordinate obeys x_i = −m1 x_(i−1) − m2 x_(i−2) + g (w_i − N(x_(i−1))). Only its
-deviation ξ from the linear mode goes through R, beside the unchanged ARX: y = G w + R ξ. Off, ξ is exactly zero.
+G has a dominant mode M = g/(1 + m1 z⁻¹ + m2 z⁻²), g = 1 + m1 + m2. With the force N(x) = k2 |x| x + k3 x³ its modal
+coordinate obeys x_i = −m1 x_(i−1) − m2 x_(i−2) + g (w_i − N(x_(i−1))). Only its deviation ξ from the linear mode goes
+through R, beside the unchanged ARX: y = G w + R ξ. Off, ξ is exactly zero. R is what the mode passes on its way to the
+sensor: all the rest of G, R = G/M, or nothing but its own share of a sum of modes.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..errors import ModelError
 from ..kernel import kernel
 from .arx_block import ArxBlock
-from .block import Array, Block, MemorylessBlock, State
-
-
-def split(a: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Dominant mode (m1, m2) of B/A, the rest of A without its leading 1, and their derivatives by a, (na, na).
-
-    The dominant mode is the complex pole pair with the largest residue over distance from the unit circle.
-
-    Raises
-    ------
-    ModelError
-        If A has no complex pole pair.
-
-    >>> mode, rest, _ = split(np.array([-1.7, 1.1, -0.16]), np.ones(1))
-    >>> mode.round(9).tolist(), rest.round(9).tolist()
-    ([-1.5, 0.8], [-0.2])
-    """
-    poles = np.roots(np.append(1.0, a))
-    above = poles[poles.imag > 1e-9]
-    if not above.size:
-        raise ModelError("softening: the ARX has no complex pole pair; expected a resonance, order 2 or more")
-
-    def height(pole: complex) -> float:
-        others = poles[np.abs(poles - pole) > 0]
-        return float(np.abs(np.polyval(b[::-1], 1 / pole) / np.prod(1 - others / pole)) / (1 - np.abs(pole)))
-
-    pole = max(above, key=height)
-    mode = np.array([-2.0 * pole.real, np.abs(pole) ** 2])
-    rest = np.polydiv(np.append(1.0, a), np.append(1.0, mode))[0][1:]
-    columns = np.zeros((a.size, a.size))
-    for k in range(a.size):
-        factor = np.append(1.0, rest if k < 2 else mode)
-        first = k if k < 2 else k - 2
-        columns[first : first + factor.size, k] = factor[: a.size - first]
-    return mode, rest, np.asarray(np.linalg.inv(columns))
+from .block import Array, Block, MemorylessBlock, SeriesBlock, State
+from .lag import LagBlock
+from .mode_path import Path
 
 
 @kernel
@@ -136,9 +104,8 @@ def add_mixed(weights, rows, out):
 class StaticSoftening(MemorylessBlock):
     """Deflection under a slow w, for records slower than the model."""
 
-    names = ("softening.k2", "softening.k3")
-
-    def __init__(self, k2: float, k3: float) -> None:
+    def __init__(self, name: str, k2: float, k3: float) -> None:
+        self.names = (f"{name}.k2", f"{name}.k3")
         self.k2, self.k3 = k2, k3
 
     def value(self, x: Array) -> Array:
@@ -156,27 +123,23 @@ class StaticSoftening(MemorylessBlock):
 
 
 class SoftenedBlock(Block):
-    """State: of the ARX; w and x at rest; of mode and ξ; of the rest."""
+    """State: of the ARX; w and x at rest; of mode and ξ; of the path."""
 
-    def __init__(self, arx: ArxBlock, delay: float, k2: float, k3: float) -> None:
-        self.arx = arx
-        mode, rest, self.by_a = split(arx.a, arx.b)
-        self.loop = np.append(mode, (k2, k3))
-        self.mode_gain = 1.0 + mode.sum()
-        self.rest_of_arx = ArxBlock((), rest, arx.b / self.mode_gain, delay)
-        self.settled = StaticSoftening(k2, k3)
-        self.names = (*self.settled.names, *arx.names)
+    def __init__(self, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
+        self.arx, self.settled, self.path = arx, settled, path
+        self.loop = np.append(path.mode, (settled.k2, settled.k3))
+        self.names = (*settled.names, *arx.names)
 
     def static(self, x0: float) -> float:
-        return self.arx.gain * self.settled.static(x0)
+        return self.arx.gain * x0 + self.path.share * (self.settled.static(x0) - x0)
 
     def static_slopes(self, x0: float) -> tuple[float, Array]:
         slope, own = self.settled.static_slopes(x0)
-        by_arx = self.arx.gain_slopes() * self.settled.static(x0)
-        return self.arx.gain * slope, np.concatenate((self.arx.gain * own, by_arx))
+        by_arx = self.arx.gain_slopes() * x0 + self.path.share_slopes * (self.settled.static(x0) - x0)
+        return self.arx.gain + self.path.share * (slope - 1.0), np.concatenate((self.path.share * own, by_arx))
 
     def rest(self, x0: float, time: float) -> State:
-        return self.arx.rest(x0, time), (x0, self.settled.static(x0)), np.zeros(4), self.rest_of_arx.zeros(1)
+        return self.arx.rest(x0, time), (x0, self.settled.static(x0)), np.zeros(4), self.path.filter.zeros(1)
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         arx, (w0, x0), z, filtered = state
@@ -184,37 +147,87 @@ class SoftenedBlock(Block):
         xi, z = np.empty(x.shape), z.copy()
         run_mode_deviation(x - w0, x0, self.loop, z, xi)
         added = np.empty((1, x.size))
-        filtered = self.rest_of_arx.filter(xi[None, :], filtered, added)
-        return y + (self.arx.gain * (x0 - w0) + added[0]), (arx, (w0, x0), z, filtered)
+        filtered = self.path.filter.filter(xi[None, :], filtered, added)
+        return y + (self.path.share * (x0 - w0) + added[0]), (arx, (w0, x0), z, filtered)
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
         slope, own = self.settled.static_slopes(x0)
         settled = np.concatenate((slope * dx0, np.zeros(2), own))
         moved = np.zeros((len(settled), 4))
-        filtered = self.rest_of_arx.zeros(len(settled))
-        return self.arx.rest_tangent(x0, dx0), np.array(dx0), settled, moved, filtered, self.rest_of_arx.own_rest()
+        filtered = self.path.filter.zeros(len(settled))
+        return self.arx.rest_tangent(x0, dx0), np.array(dx0), settled, moved, filtered, self.path.filter.own_rest()
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         arx, (w0, x0), z, filtered = state
         d_arx, dw0, dx0, dz, d_filtered, own = tangent
-        m, na, nb = len(dx), self.arx.a.size, self.arx.b.size
+        m, na, nb, k = len(dx), self.arx.a.size, self.arx.b.size, len(self.path.by_a)
         dz, xi = dz.copy(), np.empty(x.shape)
         d_xi = np.empty((m + 4, x.size))
         z = z.copy()
         linearise_mode_deviation(x - w0, dx - dw0[:, None], x0, dx0, self.loop, z, dz, xi, d_xi)
         y, rows, arx, d_arx = self.arx.linearise(x, dx, arx, d_arx)
-        added, through, by_rest = np.empty((1, x.size)), np.empty(d_xi.shape), np.empty((na - 1 + nb, x.size))
-        after = self.rest_of_arx.filter(xi[None, :], filtered, added)
-        own = self.rest_of_arx.by_parameter(xi, added[0], filtered[0], own, by_rest)
-        d_filtered = self.rest_of_arx.filter(d_xi, d_filtered, through)
-        rows[:m] += self.arx.gain * (dx0[:m] - dw0)[:, None] + through[:m]
-        rows[m:] += (self.arx.gain_slopes() * (x0 - w0))[:, None]
-        by_mode = through[m : m + 2] - added / self.mode_gain
-        add_mixed(self.by_a[:2], by_mode, rows[m : m + na])
-        add_mixed(self.by_a[2:], by_rest[: na - 2], rows[m : m + na])
-        rows[m + na : m + na + nb] += by_rest[na - 2 : -1] / self.mode_gain
-        rows[m + na + nb] += by_rest[-1]
-        by_stiffness = self.arx.gain * dx0[m + 2 :, None] + through[m + 2 :]
-        y = y + (self.arx.gain * (x0 - w0) + added[0])
+        added, through, by_path = np.empty((1, x.size)), np.empty(d_xi.shape), np.empty((k + 1, x.size))
+        after = self.path.filter.filter(xi[None, :], filtered, added)
+        own = self.path.filter.by_parameter(xi, added[0], filtered[0], own, by_path)
+        d_filtered = self.path.filter.filter(d_xi, d_filtered, through)
+        rows[:m] += self.path.share * (dx0[:m] - dw0)[:, None] + through[:m]
+        rows[m:] += (self.path.share_slopes * (x0 - w0))[:, None]
+        by_mode = through[m : m + 2] - added / self.path.gain
+        add_mixed(self.path.mode_by_a, by_mode, rows[m : m + na])
+        add_mixed(self.path.by_a, by_path[:k], rows[m : m + na])
+        add_mixed(self.path.by_b, by_path[:k], rows[m + na : m + na + nb])
+        rows[m + na + nb] += by_path[k]
+        by_stiffness = self.path.share * dx0[m + 2 :, None] + through[m + 2 :]
+        y = y + (self.path.share * (x0 - w0) + added[0])
         tangent = (d_arx, dw0, dx0, dz, d_filtered, own)
         return y, np.vstack((rows[:m], by_stiffness, rows[m:])), (arx, (w0, x0), z, after), tangent
+
+
+class SlowSoftenedBlock(Block):
+    """The static softening of one mode in a sum, and the lag of G behind it, for records slower than the model."""
+
+    def __init__(self, lag: LagBlock, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
+        self.ratio = path.share / arx.gain
+        self.ratio_slopes = (path.share_slopes - self.ratio * arx.gain_slopes()) / arx.gain
+        self.series = SeriesBlock((_Shared(settled, self.ratio), lag))
+        self.names = (*settled.names, *lag.names)
+
+    def _folded(self, own: Array) -> Array:
+        """Rows of the stiffness, the ratio and the ARX; the ratio is a function of the ARX."""
+        return np.concatenate((own[:2], own[3:] + np.multiply.outer(self.ratio_slopes, own[2])))
+
+    def static(self, x0: float) -> float:
+        return self.series.static(x0)
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        slope, own = self.series.static_slopes(x0)
+        return slope, self._folded(own)
+
+    def rest(self, x0: float, time: float) -> State:
+        return self.series.rest(x0, time)
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return self.series.rest_tangent(x0, dx0)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        return self.series.run(x, state)
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        y, rows, state, tangent = self.series.linearise(x, dx, state, tangent)
+        return y, np.concatenate((rows[: len(dx)], self._folded(rows[len(dx) :]))), state, tangent
+
+
+class _Shared(MemorylessBlock):
+    """w + ratio (x − w)."""
+
+    def __init__(self, settled: StaticSoftening, ratio: float) -> None:
+        self.settled, self.ratio, self.names = settled, ratio, (*settled.names, "ratio")
+
+    def value(self, x: Array) -> Array:
+        return x + self.ratio * (self.settled.value(x) - x)
+
+    def slope(self, x: Array) -> Array:
+        return 1.0 + self.ratio * (self.settled.slope(x) - 1.0)
+
+    def by_parameter(self, x: Array) -> Array:
+        return np.vstack((self.ratio * self.settled.by_parameter(x), self.settled.value(x) - x))

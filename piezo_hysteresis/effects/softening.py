@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import ClassVar, Self
 
 from ..parameter import Parameter
 from .effect import Place, Term
 from .extent import Extent
+from .mode_path import Path, WholePath
 
 FOUND_BY = (0.01, 0.03, 0.1)
 """Sizes of k3 at which a search begins: a sharp resonance that moves by its width is far from linear in it."""
@@ -24,8 +25,8 @@ class Softening(Term):
 
     Notes
     -----
-    x is the coordinate of the dominant complex pole pair of G, in units of the static hysteresis output w. G is split
-    into that mode and the rest; the delay of G stays outside the loop of the mode.
+    x is the coordinate of the dominant complex pole pair of G, in units of the static hysteresis output w. That mode
+    drives the rest of G; the delay of G stays outside the loop of the mode.
     """
 
     name = "softening"
@@ -33,6 +34,8 @@ class Softening(Term):
     place = Place.DYNAMICS
     host = "arx"
     twin = "sensor_nonlinearity"
+    path: ClassVar[type[Path]] = WholePath
+    """What the mode passes on its way to the sensor."""
     equation = "m ẍ + c ẋ + k x (1 + k2 |x| + k3 x²) = k w"
     signature = "a resonance that moves with amplitude: large chirps across it; statically a sensor cubic"
     source = "Duffing oscillator on the modal coordinate"

@@ -25,6 +25,7 @@ FAMILIES = {
     "initial_state": "hysteresis",
     "backlash": "hysteresis",
     "softening": "dynamics",
+    "softening_of_one_mode": "dynamics",
     "extra_resonance": "dynamics",
     "extra_delay": "lag",
     "amplifier_bandwidth": "lag",

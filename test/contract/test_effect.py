@@ -23,6 +23,7 @@ from piezo_hysteresis.effects import (
     Offset,
     PublishedBoucWen,
     Softening,
+    SofteningOfOneMode,
     ThermalDrift,
 )
 from piezo_hysteresis.effects.time_block import TimeBlock
@@ -37,7 +38,7 @@ UNUSUAL = {
 }
 """Sizes of effects that are not off at a finite small value."""
 
-MAY_DIVERGE = (PublishedBoucWen, Softening)
+MAY_DIVERGE = (PublishedBoucWen, Softening, SofteningOfOneMode)
 """At their bounds the explicit step is unstable, and the stiffness vanishes under the drive; both are told."""
 
 

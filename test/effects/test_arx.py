@@ -10,8 +10,8 @@ from numpy.polynomial import polynomial
 from scipy import signal
 from scipy.integrate import solve_ivp
 
-from piezo_hysteresis.effects import Arx, Setting, Softening
-from piezo_hysteresis.effects.softened_block import split
+from piezo_hysteresis.effects import Arx, Setting, Softening, SofteningOfOneMode
+from piezo_hysteresis.effects.mode_path import split
 from piezo_hysteresis.errors import ModelError, ParameterError
 
 PAPER = {
@@ -121,3 +121,45 @@ def test_the_softened_mode_is_a_duffing_oscillator() -> None:
 def test_softening_needs_a_resonance() -> None:
     with pytest.raises(ModelError, match="no complex pole pair"):
         run(Arx(a=[-0.9], b=[0.1]), np.ones(3), FAST, Softening(k3=0.1))
+
+
+def two_modes(period: float, share: float = 0.8) -> tuple[Arx, np.ndarray]:
+    """A sum of a mode at 300 Hz with `share` of the static displacement and one at 900 Hz, and both denominators."""
+    modes = []
+    for frequency, zeta in ((300.0, 0.02), (900.0, 0.03)):
+        rate = 2 * np.pi * frequency
+        poles = np.exp(rate * period * (-zeta + 1j * np.sqrt(1 - zeta**2)))
+        modes.append(np.poly([poles, poles.conjugate()]).real)
+    first, second = modes
+    b = share * first.sum() * second + (1.0 - share) * second.sum() * first
+    return Arx(a=polynomial.polymul(first, second)[1:], b=b, delay=2), np.array(modes)
+
+
+@pytest.mark.parametrize("k3", [0.0, 0.2])
+def test_softening_of_one_mode_leaves_the_other_as_it_is(k3: float) -> None:
+    period, share = 2e-5, 0.8
+    arx, (first, second) = two_modes(period, share)
+    w = np.concatenate((np.zeros(5), np.random.default_rng(3).normal(0.0, 0.5, 3000)))
+    x, z = np.zeros(w.size), np.zeros(w.size)
+    for i in range(w.size):
+        before, earlier = (x[i - 1], x[i - 2]) if i > 1 else (0.0, 0.0)
+        x[i] = first.sum() * (w[i] - k3 * before**3) - first[1] * before - first[2] * earlier
+    z = signal.lfilter([second.sum()], second, w)
+    expected = np.concatenate((np.zeros(2), (share * x + (1.0 - share) * z)[:-2]))
+    y = run(arx, w, Setting(period, period), SofteningOfOneMode(k3=k3))
+    np.testing.assert_allclose(y, expected, atol=1e-9)
+
+
+def test_one_softened_mode_of_two_settles_with_its_share() -> None:
+    period, share, k3 = 2e-5, 0.8, 0.03
+    arx, _ = two_modes(period, share)
+    x = np.concatenate((np.zeros(5), np.full(60000, 0.8)))
+    (deflection,) = [r.real for r in np.roots([k3, 0.0, 1.0, -0.8]) if abs(r.imag) < 1e-12 and 0 < r.real < 1]
+    for setting in (Setting(period, period), Setting(1e-3, period)):
+        y = run(arx, x, setting, SofteningOfOneMode(k3=k3))
+        assert y[-1] == pytest.approx(share * deflection + (1.0 - share) * 0.8, rel=1e-7)
+
+
+def test_two_forms_of_softening_are_one_too_many() -> None:
+    with pytest.raises(ModelError, match="2 forms of softening"):
+        run(two_modes(2e-5)[0], np.ones(3), FAST, Softening(k3=0.1), SofteningOfOneMode(k3=0.1))
