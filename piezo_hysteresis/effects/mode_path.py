@@ -17,7 +17,7 @@ def split(a: Array, b: Array) -> tuple[Array, Array, Array]:
     Raises
     ------
     ModelError
-        If A has no complex pole pair.
+        If A has no complex pole pair, or the dominant one twice.
 
     >>> mode, rest, _ = split(np.array([-1.7, 1.1, -0.16]), np.ones(1))
     >>> mode.round(9).tolist(), rest.round(9).tolist()
@@ -40,7 +40,7 @@ def split(a: Array, b: Array) -> tuple[Array, Array, Array]:
         factor = np.append(1.0, rest if k < 2 else mode)
         first = k if k < 2 else k - 2
         columns[first : first + factor.size, k] = factor[: a.size - first]
-    return mode, rest, np.asarray(np.linalg.inv(columns))
+    return mode, rest, _inverse(columns)
 
 
 def share_of_mode(a: Array, b: Array, mode: Array, rest: Array, by_a: Array) -> tuple[Array, Array, Array]:
@@ -50,7 +50,7 @@ def share_of_mode(a: Array, b: Array, mode: Array, rest: Array, by_a: Array) -> 
 
     >>> mode, rest, by_a = split(np.array([-1.7, 1.1, -0.16]), np.ones(1))
     >>> share_of_mode(np.array([-1.7, 1.1, -0.16]), np.ones(1), mode, rest, by_a)[0].round(6).tolist()
-    [1.083333, -1.333333]
+    [0.925926, 0.296296]
     """
     size = max(b.size, a.size)
     resonance, others = np.append(1.0, mode), np.append(1.0, rest)
@@ -59,7 +59,7 @@ def share_of_mode(a: Array, b: Array, mode: Array, rest: Array, by_a: Array) -> 
         column = others if k < 2 else resonance
         first = k if k < 2 else k - 2
         sylvester[first : first + column.size, k] = column
-    inverse = np.asarray(np.linalg.inv(sylvester))
+    inverse = _inverse(sylvester)
     parts = inverse @ np.pad(b, (0, size - b.size))
     numerator, remainder = parts[:2], parts[2:]
     moved = np.zeros((size, a.size))
@@ -67,6 +67,13 @@ def share_of_mode(a: Array, b: Array, mode: Array, rest: Array, by_a: Array) -> 
         factor, first = (remainder, k + 1) if k < 2 else (numerator, k - 1)
         moved[first : first + factor.size, k] = factor
     return numerator, np.asarray(-(inverse @ moved @ by_a)[:2]), inverse[:2, : b.size]
+
+
+def _inverse(matrix: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.inv(matrix))
+    except np.linalg.LinAlgError:
+        raise ModelError("softening: the ARX has its dominant pole pair twice; expected one mode of its own") from None
 
 
 class Path:
@@ -81,10 +88,12 @@ class Path:
 
     Attributes
     ----------
-    mode : (2,) ndarray
-        m1, m2.
-    mode_by_a : (2, na) ndarray
+    mode, rest : (2,), (na - 2,) ndarray
+        m1 and m2, and the rest of A.
+    mode_by_a, rest_by_a : (2, na), (na - 2, na) ndarray
         Their derivatives.
+    gain : float
+        g.
     filter : ArxBlock
         The path, of gain 1/g less.
     share : float

@@ -11,7 +11,7 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 
 from piezo_hysteresis.effects import Arx, Setting, Softening, SofteningOfOneMode
-from piezo_hysteresis.effects.mode_path import split
+from piezo_hysteresis.effects.mode_path import share_of_mode, split
 from piezo_hysteresis.errors import ModelError, ParameterError
 
 PAPER = {
@@ -163,3 +163,9 @@ def test_one_softened_mode_of_two_settles_with_its_share() -> None:
 def test_two_forms_of_softening_are_one_too_many() -> None:
     with pytest.raises(ModelError, match="2 forms of softening"):
         run(two_modes(2e-5)[0], np.ones(3), FAST, Softening(k3=0.1), SofteningOfOneMode(k3=0.1))
+
+
+def test_a_mode_that_is_there_twice_has_no_share_of_its_own() -> None:
+    once = np.array([1.0, -1.0, 0.5])
+    with pytest.raises(ModelError, match="twice"):
+        share_of_mode(polynomial.polymul(once, once)[1:], np.ones(4), once[1:], once[1:], np.eye(4))
