@@ -15,22 +15,23 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import numpy as np
 import rclpy
-from builtin_interfaces.msg import Time
-from rclpy.executors import Executor
+from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 
 from piezo_hysteresis.nodes.cloud_stream import CloudWriter
+from piezo_hysteresis.nodes.conversions import to_stamp
 from piezo_hysteresis.nodes.executor import make_executor, spin_until
 from piezo_hysteresis.nodes.quality import DEEP, SAMPLES
 from piezo_hysteresis.nodes.sample_block import SAMPLES as LAYOUT
+from piezo_hysteresis.nodes.sending import send
 
 BLOCK = 0.01
 """Time that a block covers, as that of the driver [s]."""
@@ -82,11 +83,11 @@ def _spin(executor: Executor, duration: float) -> None:
 def _play(publisher: Publisher, size: int) -> None:
     writer, columns = CloudWriter(LAYOUT), {name: np.zeros(size, word) for name, word in LAYOUT.items()}
     due = time.monotonic()
-    while True:
+    given = True
+    while given:
         due += BLOCK
         time.sleep(max(0.0, due - time.monotonic()))
-        seconds, nanoseconds = divmod(time.time_ns(), 1_000_000_000)
-        publisher.publish(writer.write(columns, Time(sec=seconds, nanosec=nanoseconds)))
+        given = send(publisher, writer.write(columns, to_stamp(time.time_ns())))
 
 
 def main(role: str, size: int) -> None:
@@ -100,7 +101,8 @@ def main(role: str, size: int) -> None:
         hand_on: Callable[[bytes], None] = publisher.publish
         node.create_subscription(PointCloud2, "relay_source", hand_on, DEEP, raw=True)
     executor.add_node(node)
-    spin_until(executor, Future())
+    with suppress(ExternalShutdownException):
+        spin_until(executor, Future())
 
 
 if __name__ == "__main__":
