@@ -111,9 +111,10 @@ def diagnose(
     records = tuple(at_period(r, period) for r in records)
     starts = iter((model,)) if model is not None else start_models(records, fitted)
     start = exact(next(starts))
-    lost = coarseness(start, records)
-    records = tuple(replace(r, displacement=r.displacement - c) for r, c in zip(records, lost, strict=True))
-    least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
+    if not noise_of_drive:  # whose averages would turn back and forth
+        lost = coarseness(start, records)
+        records = tuple(replace(r, displacement=r.displacement - c) for r, c in zip(records, lost, strict=True))
+        least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
     kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
     evidence = Evidence(tuple(kept), np.array(sizes), Nuisance(), extent_of([records[i] for i in usable], start))
     tell("baseline, jointly", 0.25)
