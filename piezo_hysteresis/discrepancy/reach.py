@@ -29,12 +29,13 @@ def beyond_reach(records: Sequence[Record]) -> tuple[Notice, ...]:
     missing = []
     if not any(_longest_hold(r, MOVED * span) >= HOLD for r in records):
         missing.append(("creep", "no level is held for a second or more after it was changed"))
-    kinds = ["slow loops" if content_of(r).is_slow else r.phase.split("_")[0] for r in records]
+    contents = [content_of(r) for r in records]
+    kinds = ["slow loops" if c.is_slow else r.phase.split("_")[0] for r, c in zip(records, contents, strict=True)]
     if len(set(kinds)) == len(kinds):
         missing.append(("thermal_drift and gain_drift", "no kind of phase is there twice"))
     if not _has_smaller_loops(records):
         missing.append(("hysteresis_memory and hysteresis_exponent", "all loops have one amplitude"))
-    if not any(content_of(r).is_broadband for r in records):
+    if not any(c.is_broadband for c in contents):
         missing.append(("extra_resonance and the lags", "no drive moves the dynamics: no noise, no multisine"))
     return tuple(Notice("not_tested", f"{what} can hardly be seen: {why}") for what, why in missing)
 

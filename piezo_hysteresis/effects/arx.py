@@ -92,16 +92,21 @@ class Arx(Effect):
 
     def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
         names = tuple(f"{self.name}.{n}" for n in self.free_names())
-        fast = ArxBlock(names, self.array("a"), self.array("b"), self["delay"])
-        softening = [
-            (StaticSoftening(t.name, t["k2"], t["k3"]), t.path(fast, self["delay"]))
-            for t in terms
-            if isinstance(t, Softening)
-        ]
+        softening = [t for t in terms if isinstance(t, Softening)]
         if len(softening) > 1:
             raise ModelError(f"arx: got {len(softening)} forms of softening, expected one")
-        if not setting.is_slow:
-            return SoftenedBlock(fast, *softening[0]) if softening else fast
+        slow = self._lag(names, setting) if setting.is_slow else None
+        if slow is not None and not softening:
+            return slow
+        fast = ArxBlock(names, self.array("a"), self.array("b"), self["delay"])
+        if not softening:
+            return fast
+        (term,) = softening
+        settled, path = StaticSoftening(term.name, term["k2"], term["k3"]), term.path(fast, self["delay"])
+        return SoftenedBlock(fast, settled, path) if slow is None else SlowSoftenedBlock(slow, fast, settled, path)
+
+    def _lag(self, names: tuple[str, ...], setting: Setting) -> LagBlock:
+        """G in records slower than the model."""
         a, b, ratio = self.array("a"), self.array("b"), setting.model_period / setting.sample_period
         at_a, at_b = 1.0 + a.sum(), b.sum()
         power = np.arange(1, a.size + 1)
@@ -113,5 +118,4 @@ class Arx(Effect):
                 f"{LONGEST_DELAY:g}; B(1) or A(1) all but vanishes"
             )
         lag = max(0.0, ratio * self.group_delay)
-        slow = LagBlock(names, self.dc_gain, lag, dc_gain_slopes(a, b), lag_slopes)
-        return SlowSoftenedBlock(slow, fast, *softening[0]) if softening else slow
+        return LagBlock(names, self.dc_gain, lag, dc_gain_slopes(a, b), lag_slopes)

@@ -183,37 +183,25 @@ class SoftenedBlock(Block):
         return y, np.vstack((rows[:m], by_stiffness, rows[m:])), (arx, (w0, x0), z, after), tangent
 
 
-class SlowSoftenedBlock(Block):
+class SlowSoftenedBlock(SeriesBlock):
     """The static softening of one mode in a sum, and the lag of G behind it, for records slower than the model."""
 
     def __init__(self, lag: LagBlock, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
-        self.ratio = path.share / arx.gain
-        self.ratio_slopes = (path.share_slopes - self.ratio * arx.gain_slopes()) / arx.gain
-        self.series = SeriesBlock((_Shared(settled, self.ratio), lag))
+        ratio = path.share / arx.gain
+        super().__init__((_Shared(settled, ratio), lag))
+        self.ratio_slopes = (path.share_slopes - ratio * arx.gain_slopes()) / arx.gain
         self.names = (*settled.names, *lag.names)
 
     def _folded(self, own: Array) -> Array:
         """Rows of the stiffness, the ratio and the ARX; the ratio is a function of the ARX."""
         return np.concatenate((own[:2], own[3:] + np.multiply.outer(self.ratio_slopes, own[2])))
 
-    def static(self, x0: float) -> float:
-        return self.series.static(x0)
-
     def static_slopes(self, x0: float) -> tuple[float, Array]:
-        slope, own = self.series.static_slopes(x0)
+        slope, own = super().static_slopes(x0)
         return slope, self._folded(own)
 
-    def rest(self, x0: float, time: float) -> State:
-        return self.series.rest(x0, time)
-
-    def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return self.series.rest_tangent(x0, dx0)
-
-    def run(self, x: Array, state: State) -> tuple[Array, State]:
-        return self.series.run(x, state)
-
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        y, rows, state, tangent = self.series.linearise(x, dx, state, tangent)
+        y, rows, state, tangent = super().linearise(x, dx, state, tangent)
         return y, np.concatenate((rows[: len(dx)], self._folded(rows[len(dx) :]))), state, tangent
 
 
