@@ -114,6 +114,26 @@ class Samples:
         return whole and np.array_equal(part.voltage[inside], np.asarray(waveform)[at])
 
 
+class Spinning:
+    """An executor that spins nodes in a thread of its own until it is ended: only then may they be destroyed."""
+
+    def __init__(self, context: rclpy.Context, node: Node) -> None:
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(node)
+        self._ended = rclpy.Future()
+        self._thread = threading.Thread(
+            target=self.executor.spin_until_future_complete, args=(self._ended,), daemon=True
+        )
+        self._thread.start()
+
+    def end(self) -> None:
+        self._ended.set_result(None)
+        self._thread.join(PATIENCE)
+        if self._thread.is_alive():
+            pytest.fail(f"the thread of the test's own node did not end within {PATIENCE:g} s")
+        self.executor.shutdown()
+
+
 class Lab:
     """A node of the test's own in a thread, and the processes that it has started."""
 
@@ -122,14 +142,11 @@ class Lab:
         self.processes: list[NodeProcess] = []
         self._added: list[Any] = []
         self._heard: list[Any] = []
-        self._others: list[tuple[Node, SingleThreadedExecutor, threading.Thread]] = []
+        self._others: list[tuple[Node, Spinning]] = []
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
         self.node = Node("lab", context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
-        self._thread.start()
+        self._spinning = Spinning(self._context, self.node)
 
     def start(
         self,
@@ -171,18 +188,14 @@ class Lab:
         """A node with `end`, in the process and the thread of the test's own."""
         overrides = [rclpy.Parameter(name.replace("__", "."), value=value) for name, value in parameters.items()]
         node = kind(context=self._context, parameter_overrides=overrides)
-        self._executor.add_node(node)
+        self._spinning.executor.add_node(node)
         self._added.append(node)
         return node
 
     def second_node(self, name: str) -> Node:
         """A node of the test's own in a thread of its own: what it does holds up nobody."""
         node = Node(name, context=self._context)
-        executor = SingleThreadedExecutor(context=self._context)
-        executor.add_node(node)
-        thread = threading.Thread(target=executor.spin, daemon=True)
-        thread.start()
-        self._others.append((node, executor, thread))
+        self._others.append((node, Spinning(self._context, node)))
         return node
 
     def wait(self, condition: Callable[[], Any], what: str, timeout: float = PATIENCE) -> Any:
@@ -202,7 +215,7 @@ class Lab:
 
     def do(self, function: Callable[[], Any]) -> Any:
         """Call a function in the thread of the node, where what it takes part in can be taken away."""
-        task = self._executor.create_task(function)
+        task = self._spinning.executor.create_task(function)
         self.wait(task.done, "a call in the thread of the node")
         return task.result()
 
@@ -302,11 +315,9 @@ class Lab:
             process.end()
         for node in self._added:
             node.end()
-        self._executor.shutdown()
-        self._thread.join(10.0)
-        for node, executor, thread in self._others:
-            executor.shutdown()
-            thread.join(10.0)
+        self._spinning.end()
+        for node, spinning in self._others:
+            spinning.end()
             node.destroy_node()
         for node in self._added:
             node.destroy_node()
