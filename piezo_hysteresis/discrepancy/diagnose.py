@@ -210,11 +210,12 @@ def _verdict(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[
     if selection.accepted and not falls:
         names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
         return Verdict.UNKNOWN, f"No name: {names} helps on the records that chose it, not on those set aside."
-    closest = selection.steps[0].best if selection.steps else None
     told = ""
-    if closest is not None:
+    if selection.steps:
+        closest = selection.steps[0].best
         share = 100 * selection.explained(closest.score)
-        told = f"; closest is {closest.effect.public_name()}, which explains {share:.0f} %"
+        why = "".join(f" ({r.reason})" for r in selection.steps[0].rejected if r.name == closest.name)
+        told = f"; closest is {closest.effect.public_name()}, which explains {share:.0f} %{why}"
     return Verdict.UNKNOWN, f"The model misses an effect that the catalogue does not explain{told}."
 
 

@@ -143,6 +143,7 @@ def _turn(
     if objection is not None and (late := behind_the_pole(model, _others(screened, refits), before)):
         refits = sorted([*refits, *late], key=lambda c: c.score.cost)
         best, alone, objection = _judged(refits, before, null, keeps)
+    objection = objection or _untried_twin(type(best.effect), effects)
     accepted, rivals = objection is None, list[Candidate]()
     rejected = [
         Rejection(name, f"on slow drive one with {twin}, which is in the model") for name, twin in twins.items()
@@ -172,6 +173,13 @@ def _others(screened: list[Candidate], refits: list[Candidate]) -> list[Candidat
     return [c for c in screened if c.name not in names]
 
 
+def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> str | None:
+    """Objection to an effect whose twin is left out of the library: none of the two can be told from the other."""
+    twins = {e.public_name() for e in CATALOGUE if effect.twin == e.name or e.twin == effect.name}
+    untried = sorted(twins - {e.public_name() for e in effects})
+    return f"on slow drive one with {untried[0]}, which the library lacks" if untried else None
+
+
 def _judged(
     refits: list[Candidate], before: Score, null: float, keeps: float
 ) -> tuple[Candidate, Fitted | None, str | None]:
@@ -180,8 +188,8 @@ def _judged(
     gain, left = before.cost - best.score.cost, _left(best.score, before, null)
     if gain < LEAST_GAIN or left > keeps:
         told = (
-            f"closest, but improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
-            f"{100 * left:.0f} % of V beyond noise stays ({100 * keeps:.0f} % at most)"
+            f"improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
+            f"{100 * left:.0f} % of V beyond noise stays, {100 * keeps:.0f} % at most"
         )
         return best, None, told
     alone = without(best, LATER)

@@ -10,7 +10,7 @@ import pytest
 from benchmarks.naming_cases import UNKNOWN, Case
 from benchmarks.naming_experiments import Layout
 from piezo_hysteresis.discrepancy import Verdict, diagnose
-from piezo_hysteresis.effects import BY_NAME
+from piezo_hysteresis.effects import BY_NAME, CATALOGUE
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.record import Experiment, Notice, Record
 
@@ -137,3 +137,10 @@ def test_a_stage_that_was_not_driven_is_refused():
     still = Record(np.full(100, 3.0), np.arange(100.0), 1e-3, phase="rest")
     with pytest.raises(IdentificationError, match="does not move"):
         diagnose(Experiment((still,) * 5))
+
+
+def test_no_effect_is_named_where_its_twin_was_no_candidate():
+    library = [e for e in CATALOGUE if e.name != "sensor_nonlinearity"]
+    found = diagnose(hidden("softening", plant="independent").experiment(), effects=library)
+    assert found.verdict is Verdict.UNKNOWN
+    assert "closest is softening" in found.reason and "sensor_nonlinearity" in found.reason
