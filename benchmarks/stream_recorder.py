@@ -1,9 +1,9 @@
-"""`StreamRecorder`: the third process of the streaming benchmark, which sends waveforms and records everything."""
+"""`StreamRecorder`: the third process of the streaming benchmark, which sends waveforms and records."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,7 +36,7 @@ class Command:
 
 
 class StreamRecorder:
-    """Sends waveforms, and records everything of an axis.
+    """Sends waveforms, and records an axis.
 
     Parameters
     ----------
@@ -48,9 +48,13 @@ class StreamRecorder:
         That of all axes.
     check : callable
         Raises where a node has ended.
+    topics : collection of str
+        What is recorded.
     """
 
-    def __init__(self, namespace: str, folder: Path, executor: Executor, check: Callable[[], None]) -> None:
+    def __init__(
+        self, namespace: str, folder: Path, executor: Executor, check: Callable[[], None], topics: Collection[str]
+    ) -> None:
         self._check, self._executor = check, executor
         self._node = Node("recorder", namespace=namespace)
         self._executor.add_node(self._node)
@@ -58,7 +62,7 @@ class StreamRecorder:
         self._ended: dict[str, dict[str, str]] = {}
         self._command = self._node.create_publisher(PointCloud2, "command", COMMAND)
         self._node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
-        self.bag = BagRecorder(self._node, folder)
+        self.bag = BagRecorder(self._node, folder, topics)
 
     def _on_status(self, status: DiagnosticStatus) -> None:
         told = values_of(status)

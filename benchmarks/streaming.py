@@ -1,8 +1,9 @@
 """Streaming over DDS: driver, model node and a recorder as processes of their own; nothing may be lost.
 
-The driver plays sines and slow loops without a pause; this process is the recorder and writes every topic to a bag, in
-which the samples are counted afterwards. Latency counts from the last sample of a block to its residual in the
-recorder's hands. Beside it stands what three processes take that hand on as much by rclpy alone.
+The driver plays sines and slow loops without a pause; this process is the recorder. It writes every topic to a bag, at
+the first rate once more the samples and predictions alone, and counts the samples in it afterwards. Latency counts from
+the last sample of a block to its residual in the recorder's hands. Beside it stands what three processes take that hand
+on as much by rclpy alone.
 
 The exit code is 1 where a sample is missing, doubled, or was played at another voltage than was commanded, up to
 500 kHz; beyond, the highest rate is sought that loses nothing. All processes take `config/large_blocks.xml`.
@@ -13,10 +14,11 @@ The exit code is 1 where a sample is missing, doubled, or was played at another 
 from __future__ import annotations
 
 import argparse
+import gc
 import os
-import resource
 import tempfile
 import time
+from collections.abc import Collection
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -36,12 +38,14 @@ from piezo_hysteresis.identification.drive import DriveLimits
 from piezo_hysteresis.identification.excitation import sine, triangle
 from piezo_hysteresis.model import Model
 from piezo_hysteresis.model_file import save
+from piezo_hysteresis.nodes.bag_recorder import TOPICS
 from piezo_hysteresis.nodes.cloud import from_cloud
 from piezo_hysteresis.nodes.conversions import from_stamp
 from piezo_hysteresis.nodes.executor import make_executor
 from piezo_hysteresis.recording.bag import Bag
 
 NODES = ("driver_node", "model_node")
+BLOCKS = ("samples", "predicted_samples")
 LARGE_BLOCKS = Path(__file__).parents[1] / "config" / "large_blocks.xml"
 LONGEST = 500_000
 """Samples of a command at most."""
@@ -65,12 +69,14 @@ def waveform(rate: float, duration: float) -> np.ndarray:
 
 
 def memory(pid: int) -> float:
-    """Largest resident size of a process so far [MB]."""
+    """Resident size of a process [MB]."""
     lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024
+    return next(float(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024
 
 
-def stream(rate: float, duration: float, folder: Path, axes: int = 1) -> tuple[dict[str, Cell], list[str]]:
+def stream(
+    rate: float, duration: float, folder: Path, axes: int, topics: Collection[str]
+) -> tuple[dict[str, Cell], list[str]]:
     """Figures by name, and the promises that were not kept."""
     period = 1.0 / rate
     voltage = waveform(rate, min(duration, LONGEST / rate))
@@ -82,7 +88,7 @@ def stream(rate: float, duration: float, folder: Path, axes: int = 1) -> tuple[d
             processes = stack.enter_context(Processes(f"/bench_{axis}", folder / f"log_{axis}"))
             processes.start("driver_node", sample_period=f"{period:.17f}", discovery_time=0.1)
             processes.start("model_node", model_file=folder / "model.yaml")
-            recorder = StreamRecorder(f"/bench_{axis}", folder / f"bag_{axis}", executor, processes.check)
+            recorder = StreamRecorder(f"/bench_{axis}", folder / f"bag_{axis}", executor, processes.check, topics)
             stack.callback(recorder.close)
             recorders.append(recorder)
             for name in NODES:
@@ -104,14 +110,14 @@ def stream(rate: float, duration: float, folder: Path, axes: int = 1) -> tuple[d
         shares.append(100 * (time.process_time() - own) / elapsed)
         for recorder, played in zip(recorders, commands, strict=True):
             recorder.follow(played[-1])
-        sizes = [max(map(memory, ids[name])) for name in NODES]
-        sizes.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+        sizes = [*(max(map(memory, ids[name])) for name in NODES), memory(os.getpid())]
     counted = [count(folder / f"bag_{axis}", commands[axis], f"/bench_{axis}") for axis in range(axes)]
     figures = {name: _over_axes(name, [one[name] for one, _ in counted]) for name in counted[0][0]}
     names = ("driver", "model node", "recorder")
     figures = {
         "rate, kHz": rate / 1e3,
         "axes": axes,
+        "topics recorded": "all" if topics is TOPICS else "blocks",
         "time, s": elapsed,
         **figures,
         **{f"CPU of {name}, % of a core": share for name, share in zip(names, shares, strict=True)},
@@ -131,7 +137,7 @@ def count(bag: Path, commands: list[Command], namespace: str) -> tuple[dict[str,
     """Samples sent, received and predicted, latencies, and what is wrong with them."""
     first, last = commands[0].first, commands[-1].first + commands[-1].voltage.size - 1
     sent = (last - first) % 2**32 + 1
-    topics = {f"{namespace}/{name}": name for name in ("samples", "predicted_samples")}
+    topics = {f"{namespace}/{name}": name for name in BLOCKS}
     places: dict[str, list[np.ndarray]] = {name: [] for name in topics.values()}
     voltages, latencies = [], []
     for message in Bag(bag).messages(topics):
@@ -171,11 +177,13 @@ def count(bag: Path, commands: list[Command], namespace: str) -> tuple[dict[str,
     }, failures
 
 
-def tried(rate: float, duration: float, axes: int = 1) -> tuple[dict[str, Cell] | None, list[str]]:
+def tried(
+    rate: float, duration: float, axes: int = 1, topics: Collection[str] = TOPICS
+) -> tuple[dict[str, Cell] | None, list[str]]:
     """`stream` in a folder of its own; no figures where it could not be played to its end."""
     with tempfile.TemporaryDirectory() as folder:
         try:
-            return stream(rate, duration, Path(folder), axes)
+            return stream(rate, duration, Path(folder), axes, topics)
         except (RuntimeError, TimeoutError) as error:
             return None, [f"{rate / 1e3:g} kHz: {error}"]
 
@@ -192,26 +200,37 @@ def highest(held: float, duration: float) -> tuple[float, float]:
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
     parser.add_argument("--rate", type=float, nargs="+", default=[50e3, 200e3, 500e3, 1e6], help="samples per second")
-    parser.add_argument("--seconds", type=float, default=30.0, help="of the first rate; 8 of the others")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=30.0,
+        help="of the first rate, with all topics and with blocks alone; 8 of the others",
+    )
     parser.add_argument("--axes", type=int, default=2, help="at once, at the first rate; 1 leaves it out")
     parser.add_argument("--no-search", action="store_true", help="do not seek the highest rate")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
-    """A column for every rate, one for several axes, and the highest rate."""
+    """A column for every rate, one for blocks alone and one for several axes at the first, and the highest rate."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     os.environ.setdefault("FASTDDS_DEFAULT_PROFILES_FILE", str(LARGE_BLOCKS))
     short = min(8.0, options.seconds)
-    cases = [(rate, short if k else options.seconds, 1) for k, rate in enumerate(options.rate)]
+    first, *others = options.rate
+    cases: list[tuple[float, float, int, Collection[str]]] = [
+        (first, options.seconds, 1, topics) for topics in (TOPICS, BLOCKS)
+    ]
+    cases += [(rate, short, 1, TOPICS) for rate in others]
     if options.axes > 1:
-        cases.append((options.rate[0], short, options.axes))
+        cases.append((first, short, options.axes, TOPICS))
     columns: list[dict[str, Cell]] = []
     failures: list[str] = []
     held, tables = 0.0, []
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    gc.collect()
+    gc.freeze()  # as the nodes do
     try:
-        for rate, duration, axes in cases:
-            column, failed = tried(rate, duration, axes)
+        for rate, duration, axes, topics in cases:
+            column, failed = tried(rate, duration, axes, topics)
             if column is not None:
                 limit = dict(zip(LIMIT, relayed(rate, short) if axes == 1 else ("", ""), strict=True))
                 columns.append({**column, **limit})

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,9 @@ from scipy.linalg.blas import ddot  # numpy's would warn of squares that are too
 from .errors import RecordError
 
 Samples = NDArray[np.float64]
+
+CHANNELS = ("voltage", "displacement", "other_displacement", "temperature")
+"""Of a record, one value per sample."""
 
 
 def are_finite(samples: Samples) -> bool:
@@ -129,16 +133,29 @@ class Record:
         start, stop, step = part.indices(self.size)
         if step != 1 or stop <= start:
             raise RecordError(f"slice {part}: expected a non-empty contiguous part of {self.size} samples")
-        cut = slice(start, stop)
-        return replace(
-            self,
-            voltage=self.voltage[cut],
-            displacement=self.displacement[cut],
-            other_displacement=None if self.other_displacement is None else self.other_displacement[cut],
-            temperature=None if self.temperature is None else self.temperature[cut],
+        return self.with_channels(
+            lambda channel: channel[start:stop],
             start_time=self.start_time + start * self.sample_period,
             continues=self.continues if start == 0 else True,
         )
+
+    def with_channels(self, change: Callable[[Samples], Samples], **fields: Any) -> Record:
+        """Every channel that is there changed alike, and the other fields given replaced.
+
+        Parameters
+        ----------
+        change : callable
+            From the samples of a channel to what takes their place.
+        **fields
+            Of the record.
+
+        Examples
+        --------
+        >>> Record([0.0, 1.0], [0.0, 2e-6], 1e-3).with_channels(np.flip, phase="backwards").voltage.tolist()
+        [1.0, 0.0]
+        """
+        given = {name: channel for name in CHANNELS if (channel := getattr(self, name)) is not None}
+        return replace(self, **{**{name: change(channel) for name, channel in given.items()}, **fields})
 
     def split(self, *boundaries: int) -> tuple[Record, ...]:
         """Cut at the given sample indices; every part but the first continues the one before it."""
@@ -165,15 +182,7 @@ class Record:
         def mean(channel: Samples) -> Samples:
             return np.asarray(channel[: blocks * factor].reshape(blocks, factor).mean(axis=1))
 
-        return replace(
-            self,
-            voltage=mean(self.voltage),
-            displacement=mean(self.displacement),
-            other_displacement=None if self.other_displacement is None else mean(self.other_displacement),
-            temperature=None if self.temperature is None else mean(self.temperature),
-            sample_period=self.sample_period * factor,
-            initial_voltage=self.settled_voltage,
-        )
+        return self.with_channels(mean, sample_period=self.sample_period * factor, initial_voltage=self.settled_voltage)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ recorder has lost.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,12 +56,9 @@ def _unevenness(residual: Array) -> float:
 
 
 def _sharpened(record: Record, parts: int, abrupt: bool) -> Record:
-    return replace(
-        record,
+    return record.with_channels(
+        lambda channel: np.repeat(channel, parts),
         voltage=sharp_drive(record.voltage, record.settled_voltage, parts, abrupt=abrupt),
-        displacement=np.repeat(record.displacement, parts),
-        other_displacement=None if record.other_displacement is None else np.repeat(record.other_displacement, parts),
-        temperature=None if record.temperature is None else np.repeat(record.temperature, parts),
         sample_period=record.sample_period / parts,
         initial_voltage=None if record.continues else record.settled_voltage,
     )

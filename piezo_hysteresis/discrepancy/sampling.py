@@ -171,12 +171,4 @@ def _interpolated(record: Record, period: float) -> Record:
     def spline(channel: Array) -> Array:
         return np.asarray(make_interp_spline(now, channel)(then))
 
-    return replace(
-        record,
-        voltage=spline(record.voltage),
-        displacement=spline(record.displacement),
-        other_displacement=None if record.other_displacement is None else spline(record.other_displacement),
-        temperature=None if record.temperature is None else spline(record.temperature),
-        sample_period=period,
-        initial_voltage=record.settled_voltage,
-    )
+    return record.with_channels(spline, sample_period=period, initial_voltage=record.settled_voltage)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Collection
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -39,7 +40,7 @@ TOPICS = {
 
 
 class BagRecorder:
-    """Subscribes to all of `TOPICS` and writes what comes, until it is closed.
+    """Subscribes to topics of an axis and writes what comes, until it is closed.
 
     Parameters
     ----------
@@ -47,11 +48,13 @@ class BagRecorder:
         Whose namespace and executor are used.
     path : Path
         Folder of the bag, which must not exist.
+    topics : collection of str
+        Some of `TOPICS`; all of them by default.
 
     Attributes
     ----------
     counts : dict of str to int
-        Messages written so far by topic, named as in `TOPICS`.
+        Messages written so far by topic.
     failure : RecordingError or None
         What ended the recording early.
 
@@ -61,13 +64,13 @@ class BagRecorder:
         If the bag cannot be made.
     """
 
-    def __init__(self, node: Node, path: Path) -> None:
+    def __init__(self, node: Node, path: Path, topics: Collection[str] = TOPICS) -> None:
         self._node, self._bag = node, BagWriter(path)
-        self.counts = dict.fromkeys(TOPICS, 0)
+        self.counts = dict.fromkeys(topics, 0)
         self.failure: RecordingError | None = None
         self._last = time.monotonic()
         self._newest, self._reader = b"", SampleReader()
-        self._subscriptions = [self._subscribe(name) for name in TOPICS]
+        self._subscriptions = [self._subscribe(name) for name in topics]
 
     @property
     def silence(self) -> float:

@@ -13,7 +13,7 @@ from .conversions import diagnostic, live, to_stamp
 from .drive import Event, Happening, Phase
 from .quality import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
 from .sample_block import SampleBlock, SampleWriter
-from .sending import send
+from .sending import is_heard, send
 
 _STATES = {Happening.BEGAN: "playing", Happening.DONE: "done", Happening.STOPPED: "stopped"}
 
@@ -118,7 +118,9 @@ class DriverTopics:
 
     def _publish_live(self, block: SampleBlock) -> None:
         voltage, displacement = float(block.voltage[-1]), float(block.displacement[-1])
-        send(self._voltage, Float64(data=voltage))
-        send(self._displacement, Float64(data=displacement))
-        stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
-        send(self._live, live(stamp, self._stage, voltage=voltage, displacement=displacement))
+        for publisher, value in ((self._voltage, voltage), (self._displacement, displacement)):
+            if is_heard(publisher):
+                send(publisher, Float64(data=value))
+        if is_heard(self._live):
+            stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
+            send(self._live, live(stamp, self._stage, voltage=voltage, displacement=displacement))

@@ -13,7 +13,7 @@ from ..predictor import Prediction, Predictor
 from .conversions import live, to_stamp
 from .quality import COMMAND, SAMPLES
 from .sample_block import PredictionWriter, SampleBlock
-from .sending import send
+from .sending import is_heard, send
 
 
 class ModelTopics:
@@ -58,10 +58,11 @@ class ModelTopics:
 
     def _publish_live(self, block: SampleBlock, answer: Prediction, rms: float | None) -> None:
         prediction, residual = float(answer.prediction[-1]), float(answer.residual[-1])
-        send(self._prediction, Float64(data=prediction))
-        send(self._residual, Float64(data=residual))
-        if rms is not None:
-            send(self._rms, Float64(data=rms))
+        for publisher, value in ((self._prediction, prediction), (self._residual, residual), (self._rms, rms)):
+            if value is not None and is_heard(publisher):
+                send(publisher, Float64(data=value))
+        if not is_heard(self._live):
+            return
         values = {
             "voltage": float(block.voltage[-1]),
             "displacement": float(block.displacement[-1]),

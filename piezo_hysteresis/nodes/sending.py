@@ -1,4 +1,7 @@
-"""`send`: publish so that a middleware that is short of time costs a message at worst, never the node."""
+"""`send`: publish so that a middleware that is short of time costs a message at worst, never the node.
+
+`is_heard` spares the making of messages that nobody takes.
+"""
 
 from __future__ import annotations
 
@@ -20,3 +23,8 @@ def send(publisher: Publisher, message: Any) -> bool:
             continue
         return True
     return False
+
+
+def is_heard(publisher: Publisher) -> bool:
+    """Whether anybody is there to take what a publisher sends."""
+    return bool(publisher.get_subscription_count())

@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from ..errors import RecordingError
-from ..record import Samples
+from ..record import CHANNELS, Samples
 
 TYPE = "sensor_msgs/msg/PointCloud2"
 
@@ -25,8 +25,6 @@ FIELDS = np.dtype(
     }
 )
 """Layout of one sample: time [s from the stamp], voltage [V], displacement [m], running index, phase number."""
-
-CHANNELS = ("voltage", "displacement", "other_displacement", "temperature")
 
 _KINDS = dict.fromkeys((*CHANNELS, "time"), "f8") | {"index": "u4", "phase": "u4"}
 _DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
