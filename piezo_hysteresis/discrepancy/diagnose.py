@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import CATALOGUE, Effect
+from ..effects import CATALOGUE, Effect, ExtraResonance
 from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ..identification.carried import select as select_records
 from ..identification.fit import Fit, Progress
 from ..identification.normal_equations import Nuisance, residuals
 from ..identification.roles import CARRYING
 from ..model import Model
-from ..record import Experiment, Notice
+from ..record import Experiment, Notice, Record
 from .baseline import exact, start_models
 from .candidates import score_baseline, score_model
 from .coarseness import coarseness
 from .diagnosis import Diagnosis, Verdict
 from .evidence import Evidence, extent_of
+from .explicit_step import KIND, is_stepped, without_steps
 from .few_records import diagnose_few
 from .gap import Gap, measure_gap
 from .held_out import ADEQUATE
@@ -50,6 +51,8 @@ NOISY, WORTHWHILE = 1.1, 0.95
 FORESEEN, UNFORESEEN = 1.1, 1.5
 """Gap on records set aside, in floors: up to the first nothing is missing, though some that were fitted are not quite
 foretold by the others; from the second something is, though those lack nothing."""
+LINEAR_LEAVES = 2.0 * ADEQUATE
+"""V that an effect of linear dynamics may leave: they are fitted with it, and hold what is linear."""
 IDLE = ("idle", "hold", *CARRYING)
 """Phases that only bring the stage from one state to another."""
 
@@ -88,7 +91,8 @@ def diagnose(
     """
     tell = progress or (lambda word, fraction: None)
     noise_of_drive = voltage_noise(experiment.records)
-    if noise_of_drive:
+    is_noisy = bool(noise_of_drive.any())
+    if is_noisy:
         experiment = _quieted(experiment, noise_of_drive)
     records = tuple(slowed(r) for r in experiment.records)
     severe = [n for n in experiment.notices if n.severe]
@@ -111,15 +115,26 @@ def diagnose(
     records = tuple(at_period(r, period) for r in records)
     starts = iter((model,)) if model is not None else start_models(records, fitted)
     start = exact(next(starts))
-    if not noise_of_drive:  # whose averages would turn back and forth
-        lost = coarseness(start, records)
+    extent = extent_of([records[i] for i in usable], start)
+
+    def gathered(records: Sequence[Record], least: Array) -> Evidence:
+        kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
+        return Evidence(tuple(kept), np.array(sizes), Nuisance(), extent)
+
+    evidence = gathered(records, least)
+    tell("baseline, jointly", 0.2)
+    baseline = joint(start, evidence, LAST, PRECISE)
+    lost = coarseness(baseline.model, records)
+    if not is_noisy and any(c.any() for c in lost):  # averages of noise would turn back and forth
         records = tuple(replace(r, displacement=r.displacement - c) for r, c in zip(records, lost, strict=True))
         least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
-    kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
-    evidence = Evidence(tuple(kept), np.array(sizes), Nuisance(), extent_of([records[i] for i in usable], start))
-    tell("baseline, jointly", 0.25)
-    baseline = joint(start, evidence, LAST, PRECISE)
+        evidence = gathered(records, least)
+        tell("baseline, jointly", 0.3)
+        baseline = joint(baseline.model, evidence, LAST, PRECISE)
     evidence, score = score_baseline(baseline.model, evidence)
+    may_be_stepped = all(n.kind != KIND for n in experiment.notices)
+    if score.excess > ADEQUATE and may_be_stepped and is_stepped(baseline.model, evidence):
+        return diagnose(without_steps(experiment, baseline.model), model, effects=effects, progress=progress)
     if score.excess > ADEQUATE:
         with suppress(DivergenceError, IdentificationError, ModelError, ParameterError):
             for anew in starts:
@@ -139,8 +154,12 @@ def diagnose(
         effects,
         lambda word, part: tell(word, 0.4 + 0.4 * part),
     )
+    if selection.score.excess > ADEQUATE and may_be_stepped and selection.steps:
+        last = selection.accepted[-1].best.evidence if selection.accepted else evidence
+        if is_stepped(selection.model, last):
+            return diagnose(without_steps(experiment, selection.model), model, effects=effects, progress=progress)
     tell("gap", 0.85)
-    named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED
+    named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED and not _is_makeshift(selection)
     whole = tuple(select_records(shortened(records, FITTED), least.tolist(), fitted)[0])
     plain = baseline.model if selection.accepted else selection.model  # the search may have found better dynamics
     first = joint(plain, replace(evidence, records=whole), LAST, PRECISE)
@@ -172,10 +191,17 @@ def diagnose(
     )
 
 
-def _quieted(experiment: Experiment, noise: float) -> Experiment:
-    told = f"the voltage was measured with {noise:.2g} V of noise; turns within {NOISE_WIDTH:g} times that are left out"
-    records = tuple(quieted(r, noise) for r in experiment.records)
+def _quieted(experiment: Experiment, noise: Array) -> Experiment:
+    size = f"{noise.max():.2g} V of noise"
+    told = f"the voltage was measured with {size}; turns within {NOISE_WIDTH:g} times that are left out"
+    records = tuple(quieted(r, n) for r, n in zip(experiment.records, noise.tolist(), strict=True))
     return replace(experiment, records=records).noting(Notice("voltage_noise", told))
+
+
+def _is_makeshift(selection: Selection) -> bool:
+    """Whether a lag or a resonance leaves a gap: one that is there leaves none, one beside poor dynamics does."""
+    linear = any(s.best.effect.family == "lag" or s.best.name == ExtraResonance.name for s in selection.accepted)
+    return linear and selection.score.excess > LINEAR_LEAVES
 
 
 def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:
@@ -191,9 +217,9 @@ def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:
 
 
 def _verdict(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Verdict, str]:
+    names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
+    closed = selection.explained(selection.score)
     if named:
-        names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
-        closed = selection.explained(selection.score)
         rest = (
             "what remains is at the floor"
             if gap.after <= np.sqrt(ADEQUATE) * gap.floor
@@ -207,8 +233,10 @@ def _verdict(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[
             told = f"those set aside, where a gap of {gap.after / gap.floor:.1f} floors remains"
             return Verdict.UNKNOWN, f"No name: nothing is missing on the records that were fitted, but on {told}."
         return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
+    if closed >= NAMED and _is_makeshift(selection):
+        told = f"{names} explains {100 * closed:.0f} %, but what is linear leaves nothing where it is named rightly"
+        return Verdict.UNKNOWN, f"No name: {told}."
     if selection.accepted and not falls:
-        names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
         return Verdict.UNKNOWN, f"No name: {names} helps on the records that chose it, not on those set aside."
     told = ""
     if selection.steps:

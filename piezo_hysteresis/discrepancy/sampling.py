@@ -42,22 +42,25 @@ ALIKE = 0.1
 """Share by which the drive of a part may differ from that of the whole, in size and in speed."""
 
 
-def voltage_noise(records: Sequence[Record]) -> float:
-    """Standard deviation of the noise on a voltage that was measured [V]; 0 where it was commanded.
+def voltage_noise(records: Sequence[Record]) -> Array:
+    """Standard deviation of the noise on the voltage of every record that was measured [V]; 0 where it was commanded.
 
     Noise makes second differences that change sign from one to the next; ramps, holds and rests that were commanded
-    have none at all.
+    have none at all. Block averages hold the less of it the longer they are.
     """
-    least, is_white = np.inf, False
+    least, density, is_white = np.inf, np.inf, False
     for record in records:
         bends = np.diff(record.voltage, 2)
         if bends.size < FEWEST_BENDS:
             continue
         size = noise_on_motion(record.voltage, 2)
+        density = min(density, size * np.sqrt(record.sample_period))
         if size < least:
             least = size
             is_white = bool(np.mean(bends[1:] * bends[:-1] < 0.0) > WHITE)
-    return least if is_white else 0.0
+    if not is_white:
+        return np.zeros(len(records))
+    return np.maximum(least, density / np.sqrt([r.sample_period for r in records]))
 
 
 def quieted(record: Record, noise: float) -> Record:

@@ -79,10 +79,11 @@ def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
         )
     resolution = _resolution({id(r): r for r, _ in edges}.values())
     bases = [_BaseLine.before(record, edge, every, BEFORE[0]) for record, edge in edges]
-    scatters = np.sqrt([base.squares / (base.size - 2) for base in bases])
+    # About the mean: the slow ringing of a soft stage is straight over a base line, and no line to go on by.
+    scatters = np.array([base.samples.std(ddof=1) for base in bases])
     swing = max(float(np.ptp(record.displacement)) for record, _ in edges)
     quietest = max(float(scatters.min()), resolution / np.sqrt(12.0), NEGLIGIBLE * swing)
-    freedom = min(base.size for base in bases) - 2
+    freedom = min(base.size for base in bases) - 1
     by_chance = float(np.sqrt(f.isf(RARE, freedom, freedom)))
     edges = [e for e, scatter in zip(edges, scatters, strict=True) if scatter <= max(QUIET, by_chance) * quietest]
     # A stage that still rings is not straight over a long base line; a short one is noisy.

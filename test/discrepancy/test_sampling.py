@@ -84,9 +84,11 @@ def test_the_noise_of_a_measured_voltage_is_known_and_a_commanded_one_has_none(n
     drives = (np.zeros(t.size), 8.0 * np.abs(t % 1.0 - 0.5), np.repeat([0.0, 3.0, 6.0, 2.0], 1000), np.sin(300.0 * t))
     commanded = [Record(u, 1e-6 * u, 1e-3) for u in drives]
     measured = [replace(r, voltage=r.voltage + noise * random.standard_normal(r.size)) for r in commanded]
-    assert voltage_noise(commanded) == 0.0
-    assert voltage_noise(commanded[3:]) == 0.0
+    assert not voltage_noise(commanded).any()
+    assert not voltage_noise(commanded[3:]).any()
     assert voltage_noise(measured) == pytest.approx(noise, rel=0.1)
+    averaged = [measured[0], measured[1].decimate(16)]
+    assert voltage_noise(averaged) == pytest.approx([noise, noise / 4.0], rel=0.2)
 
 
 def test_a_drive_is_followed_but_for_its_noise():
