@@ -1,0 +1,67 @@
+"""Data of simulations whose loop takes the explicit step of Eq. (7) are known, and freed of what that step changes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.discrepancy.evidence import Evidence, extent_of
+from piezo_hysteresis.discrepancy.explicit_step import KIND, is_stepped, step_changes, without_steps
+from piezo_hysteresis.effects import Arx, BoucWen, PublishedBoucWen
+from piezo_hysteresis.identification.normal_equations import Nuisance
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Experiment, Record
+
+LOOP = {"A": -0.7, "beta": 3.5, "gamma": 0.6, "p1": 0.05, "p2": 1.6}
+DYNAMICS = Arx(a=(-0.9,), b=(0.1,), delay=2)
+FAST, SLOW, NOISE = 2e-5, 2e-4, 1e-9
+RANDOM = np.random.default_rng(4)
+
+
+def model(kind):
+    return Model((kind(**LOOP), DYNAMICS), FAST, 10.0, 1e-5)
+
+
+def answered(kind):
+    """Loops, noise and jumps, as the loop of a kind answers them."""
+    triangle = 9.0 * (1.0 - np.abs(np.linspace(-1.0, 1.0, 2001)))
+    drives = [(triangle, SLOW, "triangle"), (np.cumsum(RANDOM.normal(0.0, 0.05, 3000)) % 1.0, FAST, "noise")]
+    drives += [(np.repeat([0.0, top, 0.5 * top], 400), FAST, "step") for top in (1.0, 3.0, 5.0)]
+    records = [Record(u, np.zeros(u.size), period, phase) for u, period, phase in drives]
+    answers = model(BoucWen).simulate(records[:1]) + model(kind).simulate(records[1:])
+    return tuple(
+        replace(r, displacement=y + RANDOM.normal(0.0, NOISE, r.size)) for r, y in zip(records, answers, strict=True)
+    )
+
+
+def evidence(records):
+    floors = np.full(len(records), 3.0 * NOISE)
+    return Evidence(records, floors, Nuisance(), extent_of(records, model(BoucWen)))
+
+
+@pytest.mark.parametrize("height", [0.01, 0.1, 0.4])
+def test_a_jump_from_rest_changes_by_what_the_closed_solution_says(height):
+    static = Model((BoucWen(**LOOP), Arx(a=(), b=(1.0,), delay=1)), FAST, 10.0, 1e-5)
+    jump = Record(10.0 * np.repeat([0.0, height], 10), np.zeros(20), FAST)
+    (change,) = step_changes(static, [jump])
+    loss = LOOP["beta"] - LOOP["gamma"]  # h, driven by a negative A, has the other sign than the drive
+    exact = LOOP["A"] / loss * (1.0 - np.exp(-loss * height))
+    assert change[:10] == pytest.approx(0.0)
+    assert change[-1] == pytest.approx(1e-5 * (LOOP["A"] * height - exact), rel=1e-9)
+
+
+def test_slow_records_have_many_steps_behind_every_sample():
+    records = answered(BoucWen)
+    assert not step_changes(model(BoucWen), records)[0].any()
+
+
+def test_data_of_an_explicit_step_are_told_from_others():
+    assert is_stepped(model(BoucWen), evidence(answered(PublishedBoucWen)))
+    assert not is_stepped(model(BoucWen), evidence(answered(BoucWen)))
+
+
+def test_without_the_steps_the_exact_loop_answers():
+    freed = without_steps(Experiment(answered(PublishedBoucWen)), model(BoucWen))
+    assert [n.kind for n in freed.notices] == [KIND]
+    for record, expected in zip(freed, model(BoucWen).simulate(list(freed)), strict=True):
+        assert np.std(record.displacement - expected) < 1.1 * NOISE
