@@ -59,7 +59,7 @@ def behind_the_pole(model: Model, candidates: Sequence[Candidate], before: Score
     """Refits of lags of the drive, which the dynamics have taken up, so that no score test sees them."""
     refits = []
     for candidate in candidates:
-        if candidate.effect.place is Place.DRIVE and candidate.effect.family in LINEAR:
+        if candidate.effect.place is Place.DRIVE:
             anew = from_all_starts(model, candidate, FIRST)
             if anew is not None:
                 refits.append(settled(anew, before))
