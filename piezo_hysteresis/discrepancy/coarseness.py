@@ -20,13 +20,16 @@ PARTS = 16
 """Parts into which a sample is divided at most."""
 FEWEST = 4
 """Parts below which a sample is short enough."""
+SMOOTHER = 0.97
+"""Share of the unevenness of a residual that a change leaves at most: what it removes stands out in single samples."""
 
 
 def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
     """Change of the simulation where slow drives turn within their samples, and averages are compared [m].
 
     Whether a drive ran or jumped to the next level is not in its averages: every record is taken as its displacement
-    tells, in which a wrong guess stands out in single samples.
+    tells, in which a wrong guess stands out in single samples. A change that stands out in none is left alone: it is
+    one of dynamics that are not known well.
 
     Parameters
     ----------
@@ -38,7 +41,7 @@ def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
     Returns
     -------
     list of (n,) ndarray
-        By record; zero for those that are not slow.
+        By record; zero where nothing is lost, or the record is not slow.
     """
     parts = [min(PARTS, 2 * int(0.5005 * r.sample_period / model.sample_period)) for r in records]
     straight = model.simulate(records)
@@ -48,11 +51,15 @@ def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
         pairs = zip(straight, model.simulate(sharp), strict=True)
         changes.append([y.reshape(x.size, -1).mean(axis=1) - x for x, y in pairs])
     off = [r.displacement - y for r, y in zip(records, straight, strict=True)]
-    return [a if _unevenness(e - a) <= _unevenness(e - b) else b for e, a, b in zip(off, *changes, strict=True)]
+    return [
+        min((np.zeros_like(e), a, b), key=lambda c: _unevenness(e, c)) for e, a, b in zip(off, *changes, strict=True)
+    ]
 
 
-def _unevenness(residual: Array) -> float:
-    return float(np.sum(np.diff(residual, 2) ** 2))
+def _unevenness(residual: Array, change: Array) -> float:
+    """Of a residual once a change is taken out; without one, what a change has to stay below."""
+    left = float(np.sum(np.diff(residual - change, 2) ** 2))
+    return left if change.any() else SMOOTHER * left
 
 
 def _sharpened(record: Record, parts: int, abrupt: bool) -> Record:

@@ -10,7 +10,7 @@ from ..identification.fit import Progress
 from ..model import Model
 from .candidates import Candidate
 from .held_out import ADEQUATE, Score
-from .refit import LINEAR, better, from_all_starts, proceed, refit, restart
+from .refit import better, from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
 """Least gain in mean ln max(1, R²) for which an effect is accepted."""

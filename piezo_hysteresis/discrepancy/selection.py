@@ -140,8 +140,8 @@ def _turn(
     if not refits:
         return None
     best, alone, objection = _judged(refits, before, null, keeps)
-    if objection is not None and (late := behind_the_pole(model, _others(screened, refits), before)):
-        refits = sorted([*refits, *late], key=lambda c: c.score.cost)
+    if objection is not None and (late := behind_the_pole(model, screened, before)):
+        refits = sorted(_best_of_each([*refits, *late]), key=lambda c: c.score.cost)
         best, alone, objection = _judged(refits, before, null, keeps)
     objection = objection or _untried_twin(type(best.effect), effects)
     accepted, rivals = objection is None, list[Candidate]()
@@ -165,6 +165,12 @@ def _turn(
         most = max(0.0, before.cost - candidate.score.cost)
         rejected.append(Rejection(candidate.name, f"improves records left out by {most:.2f} at most (mean ln R²)"))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
+
+
+def _best_of_each(refits: list[Candidate]) -> list[Candidate]:
+    """Of the refits of an effect the best one."""
+    worst_first = sorted(refits, key=lambda c: -c.score.cost)
+    return list({c.name: c for c in worst_first}.values())
 
 
 def _others(screened: list[Candidate], refits: list[Candidate]) -> list[Candidate]:
