@@ -35,6 +35,7 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     """Hysteresis from the slow loops, delay from the steps, dynamics from the broadband records.
 
     What is missing may lead the iterations of the dynamics astray: after the model from many there is one from few.
+    Noise may hide modes that larger motion shows: the last one is from all records that move.
 
     Parameters
     ----------
@@ -69,8 +70,12 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1)), period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or _delay_without_steps(start, records, broadband)
-    for iterations in (ITERATIONS, FEW_ITERATIONS):
-        yield _with_dynamics(start, records, (broadband, moving), delay, iterations)
+    for choices, iterations in (
+        ((broadband, moving), ITERATIONS),
+        ((broadband, moving), FEW_ITERATIONS),
+        ((moving, broadband), ITERATIONS),
+    ):
+        yield _with_dynamics(start, records, choices, delay, iterations)
 
 
 def _with_dynamics(

@@ -132,15 +132,15 @@ def diagnose(
         tell("baseline, jointly", 0.3)
         baseline = joint(baseline.model, evidence, LAST, PRECISE)
     evidence, score = score_baseline(baseline.model, evidence)
-    may_be_stepped = all(n.kind != KIND for n in experiment.notices)
-    if score.excess > ADEQUATE and may_be_stepped and is_stepped(baseline.model, evidence):
-        return diagnose(without_steps(experiment, baseline.model), model, effects=effects, progress=progress)
     if score.excess > ADEQUATE:
         with suppress(DivergenceError, IdentificationError, ModelError, ParameterError):
             for anew in starts:
                 other = joint(exact(anew), evidence, LAST, PRECISE)
                 if other.cost < baseline.cost:
                     baseline, score = other, score_model(other.model, evidence)
+    may_be_stepped = all(n.kind != KIND for n in experiment.notices)
+    if score.excess > ADEQUATE and may_be_stepped and is_stepped(baseline.model, evidence):
+        return diagnose(without_steps(experiment, baseline.model), model, effects=effects, progress=progress)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
 
     tell("where", 0.35)
