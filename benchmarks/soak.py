@@ -35,6 +35,8 @@ from piezo_hysteresis.model_file import dumps, load
 
 ROOT = Path(__file__).parent.parent
 MODEL = ROOT / "config" / "published_stage.yaml"
+LARGE_BLOCKS = ROOT / "config" / "large_blocks.xml"
+"""With it no process takes another one, which was stopped, for dead within the time that a fault lasts."""
 LIMITS = {"voltage_min": 0.0, "voltage_max": 10.0, "max_slew_rate": 2e4, "ramp_rate": 100.0}
 FALSE_SHARE = 0.02
 """Of the range: simulated stage and model are other code, 0.3 % apart in a free run."""
@@ -188,6 +190,7 @@ def main() -> int:
     parser.add_argument("--rate", type=float, default=50e3, help="samples per second; default: 50000")
     options = parser.parse_args()
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    os.environ.setdefault("FASTDDS_DEFAULT_PROFILES_FILE", str(LARGE_BLOCKS))
     console = Console()
     console.print(", ".join(f"{key} {value}" for key, value in machine().items()), highlight=False)
     with tempfile.TemporaryDirectory() as folder:
