@@ -55,8 +55,8 @@ def contest(model: Model, candidates: Sequence[Candidate], before: Score, tell: 
     return sorted([best, *rest], key=lambda c: c.score.cost)
 
 
-def behind_the_pole(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
-    """Refits of lags of the drive, which the dynamics have taken up, so that no score test sees them."""
+def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
+    """Refits of effects of the drive from every start: dynamics have taken them up, so that no score test sees them."""
     refits = []
     for candidate in candidates:
         if candidate.effect.place is Place.DRIVE:

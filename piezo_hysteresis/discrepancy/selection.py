@@ -15,7 +15,7 @@ from ..identification.fit import Progress
 from ..identification.normal_equations import residuals
 from ..model import Model
 from .candidates import Candidate, alikeness, screen
-from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, behind_the_pole, contest, finest, settled, simplest
+from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, refits_of_the_drive, contest, finest, settled, simplest
 from .evidence import Evidence
 from .held_out import ADEQUATE, Score
 from .refit import Fitted, is_seen, is_steady, may_be_off, refit, restart, without
@@ -140,7 +140,7 @@ def _turn(
     if not refits:
         return None
     best, alone, objection = _judged(refits, before, null, keeps)
-    if objection is not None and (late := behind_the_pole(model, screened, before)):
+    if objection is not None and (late := refits_of_the_drive(model, screened, before)):
         refits = sorted(_best_of_each([*refits, *late]), key=lambda c: c.score.cost)
         best, alone, objection = _judged(refits, before, null, keeps)
     objection = objection or _untried_twin(type(best.effect), effects)
