@@ -15,7 +15,7 @@ from ..identification.fit import Progress
 from ..identification.normal_equations import residuals
 from ..model import Model
 from .candidates import Candidate, alikeness, screen
-from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, refits_of_the_drive, contest, finest, settled, simplest
+from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, contest, finest, refits_of_the_drive, settled, simplest
 from .evidence import Evidence
 from .held_out import ADEQUATE, Score
 from .refit import Fitted, is_seen, is_steady, may_be_off, refit, restart, without
