@@ -59,6 +59,11 @@ class Outcome:
         return self.excess_before > VISIBLE
 
     @property
+    def rest_invisible(self) -> bool:
+        """Whether what was not named cannot be seen: all that is left, once dynamics were found anew, is noise."""
+        return self.verdict != "unknown" and set(self.names) < set(self.truth) and self.excess_after <= VISIBLE
+
+    @property
     def family_right(self) -> bool:
         """All families of the truth, and no other."""
         return set(self.families) == set(self.right_families)
@@ -120,17 +125,17 @@ def confusion(outcomes: list[Outcome]) -> Table:
 
 
 def figures(outcomes: list[Outcome]) -> Table:
-    """Shares of every group."""
+    """Shares of every group; what is right counts among the cases all of whose effects can be seen."""
     table = Table("group", "cases", "visible", "families right", "names right", "unknown", "false family")
     for group in GROUPS:
         members = [o for o in outcomes if o.group == group]
         if not members:
             continue
-        seen = [o for o in members if o.visible] if group not in ("effect_free",) else members
+        seen = [o for o in members if o.visible and not o.rest_invisible] if group != "effect_free" else members
         table.add_row(
             group,
             str(len(members)),
-            str(sum(o.visible for o in members)),
+            str(len(seen)) if group != "effect_free" else str(sum(o.visible for o in members)),
             f"{sum(o.family_right for o in seen)} of {len(seen)}",
             f"{sum(o.name_right for o in seen)} of {len(seen)}",
             str(sum(o.verdict == "unknown" for o in members)),
