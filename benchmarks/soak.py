@@ -36,7 +36,7 @@ from piezo_hysteresis.model_file import dumps, load
 ROOT = Path(__file__).parent.parent
 MODEL = ROOT / "config" / "published_stage.yaml"
 LARGE_BLOCKS = ROOT / "config" / "large_blocks.xml"
-"""With it no process takes another one, which was stopped, for dead within the time that a fault lasts."""
+"""With it a process that was stopped, or gets no core, is not taken for dead after a second."""
 LIMITS = {"voltage_min": 0.0, "voltage_max": 10.0, "max_slew_rate": 2e4, "ramp_rate": 100.0}
 FALSE_SHARE = 0.02
 """Of the range: simulated stage and model are other code, 0.3 % apart in a free run."""
