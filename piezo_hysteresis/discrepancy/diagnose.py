@@ -51,6 +51,8 @@ NOISY, WORTHWHILE = 1.1, 0.95
 FORESEEN, UNFORESEEN = 1.1, 1.5
 """Gap on records set aside, in floors: up to the first nothing is missing, though some that were fitted are not quite
 foretold by the others; from the second something is, though those lack nothing."""
+STEPS_LEAVE = 10.0
+"""Cost that may be left once the changes of an explicit step are taken out before anything is named."""
 LINEAR_LEAVES = 2.0 * ADEQUATE
 """V that an effect of linear dynamics may leave: they are fitted with it, and hold what is linear."""
 IDLE = ("idle", "hold", *CARRYING)
@@ -139,7 +141,7 @@ def diagnose(
                 if other.cost < baseline.cost:
                     baseline, score = other, score_model(other.model, evidence)
     may_be_stepped = all(n.kind != KIND for n in experiment.notices)
-    if score.excess > ADEQUATE and may_be_stepped and is_stepped(baseline.model, evidence):
+    if score.excess > ADEQUATE and may_be_stepped and is_stepped(baseline.model, evidence, leaves=STEPS_LEAVE):
         return diagnose(without_steps(experiment, baseline.model), model, effects=effects, progress=progress)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
 
@@ -154,10 +156,9 @@ def diagnose(
         effects,
         lambda word, part: tell(word, 0.4 + 0.4 * part),
     )
-    if selection.score.excess > ADEQUATE and may_be_stepped and selection.steps:
-        last = selection.accepted[-1].best.evidence if selection.accepted else evidence
-        if is_stepped(selection.model, last):
-            return diagnose(without_steps(experiment, selection.model), model, effects=effects, progress=progress)
+    last = selection.accepted[-1].best.evidence if selection.accepted else None
+    if selection.score.excess > ADEQUATE and may_be_stepped and last is not None and is_stepped(selection.model, last):
+        return diagnose(without_steps(experiment, selection.model), model, effects=effects, progress=progress)
     tell("gap", 0.85)
     named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED and not _is_makeshift(selection)
     whole = tuple(select_records(shortened(records, FITTED), least.tolist(), fitted)[0])

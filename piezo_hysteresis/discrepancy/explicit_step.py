@@ -70,7 +70,7 @@ def _frame(model: Model) -> tuple[float, float, float]:
     return model.sample_period, model.voltage_scale, model.displacement_scale
 
 
-def is_stepped(model: Model, evidence: Evidence) -> bool:
+def is_stepped(model: Model, evidence: Evidence, leaves: float = np.inf) -> bool:
     """Whether the loop behind the data takes the explicit step: they fit best with the whole of its changes taken out.
 
     Parameters
@@ -79,6 +79,8 @@ def is_stepped(model: Model, evidence: Evidence) -> bool:
         Fitted to the evidence.
     evidence : Evidence
         Records and floors.
+    leaves : float
+        Cost at most without the changes: what else is missing may look alike.
     """
     if BoucWen.name not in model:
         return False
@@ -93,7 +95,7 @@ def is_stepped(model: Model, evidence: Evidence) -> bool:
             return joint(model, replace(evidence, records=records), LINEARISATIONS, PRECISE).cost
 
         whole = cost(1.0)
-        return whole < BETTER * cost(0.0) and all(whole < cost(share) for share in OTHER_SHARES)
+        return whole < leaves and whole < BETTER * cost(0.0) and all(whole < cost(share) for share in OTHER_SHARES)
     return False
 
 
