@@ -131,11 +131,12 @@ def figures(outcomes: list[Outcome]) -> Table:
         members = [o for o in outcomes if o.group == group]
         if not members:
             continue
-        seen = [o for o in members if o.visible and not o.rest_invisible] if group != "effect_free" else members
+        visible = [o for o in members if o.visible and not o.rest_invisible]
+        seen = members if group == "effect_free" else visible
         table.add_row(
             group,
             str(len(members)),
-            str(len(seen)) if group != "effect_free" else str(sum(o.visible for o in members)),
+            str(len(visible)),
             f"{sum(o.family_right for o in seen)} of {len(seen)}",
             f"{sum(o.name_right for o in seen)} of {len(seen)}",
             str(sum(o.verdict == "unknown" for o in members)),

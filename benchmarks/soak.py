@@ -30,13 +30,12 @@ from benchmarks.soak_faults import FAULTS, Bench
 from benchmarks.soak_keeper import BEFORE, LOST, Keeper
 from benchmarks.soak_processes import Soaked
 from benchmarks.stage_log import STEP, StageLog
+from benchmarks.streaming import LARGE_BLOCKS
 from piezo_hysteresis.model import Model
 from piezo_hysteresis.model_file import dumps, load
 
 ROOT = Path(__file__).parent.parent
 MODEL = ROOT / "config" / "published_stage.yaml"
-LARGE_BLOCKS = ROOT / "config" / "large_blocks.xml"
-"""With it a process that was stopped, or gets no core, is not taken for dead after a second."""
 LIMITS = {"voltage_min": 0.0, "voltage_max": 10.0, "max_slew_rate": 2e4, "ramp_rate": 100.0}
 FALSE_SHARE = 0.02
 """Of the range: simulated stage and model are other code, 0.3 % apart in a free run."""

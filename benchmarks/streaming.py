@@ -47,6 +47,7 @@ from piezo_hysteresis.recording.bag import Bag
 NODES = ("driver_node", "model_node")
 BLOCKS = ("samples", "predicted_samples")
 LARGE_BLOCKS = Path(__file__).parents[1] / "config" / "large_blocks.xml"
+"""Room for large blocks; and a process that was stopped, or gets no core, is not taken for dead after a second."""
 LONGEST = 500_000
 """Samples of a command at most."""
 PROMISED = 500e3

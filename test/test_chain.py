@@ -80,7 +80,7 @@ def slopes(model: Model, records: list[Record], names: list[str], block: int = 8
 NAMES = [n for n in EVERYTHING.values() if not EVERYTHING.row(n).fixed]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.lists(st.integers(1, 599), min_size=1, max_size=5, unique=True).map(sorted))
 def test_parts_that_continue_are_the_whole_record_bit_for_bit(cuts: list[int]) -> None:
     whole = record(start_time=0.7)

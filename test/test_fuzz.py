@@ -30,7 +30,7 @@ NUMBERS = st.sampled_from(
     ["0.0", "-0.0", "1.0e308", "1.0e-308", "5.0e-324", ".nan", ".inf", "-.inf", "1", "9" * 5000, "0x" + "f" * 5000]
     + ["1.0e-12", "1.0e12", "true", "[]", "[1.0, 2.0]", "[" + "0.1, " * 50 + "0.1]", "'1.0'", "2001-99-99", "~", "*a"]
 )
-SETTINGS = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+SETTINGS = settings(max_examples=100, suppress_health_check=list(HealthCheck))
 
 
 def or_refused(function, *arguments):

@@ -57,14 +57,14 @@ def _same(one: Model, other: Model) -> None:
     assert dict(one.provenance) == dict(other.provenance)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
 @given(models())
 def test_text_and_parameters_carry_any_model_bit_for_bit(model: Model) -> None:
     _same(loads(dumps(model)), model)
     _same(from_parameters(to_parameters(model)), model)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
 @example(Model(MODEL.effects, 2e-5, provenance={"no": "", "on": "x", "run": "3"}))
 @given(models())
 def test_pyyaml_reads_the_same_numbers_as_rcl(model: Model) -> None:

@@ -49,7 +49,7 @@ def residual(answers: list[Prediction]) -> Array:
     return np.concatenate([a.residual for a in answers])
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(st.integers(1, 700), st.integers(0, 900), st.integers(0, 2**32 - 1))
 def test_a_clean_stream_is_the_batch_simulation_bit_for_bit(size: int, rest: int, first: int) -> None:
     voltage = sine(2000, rest=rest)
@@ -161,7 +161,7 @@ def test_samples_that_were_never_measured_are_not_lost() -> None:
     assert predictor.continuity.lost == 0
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     st.lists(st.sampled_from(["pass", "lose", "double", "late"]), min_size=3, max_size=25), st.integers(0, 2**32 - 1)
 )

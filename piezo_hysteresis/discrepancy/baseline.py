@@ -70,12 +70,10 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1)), period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or _delay_without_steps(start, records, broadband)
-    for choices, iterations in (
-        ((broadband, moving), ITERATIONS),
-        ((broadband, moving), FEW_ITERATIONS),
-        ((moving, broadband), ITERATIONS),
-    ):
-        yield _with_dynamics(start, records, choices, delay, iterations)
+    for iterations in (ITERATIONS, FEW_ITERATIONS):
+        yield _with_dynamics(start, records, (broadband, moving), delay, iterations)
+    if moving != broadband:
+        yield _with_dynamics(start, records, (moving, broadband), delay, ITERATIONS)
 
 
 def _with_dynamics(

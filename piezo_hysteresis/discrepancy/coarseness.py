@@ -51,15 +51,18 @@ def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
         pairs = zip(straight, model.simulate(sharp), strict=True)
         changes.append([y.reshape(x.size, -1).mean(axis=1) - x for x, y in pairs])
     off = [r.displacement - y for r, y in zip(records, straight, strict=True)]
-    return [
-        min((np.zeros_like(e), a, b), key=lambda c: _unevenness(e, c)) for e, a, b in zip(off, *changes, strict=True)
-    ]
+    return [_better(e, a, b) for e, a, b in zip(off, *changes, strict=True)]
 
 
-def _unevenness(residual: Array, change: Array) -> float:
-    """Of a residual once a change is taken out; without one, what a change has to stay below."""
-    left = float(np.sum(np.diff(residual - change, 2) ** 2))
-    return left if change.any() else SMOOTHER * left
+def _better(residual: Array, gradual: Array, abrupt: Array) -> Array:
+    """The change that leaves the residual more even, or none where neither does much."""
+    change = gradual if _unevenness(residual - gradual) <= _unevenness(residual - abrupt) else abrupt
+    smoother = _unevenness(residual - change) < SMOOTHER * _unevenness(residual)
+    return change if smoother else np.zeros_like(change)
+
+
+def _unevenness(residual: Array) -> float:
+    return float(np.sum(np.diff(residual, 2) ** 2))
 
 
 def _sharpened(record: Record, parts: int, abrupt: bool) -> Record:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import CATALOGUE, Effect, ExtraResonance
+from ..effects import CATALOGUE, Effect
 from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ..identification.carried import select as select_records
 from ..identification.fit import Fit, Progress
@@ -31,15 +31,14 @@ from .next_experiment import decide
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
 from .refit import joint, restart
-from .sampling import NOISE_WIDTH, at_period, common_period, quieted, shortened, slowed, voltage_noise
+from .sampling import NOISE_WIDTH, at_period, common_period, less, quieted, shortened, slowed, voltage_noise
 from .selection import NAMED, select
 from .split import reporting
 from .steps import Selection
+from .verdict import FEWEST, is_makeshift, verdict_of
 
 Array = NDArray[np.float64]
 
-FEWEST = 4
-"""Records below which none can be held out and no name is given."""
 SEARCHED, FITTED = 6_000, 50_000
 """Samples of a fast record that take part in the search, and in the last fit."""
 LAST, PRECISE = 25, 1e-4
@@ -48,13 +47,10 @@ UNSURE = 0.3
 """Share of what slow samples have lost that counts as floor: the rest is made good."""
 NOISY, WORTHWHILE = 1.1, 0.95
 """Cost over that of noise from which it is begun anew, and share of it that may be left for another time."""
-FORESEEN, UNFORESEEN = 1.1, 1.5
-"""Gap on records set aside, in floors: up to the first nothing is missing, though some that were fitted are not quite
-foretold by the others; from the second something is, though those lack nothing."""
 STEPS_LEAVE = 10.0
 """Cost that may be left once the changes of an explicit step are taken out before anything is named."""
-LINEAR_LEAVES = 2.0 * ADEQUATE
-"""V that an effect of linear dynamics may leave: they are fitted with it, and hold what is linear."""
+VOLTAGE_NOISE = "voltage_noise"
+"""Kind of the notice of an experiment whose voltage is followed but for its noise."""
 IDLE = ("idle", "hold", *CARRYING)
 """Phases that only bring the stage from one state to another."""
 
@@ -93,8 +89,7 @@ def diagnose(
     """
     tell = progress or (lambda word, fraction: None)
     noise_of_drive = voltage_noise(experiment.records)
-    is_noisy = bool(noise_of_drive.any())
-    if is_noisy:
+    if noise_of_drive.any():
         experiment = _quieted(experiment, noise_of_drive)
     records = tuple(slowed(r) for r in experiment.records)
     severe = [n for n in experiment.notices if n.severe]
@@ -127,8 +122,9 @@ def diagnose(
     tell("baseline, jointly", 0.2)
     baseline = joint(start, evidence, LAST, PRECISE)
     lost = coarseness(baseline.model, records)
-    if not is_noisy and any(c.any() for c in lost):  # averages of noise would turn back and forth
-        records = tuple(replace(r, displacement=r.displacement - c) for r, c in zip(records, lost, strict=True))
+    told = {n.kind for n in experiment.notices}
+    if VOLTAGE_NOISE not in told and any(c.any() for c in lost):  # averages of noise would turn back and forth
+        records = less(records, lost)
         least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
         evidence = gathered(records, least)
         tell("baseline, jointly", 0.3)
@@ -140,7 +136,7 @@ def diagnose(
                 other = joint(exact(anew), evidence, LAST, PRECISE)
                 if other.cost < baseline.cost:
                     baseline, score = other, score_model(other.model, evidence)
-    may_be_stepped = all(n.kind != KIND for n in experiment.notices)
+    may_be_stepped = KIND not in told
     if score.excess > ADEQUATE and may_be_stepped and is_stepped(baseline.model, evidence, leaves=STEPS_LEAVE):
         return diagnose(without_steps(experiment, baseline.model), model, effects=effects, progress=progress)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
@@ -160,7 +156,7 @@ def diagnose(
     if selection.score.excess > ADEQUATE and may_be_stepped and last is not None and is_stepped(selection.model, last):
         return diagnose(without_steps(experiment, selection.model), model, effects=effects, progress=progress)
     tell("gap", 0.85)
-    named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED and not _is_makeshift(selection)
+    named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED and not is_makeshift(selection)
     whole = tuple(select_records(shortened(records, FITTED), least.tolist(), fitted)[0])
     plain = baseline.model if selection.accepted else selection.model  # the search may have found better dynamics
     first = joint(plain, replace(evidence, records=whole), LAST, PRECISE)
@@ -177,7 +173,7 @@ def diagnose(
     if named and not falls:
         named, final, gap = False, first, gap_of(first, evidence.nuisance)
     tell("next experiment", 0.95)
-    verdict, reason = _verdict(selection, named, falls, gap)
+    verdict, reason = verdict_of(selection, named, falls, gap)
     return Diagnosis(
         verdict=verdict,
         reason=reason,
@@ -196,13 +192,7 @@ def _quieted(experiment: Experiment, noise: Array) -> Experiment:
     size = f"{noise.max():.2g} V of noise"
     told = f"the voltage was measured with {size}; turns within {NOISE_WIDTH:g} times that are left out"
     records = tuple(quieted(r, n) for r, n in zip(experiment.records, noise.tolist(), strict=True))
-    return replace(experiment, records=records).noting(Notice("voltage_noise", told))
-
-
-def _is_makeshift(selection: Selection) -> bool:
-    """Whether a lag or a resonance leaves a gap: one that is there leaves none, one beside poor dynamics does."""
-    linear = any(s.best.effect.family == "lag" or s.best.name == ExtraResonance.name for s in selection.accepted)
-    return linear and selection.score.excess > LINEAR_LEAVES
+    return replace(experiment, records=records).noting(Notice(VOLTAGE_NOISE, told))
 
 
 def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:
@@ -215,37 +205,6 @@ def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:
             break
         final = anew
     return final
-
-
-def _verdict(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Verdict, str]:
-    names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
-    closed = selection.explained(selection.score)
-    if named:
-        rest = (
-            "what remains is at the floor"
-            if gap.after <= np.sqrt(ADEQUATE) * gap.floor
-            else f"a gap of {gap.after / gap.floor:.1f} floors remains unexplained"
-        )
-        return Verdict.NAMED, f"The model misses {names}: {100 * closed:.0f} % of the gap is explained; {rest}."
-    many = gap.unseen and len(gap.per_phase) >= FEWEST
-    foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
-    if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):
-        if gap.after > UNFORESEEN * gap.floor:
-            told = f"those set aside, where a gap of {gap.after / gap.floor:.1f} floors remains"
-            return Verdict.UNKNOWN, f"No name: nothing is missing on the records that were fitted, but on {told}."
-        return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
-    if closed >= NAMED and _is_makeshift(selection):
-        told = f"{names} explains {100 * closed:.0f} %, but what is linear leaves nothing where it is named rightly"
-        return Verdict.UNKNOWN, f"No name: {told}."
-    if selection.accepted and not falls:
-        return Verdict.UNKNOWN, f"No name: {names} helps on the records that chose it, not on those set aside."
-    told = ""
-    if selection.steps:
-        closest = selection.steps[0].best
-        share = 100 * selection.explained(closest.score)
-        why = "".join(f" ({r.reason})" for r in selection.steps[0].rejected if r.name == closest.name)
-        told = f"; closest is {closest.effect.public_name()}, which explains {share:.0f} %{why}"
-    return Verdict.UNKNOWN, f"The model misses an effect that the catalogue does not explain{told}."
 
 
 def _undecided(experiment: Experiment, model: Model | None, severe: list[Notice]) -> Diagnosis:

@@ -20,7 +20,7 @@ from ..model import Model
 from ..record import Experiment, Notice, Record
 from .evidence import Evidence
 from .refit import joint
-from .sampling import at_period
+from .sampling import at_period, less
 
 Array = NDArray[np.float64]
 
@@ -55,19 +55,12 @@ def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
     DivergenceError
         Where the explicit step runs away.
     """
-    loop = model[BoucWen.name]
-    explicit = PublishedBoucWen(**loop.values)
-    effects = [e for e in model.effects if e.host != BoucWen.name]
-    pair = [
-        Model(tuple(chosen if e is loop else e for e in effects), *_frame(model)).simulate(records)
-        for chosen in (loop, explicit)
-    ]
+    for term in [e for e in model.effects if e.host == BoucWen.name]:
+        model = model.without(term.name)
+    explicit = model.without(BoucWen.name).with_effect(PublishedBoucWen(**model[BoucWen.name].values))
+    pairs = zip(records, model.simulate(records), explicit.simulate(records), strict=True)
     own = 1.001 * model.sample_period
-    return [b - a if r.sample_period < own else np.zeros(r.size) for r, a, b in zip(records, *pair, strict=True)]
-
-
-def _frame(model: Model) -> tuple[float, float, float]:
-    return model.sample_period, model.voltage_scale, model.displacement_scale
+    return [b - a if r.sample_period < own else np.zeros(r.size) for r, a, b in pairs]
 
 
 def is_stepped(model: Model, evidence: Evidence, leaves: float = np.inf) -> bool:
@@ -91,7 +84,7 @@ def is_stepped(model: Model, evidence: Evidence, leaves: float = np.inf) -> bool
             return False
 
         def cost(share: float) -> float:
-            records = tuple(_less(r, share * c) for r, c in zip(evidence.records, changes, strict=True))
+            records = less(evidence.records, [share * c for c in changes])
             return joint(model, replace(evidence, records=records), LINEARISATIONS, PRECISE).cost
 
         whole = cost(1.0)
@@ -102,15 +95,10 @@ def is_stepped(model: Model, evidence: Evidence, leaves: float = np.inf) -> bool
 def without_steps(experiment: Experiment, model: Model) -> Experiment:
     """The experiment as the exact loop would have answered, which its notices tell."""
     records = tuple(at_period(r, model.sample_period) if _is_faster(r, model) else r for r in experiment.records)
-    changes = step_changes(model, records)
+    freed = less(records, step_changes(model, records))
     told = "jumps go by the explicit step of Eq. (7), as in a simulation and in no stage; what it changes is left out"
-    freed = tuple(_less(r, c) for r, c in zip(records, changes, strict=True))
     return replace(experiment, records=freed).noting(Notice(KIND, told))
 
 
 def _is_faster(record: Record, model: Model) -> bool:
     return record.sample_period < 0.999 * model.sample_period
-
-
-def _less(record: Record, change: Array) -> Record:
-    return replace(record, displacement=record.displacement - change)

@@ -74,6 +74,11 @@ def quieted(record: Record, noise: float) -> Record:
     return replace(record, voltage=voltage)
 
 
+def less(records: Sequence[Record], changes: Sequence[Array]) -> tuple[Record, ...]:
+    """The records with changes, one each, taken out of their displacement [m]."""
+    return tuple(replace(r, displacement=r.displacement - c) for r, c in zip(records, changes, strict=True))
+
+
 def slowed(record: Record) -> Record:
     """The record at a longer sample period where it is long and straight lines between block averages show its drive.
 

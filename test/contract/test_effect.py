@@ -139,7 +139,7 @@ def plain_python(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @every_effect
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow])
 @given(cuts=st.lists(st.integers(1, N - 1), max_size=8).map(tuple))
 def test_every_cutting_gives_the_same_bits(kind: type[Effect], cuts: tuple[int, ...]) -> None:
     model = model_with(typical(kind))

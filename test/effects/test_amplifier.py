@@ -23,7 +23,7 @@ def test_a_step_becomes_a_ramp_of_the_slew_limit() -> None:
     np.testing.assert_allclose(y, np.minimum(1.0 + 1000.0 * PERIOD * np.arange(400), 5.0), rtol=1e-12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=50), st.floats(1.0, 1e6))
 def test_no_step_is_larger_than_the_limit_and_a_drive_inside_it_passes(x: list[float], slope: float) -> None:
     drive = np.array(x)
@@ -39,7 +39,7 @@ def test_saturation_clips_hard_without_corner() -> None:
     np.testing.assert_allclose(y, np.clip(x, -1.0, 10.0), atol=1e-14)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(0.0, 2.0), st.floats(5.0, 10.0), st.floats(0.01, 2.0))
 def test_a_corner_is_smooth_monotonic_and_ends_at_the_limits(lower: float, upper: float, corner: float) -> None:
     x = np.linspace(-8.0, 18.0, 20001)

@@ -27,7 +27,7 @@ def run(effect: Arx, x: np.ndarray, setting: Setting = FAST, *terms: Softening) 
     return block.run(x, block.rest(x[0], 0.0))[0]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(1, 6), st.integers(0, 5), st.integers(0, 2**32 - 1))
 def test_it_is_the_filter_of_scipy(delay: int, pairs: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -113,7 +113,7 @@ def test_a_remanent_state_is_there_at_rest_and_forgotten_after_a_swing() -> None
 numbers = st.floats(-1.0, 1.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(numbers, min_size=2, max_size=40),
     st.floats(-3.0, 3.0),
@@ -131,7 +131,7 @@ def test_the_general_kernel_with_everything_off_is_the_plain_one_bit_for_bit(
     np.testing.assert_array_equal(general, plain)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(numbers, min_size=2, max_size=60),
     st.sampled_from([-0.8, 0.8]),
@@ -144,7 +144,7 @@ def test_the_state_stays_below_its_bound(v: list[float], a: float, beta: float, 
     assert np.abs(h).max() <= abs(a) / (beta + np.sign(a) * gamma) * (1 + 1e-12)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(numbers, min_size=3, max_size=20), st.integers(2, 5))
 def test_the_result_does_not_depend_on_how_finely_a_line_is_sampled(turns: list[float], steps: int) -> None:
     v = np.array(turns)

@@ -21,7 +21,7 @@ def run(effect: Effect, x: np.ndarray) -> np.ndarray:
 levels = st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=50)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(levels, st.floats(0.0, 0.5))
 def test_backlash_never_leaves_its_play_and_moves_only_when_pushed(x: list[float], b: float) -> None:
     drive = np.array(x)
@@ -37,7 +37,7 @@ def test_backlash_is_blind_below_its_half_width() -> None:
     np.testing.assert_array_equal(run(Backlash(b=0.06), x), np.full(200, 2.0))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(levels)
 def test_memory_is_the_weighted_sum_of_plays(x: list[float]) -> None:
     effect = HysteresisMemory(c=[0.3, 0.1, 0.2], reach=0.4)
@@ -46,7 +46,7 @@ def test_memory_is_the_weighted_sum_of_plays(x: list[float]) -> None:
     np.testing.assert_allclose(run(effect, drive), sum(parts), atol=1e-15)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(levels, st.floats(-0.5, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_a_closed_minor_loop_returns_to_the_point_where_it_left(
     x: list[float], top: float, down: float, up: float

@@ -30,7 +30,7 @@ some_limits = st.builds(
 )
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(limits=some_limits, plan=st.sampled_from([protocol.paper, protocol.short]), seed=st.integers(0, 1000))
 def test_every_protocol_respects_every_stage(limits, plan, seed):
     made = plan(limits, seed)

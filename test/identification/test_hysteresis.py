@@ -34,7 +34,7 @@ loops = st.builds(
 )
 
 
-@settings(max_examples=15, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@settings(max_examples=15, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(truth=loops, offset=st.floats(-5.0, 5.0), unit=st.sampled_from([0.1, 1.0, 40.0]))
 def test_any_loop_is_found_in_any_unit_of_v(truth, offset, unit):
     w = run(truth, V)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from rclpy.serialization import deserialize_message, serialize_message
@@ -52,7 +52,6 @@ def read(message):
     return samples_from_cloud(message)
 
 
-@settings(deadline=None)
 @given(hnp.arrays(np.float64, st.integers(1, 50), elements=st.floats(-1, 1)), st.integers(0, 2**32 - 1), st.booleans())
 def test_samples_come_back_bit_for_bit(displacement, first, gap):
     block = block_of(displacement.size, first, displacement=displacement, follows_gap=gap)
@@ -63,7 +62,6 @@ def test_samples_come_back_bit_for_bit(displacement, first, gap):
     assert (back.stamp, back.stage, back.follows_gap) == (block.stamp, block.stage, gap)
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(1, 5), st.text(max_size=6), st.integers(0, 2**31 * 10**9 - 1), st.booleans())))
 def test_a_stream_says_what_its_messages_say_one_by_one(changes):
     writer, reader = SampleWriter(), SampleReader()

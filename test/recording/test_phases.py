@@ -37,7 +37,7 @@ def multisine(period, repeats, seed=0):
     return np.tile(one, repeats)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     frequency=st.floats(0.5, 400.0),
     amplitude=st.floats(1e-3, 100.0),
@@ -120,7 +120,7 @@ def test_the_flat_tops_of_a_quantised_sine_are_no_holds():
     assert propose(wave, PERIOD) == [(0, "sine_0.5hz")]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.floats(-10, 10), min_size=1, max_size=300), st.integers(1, 30))
 def test_any_drive_is_covered_from_first_to_last_sample(values, repeat):
     wave = np.repeat(np.array(values), repeat)

@@ -49,7 +49,7 @@ def assert_same(got, sent, but=()):
 
 
 @pytest.mark.parametrize("name", ["folder", "table.csv", "matlab.mat"])
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(experiment=experiments())
 def test_files_come_back_exactly(name, experiment):
     with tempfile.TemporaryDirectory() as folder:
@@ -58,7 +58,7 @@ def test_files_come_back_exactly(name, experiment):
         assert_same(read(path), experiment)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     experiment=experiments(
         periods=st.sampled_from([2e-6, 2e-5, 1e-4, 5e-3]), names=st.sampled_from(["rest", "step", "sine_50hz"])

@@ -27,7 +27,7 @@ DRIVE = np.random.default_rng(0).uniform(0.0, 10.0, 600).repeat(3)
 WHOLE = Plant(EVERYTHING, TS, seed=4).run(DRIVE)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(st.integers(1, DRIVE.size - 1), max_size=6))
 def test_cutting_the_drive_into_blocks_changes_no_bit(cuts):
     plant = Plant(EVERYTHING, TS, seed=4)

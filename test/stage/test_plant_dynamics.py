@@ -12,7 +12,7 @@ from scipy.signal import residue
 from piezo_hysteresis.stage.plant import Plant
 
 TS = 20e-6
-SAME_FIXTURE = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SAME_FIXTURE = settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def step_response(parameters, size=400, period=TS):

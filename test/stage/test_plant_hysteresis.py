@@ -27,7 +27,7 @@ def between(*levels, points=2000):
     return np.concatenate([np.linspace(a, b, points + 1)[1:] for a, b in zip(levels, levels[1:], strict=False)])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(turning_points)
 def test_bouc_wen_is_exact_in_v_however_fine_the_drive(turns):
     coarse = output(Hysteresis(), turns)
@@ -54,7 +54,7 @@ def test_loading_curve_in_closed_form():
     np.testing.assert_allclose(output(p, 10 * v), expected, rtol=1e-13)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(turning_points, st.booleans())
 def test_without_its_rate_law_hysteresis_does_not_know_time(turns, plays):
     hysteresis = Hysteresis.prandtl_ishlinskii() if plays else Hysteresis(phi1=0.5, phi2=-0.3, exponent=1.4)
@@ -62,7 +62,7 @@ def test_without_its_rate_law_hysteresis_does_not_know_time(turns, plays):
     np.testing.assert_array_equal(output(hysteresis, turns, clock=slow), output(hysteresis, turns, clock=fast))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(0.0, 4.0), st.floats(6.0, 10.0), st.lists(st.floats(4.0, 6.0), min_size=1, max_size=8))
 def test_plays_have_return_point_memory(low, high, inner):
     """Whatever happened in between, back at the last outer turning points the output is what it was."""

@@ -20,7 +20,7 @@ from piezo_hysteresis.stage.gcs2.emulator.controller import BYTES, Controller
 from piezo_hysteresis.stage.gcs2.emulator.server import Server, cut
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
-many = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+many = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 WORDS = st.sampled_from(
     [

@@ -1,0 +1,70 @@
+"""From the search and the gap to the verdict, and the reason in one plain sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..effects import ExtraResonance
+from .diagnosis import Verdict
+from .gap import Gap
+from .held_out import ADEQUATE
+from .selection import NAMED
+from .steps import Selection
+
+FEWEST = 4
+"""Records below which none can be held out and no name is given."""
+FORESEEN, UNFORESEEN = 1.1, 1.5
+"""Gap on records set aside, in floors: up to the first nothing is missing, though some that were fitted are not quite
+foretold by the others; from the second something is, though those lack nothing."""
+LINEAR_LEAVES = 2.0 * ADEQUATE
+"""V that an effect of linear dynamics may leave: they are fitted with it, and hold what is linear."""
+
+
+def is_makeshift(selection: Selection) -> bool:
+    """Whether a lag or a resonance leaves a gap: one that is there leaves none, one beside poor dynamics does."""
+    linear = any(s.best.effect.family == "lag" or s.best.name == ExtraResonance.name for s in selection.accepted)
+    return linear and selection.score.excess > LINEAR_LEAVES
+
+
+def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Verdict, str]:
+    """Named, nothing missing, or unknown, and why.
+
+    Parameters
+    ----------
+    selection : Selection
+        Every turn of the search.
+    named : bool
+        Whether its effects are to be named.
+    falls : bool
+        Whether they lower the gap on the records that were set aside.
+    gap : Gap
+        Before and after.
+    """
+    names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
+    closed = selection.explained(selection.score)
+    if named:
+        rest = (
+            "what remains is at the floor"
+            if gap.after <= np.sqrt(ADEQUATE) * gap.floor
+            else f"a gap of {gap.after / gap.floor:.1f} floors remains unexplained"
+        )
+        return Verdict.NAMED, f"The model misses {names}: {100 * closed:.0f} % of the gap is explained; {rest}."
+    many = gap.unseen and len(gap.per_phase) >= FEWEST
+    foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
+    if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):
+        if gap.after > UNFORESEEN * gap.floor:
+            told = f"those set aside, where a gap of {gap.after / gap.floor:.1f} floors remains"
+            return Verdict.UNKNOWN, f"No name: nothing is missing on the records that were fitted, but on {told}."
+        return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
+    if closed >= NAMED and is_makeshift(selection):
+        told = f"{names} explains {100 * closed:.0f} %, but what is linear leaves nothing where it is named rightly"
+        return Verdict.UNKNOWN, f"No name: {told}."
+    if selection.accepted and not falls:
+        return Verdict.UNKNOWN, f"No name: {names} helps on the records that chose it, not on those set aside."
+    told = ""
+    if selection.steps:
+        closest = selection.steps[0].best
+        share = 100 * selection.explained(closest.score)
+        why = "".join(f" ({r.reason})" for r in selection.steps[0].rejected if r.name == closest.name)
+        told = f"; closest is {closest.effect.public_name()}, which explains {share:.0f} %{why}"
+    return Verdict.UNKNOWN, f"The model misses an effect that the catalogue does not explain{told}."
