@@ -25,6 +25,8 @@ WORTHWHILE = 0.8
 """Share of the cost above which beginning anew once more is not worth it."""
 FIRST, LATER = 3, 9
 """Linearisations of a refit before the field is thinned out, and after."""
+FEWEST_STARTS = 3
+"""Starts of an effect from which all are tried where the likeliest led to no floor."""
 FINER = 0.05
 """Gain from which the finer form of an effect is taken."""
 
@@ -49,7 +51,7 @@ def contest(model: Model, candidates: Sequence[Candidate], before: Score, tell: 
     ]
     field.sort(key=lambda c: c.score.cost)
     tell(f"refit with {field[0].name}", 0.9)
-    best = settled(field[0], before)
+    best = _from_elsewhere(settled(field[0], before), before)
     reach = best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
     rest = [settled(c, before) if c.score.cost < reach and k < AGAIN else c for k, c in enumerate(field[1:], 1)]
     return sorted([best, *rest], key=lambda c: c.score.cost)
@@ -73,6 +75,20 @@ def _anew(candidate: Candidate) -> Candidate:
         return anew
     assert anew.fit is not None
     return better(from_all_starts(anew.fit.model.without(anew.name), anew, FIRST), anew)
+
+
+def _from_elsewhere(best: Candidate, before: Score) -> Candidate:
+    """The best, begun once more at every start of its effect where it has come to no floor.
+
+    An effect of the drive has had all of its starts, and one with few has no valleys to choose from.
+    """
+    assert best.fit is not None
+    starts = type(best.effect).starts(best.evidence.extent)
+    in_vain = before.cost - best.score.cost < LEAST_GAIN
+    if best.score.excess <= ADEQUATE or in_vain or best.effect.place is Place.DRIVE or len(starts) < FEWEST_STARTS:
+        return best
+    anew = from_all_starts(best.fit.model.without(best.name), best, FIRST)
+    return best if anew is None else better(settled(anew, before), best)
 
 
 def _is_far_behind(candidate: Candidate, best: Candidate, before: Score) -> bool:
