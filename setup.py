@@ -22,7 +22,7 @@ setup(
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),
     ],
     python_requires=">=3.11",
-    install_requires=["h5py", "matplotlib", "mcap", "numba", "numpy", "PyYAML", "rich", "rosbags", "scipy"],
+    install_requires=["h5py", "matplotlib", "mcap", "numba", "numpy", "PyYAML", "rich", "rosbags", "scipy", "threadpoolctl"],
     extras_require={
         "hardware": ["nidaqmx[grpc]"],
         "test": ["hypothesis", "pytest"],

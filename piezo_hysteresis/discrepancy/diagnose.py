@@ -16,6 +16,7 @@ from ..identification.fit import Fit, Progress
 from ..identification.normal_equations import Nuisance, residuals
 from ..identification.roles import CARRYING
 from ..model import Model
+from ..one_core import on_one_core
 from ..record import Experiment, Notice, Record
 from .baseline import exact, start_models
 from .candidates import score_baseline, score_model
@@ -55,6 +56,7 @@ IDLE = ("idle", "hold", *CARRYING)
 """Phases that only bring the stage from one state to another."""
 
 
+@on_one_core
 def diagnose(
     experiment: Experiment,
     model: Model | None = None,

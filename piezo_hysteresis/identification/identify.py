@@ -14,6 +14,7 @@ import numpy as np
 from ..effects import Arx, BoucWen, Effect, Offset
 from ..errors import IdentificationError
 from ..model import Model
+from ..one_core import on_one_core
 from ..provenance import provenance
 from ..record import Experiment, Notice, Record
 from .comparison import Comparison, compare_inputs
@@ -40,6 +41,7 @@ HIGHEST_ORDER = 10
 """Highest order of the comparison."""
 
 
+@on_one_core
 def identify(
     experiment: Experiment,
     *,

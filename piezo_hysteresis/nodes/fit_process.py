@@ -76,8 +76,6 @@ class FitProcess:
     """
 
     def __init__(self, job: Job, path: Path, model: str = "") -> None:
-        # matrices are small: more BLAS threads only take the cores from driver and model node
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         context = multiprocessing.get_context("spawn")
         self._results, answers = context.Pipe(duplex=False)
         self._process = context.Process(target=_work, args=(answers, job, path, model), daemon=True)

@@ -1,0 +1,39 @@
+"""While we fit, BLAS has one thread; before and after, as many as its user gave it."""
+
+from __future__ import annotations
+
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from piezo_hysteresis.errors import IdentificationError
+from piezo_hysteresis.one_core import on_one_core
+
+
+def _threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_threads_of_blas_are_one_inside_and_given_back() -> None:
+    with threadpool_limits(limits=2, user_api="blas"):
+        assert on_one_core(_threads)() == {1}
+        assert _threads() == {2}
+
+
+def test_threads_are_given_back_when_a_fit_fails() -> None:
+    @on_one_core
+    def fails() -> None:
+        raise IdentificationError("nothing moves")
+
+    with threadpool_limits(limits=2, user_api="blas"):
+        with pytest.raises(IdentificationError, match="nothing moves"):
+            fails()
+        assert _threads() == {2}
+
+
+def test_a_function_on_one_core_keeps_its_name_and_its_arguments() -> None:
+    @on_one_core
+    def product(a: int, *, b: int = 2) -> int:
+        """The product."""
+        return a * b
+
+    assert (product(3), product(3, b=4), product.__name__, product.__doc__) == (6, 12, "product", "The product.")
