@@ -21,6 +21,7 @@ from ..identification.linear_start import (
     dynamics_behind,
     follower,
     hysteresis_signals,
+    modes_behind,
     with_dynamics,
 )
 from ..identification.roles import roles_of
@@ -35,7 +36,8 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     """Hysteresis from the slow loops, delay from the steps, dynamics from the broadband records.
 
     What is missing may lead the iterations of the dynamics astray: after the model from many there is one from few.
-    Noise may hide modes that larger motion shows: the last one is from all records that move.
+    Noise may hide modes that larger motion shows: the next one is from all records that move. Modes far below the
+    sampling rate hide from iterations: the last ones are sums of modes.
 
     Parameters
     ----------
@@ -74,6 +76,9 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
         yield _with_dynamics(start, records, (broadband, moving), delay, iterations)
     if moving != broadband:
         yield _with_dynamics(start, records, (moving, broadband), delay, ITERATIONS)
+    for chosen in (broadband, moving) if moving != broadband else (broadband,):
+        with suppress(IdentificationError):
+            yield with_dynamics(start, modes_behind(start, records, chosen, delay, ORDERS).arx)
 
 
 def _with_dynamics(

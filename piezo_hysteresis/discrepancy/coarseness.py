@@ -18,18 +18,19 @@ Array = NDArray[np.float64]
 
 PARTS = 16
 """Parts into which a sample is divided at most."""
-FEWEST = 4
-"""Parts below which a sample is short enough."""
 SMOOTHER = 0.97
-"""Share of the unevenness of a residual that a change leaves at most: what it removes stands out in single samples."""
+"""Share of the unevenness, or of the square, of a residual that a change leaves at most."""
+ITS_SIZE = (0.7, 1.3)
+"""Multiple of a change that the residual holds, where the change is what it lacks."""
 
 
 def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
     """Change of the simulation where slow drives turn within their samples, and averages are compared [m].
 
     Whether a drive ran or jumped to the next level is not in its averages: every record is taken as its displacement
-    tells, in which a wrong guess stands out in single samples. A change that stands out in none is left alone: it is
-    one of dynamics that are not known well.
+    tells, in which a wrong guess stands out in single samples. Nor does a slow record hold the ringing after a turn. A
+    change that stands out in no sample, and that the residual does not hold in its size, is left alone: it is one of
+    dynamics that are not known well.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
     straight = model.simulate(records)
     changes = []
     for abrupt in (False, True):
-        sharp = [_sharpened(r, n, abrupt) if n >= FEWEST else r for r, n in zip(records, parts, strict=True)]
+        sharp = [_sharpened(r, n, abrupt) if n > 1 else r for r, n in zip(records, parts, strict=True)]
         pairs = zip(straight, model.simulate(sharp), strict=True)
         changes.append([y.reshape(x.size, -1).mean(axis=1) - x for x, y in pairs])
     off = [r.displacement - y for r, y in zip(records, straight, strict=True)]
@@ -58,7 +59,17 @@ def _better(residual: Array, gradual: Array, abrupt: Array) -> Array:
     """The change that leaves the residual more even, or none where neither does much."""
     change = gradual if _unevenness(residual - gradual) <= _unevenness(residual - abrupt) else abrupt
     smoother = _unevenness(residual - change) < SMOOTHER * _unevenness(residual)
-    return change if smoother else np.zeros_like(change)
+    return change if smoother or _holds(residual, change) else np.zeros_like(change)
+
+
+def _holds(residual: Array, change: Array) -> bool:
+    """Whether the residual holds the change in its size, and is much the smaller without it."""
+    residual, change = residual - residual.mean(), change - change.mean()
+    power, size = float(residual @ residual), float(change @ change)
+    if size == 0.0:
+        return False
+    left = residual - change
+    return bool(ITS_SIZE[0] < residual @ change / size < ITS_SIZE[1] and left @ left < SMOOTHER * power)
 
 
 def _unevenness(residual: Array) -> float:

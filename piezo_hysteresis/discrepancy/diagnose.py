@@ -31,7 +31,7 @@ from .localise import localise
 from .next_experiment import decide
 from .noise_floor import floors, noise_floors, stroke
 from .reach import beyond_reach
-from .refit import joint, restart
+from .refit import clearly_better, joint, renewed, restart
 from .sampling import NOISE_WIDTH, at_period, common_period, less, quieted, shortened, slowed, voltage_noise
 from .selection import NAMED, select
 from .split import reporting
@@ -89,7 +89,17 @@ def diagnose(
     ModelError
         If the records are faster than the model.
     """
-    tell = progress or (lambda word, fraction: None)
+    return _diagnosed(experiment, model, effects, progress or (lambda word, fraction: None))
+
+
+def _diagnosed(
+    experiment: Experiment,
+    model: Model | None,
+    effects: Collection[type[Effect]],
+    tell: Progress,
+    known: Selection | None = None,
+) -> Diagnosis:
+    """The diagnosis; `known` is a search whose model tells what slow samples have lost better than its baseline."""
     noise_of_drive = voltage_noise(experiment.records)
     if noise_of_drive.any():
         experiment = _quieted(experiment, noise_of_drive)
@@ -112,7 +122,8 @@ def diagnose(
     at_full_rate = [r for r, given in zip(records, experiment, strict=True) if r.sample_period == given.sample_period]
     period = model.sample_period if model is not None else common_period(at_full_rate or records)
     records = tuple(at_period(r, period) for r in records)
-    starts = iter((model,)) if model is not None else start_models(records, fitted)
+    first_model = known.baseline if known is not None else model
+    starts = iter((first_model,)) if first_model is not None else start_models(records, fitted)
     start = exact(next(starts))
     extent = extent_of([records[i] for i in usable], start)
 
@@ -123,7 +134,7 @@ def diagnose(
     evidence = gathered(records, least)
     tell("baseline, jointly", 0.2)
     baseline = joint(start, evidence, LAST, PRECISE)
-    lost = coarseness(baseline.model, records)
+    given, lost = records, coarseness(known.model if known is not None else baseline.model, records)
     told = {n.kind for n in experiment.notices}
     if VOLTAGE_NOISE not in told and any(c.any() for c in lost):  # averages of noise would turn back and forth
         records = less(records, lost)
@@ -136,16 +147,25 @@ def diagnose(
         with suppress(DivergenceError, IdentificationError, ModelError, ParameterError):
             for anew in starts:
                 other = joint(exact(anew), evidence, LAST, PRECISE)
-                if other.cost < baseline.cost:
-                    baseline, score = other, score_model(other.model, evidence)
+                if clearly_better(other, baseline, evidence):
+                    baseline = other
+        baseline = renewed(baseline, evidence, LAST, PRECISE)
+        score = score_model(baseline.model, evidence)
     may_be_stepped = KIND not in told
     if score.excess > ADEQUATE and may_be_stepped and is_stepped(baseline.model, evidence, leaves=STEPS_LEAVE):
-        return diagnose(without_steps(experiment, baseline.model), model, effects=effects, progress=progress)
+        return _diagnosed(without_steps(experiment, baseline.model), model, effects, tell)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
 
     tell("where", 0.35)
     left = residuals(baseline.model, records, evidence.nuisance)
     where = localise([records[i] for i in usable], [left[i] for i in usable], [least[i] for i in usable])
+    stepped = False
+
+    def is_in_vain(model: Model, evidence: Evidence) -> bool:
+        nonlocal stepped
+        stepped = may_be_stepped and is_stepped(model, evidence)
+        return stepped
+
     selection = select(
         baseline.model,
         evidence,
@@ -153,10 +173,14 @@ def diagnose(
         null,
         effects,
         lambda word, part: tell(word, 0.4 + 0.4 * part),
+        is_in_vain,
     )
-    last = selection.accepted[-1].best.evidence if selection.accepted else None
-    if selection.score.excess > ADEQUATE and may_be_stepped and last is not None and is_stepped(selection.model, last):
-        return diagnose(without_steps(experiment, selection.model), model, effects=effects, progress=progress)
+    if stepped:
+        return _diagnosed(without_steps(experiment, selection.model), model, effects, tell)
+    if selection.score.excess > ADEQUATE and selection.accepted and known is None and VOLTAGE_NOISE not in told:
+        again = coarseness(selection.model, given)
+        if any(np.std(a - b) > f for a, b, f in zip(again, lost, least, strict=True)):
+            return _diagnosed(experiment, model, effects, tell, selection)
     tell("gap", 0.85)
     named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED and not is_makeshift(selection)
     whole = tuple(select_records(shortened(records, FITTED), least.tolist(), fitted)[0])

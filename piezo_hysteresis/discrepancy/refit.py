@@ -6,13 +6,11 @@ that had the same chances without it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-import numpy as np
-from scipy.stats import chi2
-
-from ..effects import Arx, MainsHum
+from ..effects import Arx
 from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ..identification.dynamics import identify_arx
 from ..identification.fit import Fit, fit
@@ -21,23 +19,22 @@ from ..identification.linear_start import (
     ITERATIONS,
     dynamics_behind,
     hysteresis_signals,
+    modes_behind,
     with_dynamics,
 )
 from ..model import Model
 from .candidates import Candidate, free_numbers, score_model
 from .evidence import Evidence
-from .held_out import Score
+from .held_out import ADEQUATE, Score
 
 LINEAR = ("lag", "dynamics")
 """Families that dynamics of an order high enough can hold."""
-PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
-"""Periods of the mains in a record that tells its amplitude, sample period in periods, and records."""
-STEADY = 0.3
-"""Least ratio of the quartiles of that amplitude."""
-SEEN = 0.5
-"""Change in units of the floor."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at which a refit has converged."""
+ANEW, CLEARLY = 3, 0.7
+"""Times that a fit is begun anew at most, and share of the cost that one begun elsewhere may leave."""
+FINER = 0.1
+"""Gain from which a sum of modes is taken for the dynamics."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -78,6 +75,32 @@ def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: floa
     )
 
 
+def clearly_better(other: Fit, found: Fit, evidence: Evidence) -> bool:
+    """Whether a fit begun elsewhere is preferred: a little better it may be by another account of what is missing."""
+    if other.cost < CLEARLY * found.cost:
+        return True
+    return other.cost < found.cost and score_model(other.model, evidence).excess <= ADEQUATE
+
+
+def renewed(found: Fit, evidence: Evidence, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
+    """A fit begun anew behind dynamics found anew, while that helps.
+
+    Dynamics are found behind the hysteresis of the model before, which was fitted without them.
+    """
+    for _ in range(ANEW):
+        anew = _behind_anew(found.model, evidence)
+        if anew is None:
+            break
+        try:
+            other = joint(anew.model, evidence, max_iterations, tolerance)
+        except (DivergenceError, ParameterError, ModelError, IdentificationError):
+            break
+        if not clearly_better(other, found, evidence):
+            break
+        found = other
+    return found
+
+
 def refit(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
     """Fit the model with the candidate jointly, from its start; None where that diverges."""
     return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
@@ -113,16 +136,22 @@ def restart(candidate: Candidate, max_iterations: int) -> Candidate:
 def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
     """Refit of the model with the candidate begun at the best start of its effect; None where all diverge.
 
-    Every start is judged behind dynamics found anew: noise that a limit cuts to pieces bends the dynamics so much that
-    every size has a valley of its own.
+    Every start is judged behind dynamics found anew, by few iterations: noise that a limit cuts to pieces bends the
+    dynamics so much that every size has a valley of its own.
     """
     starts = type(candidate.effect).starts(candidate.evidence.extent)
-    found = [_behind_anew(model.with_effect(start), candidate.evidence) for start in starts]
+    found = [_behind_anew(model.with_effect(start), candidate.evidence, (FEW_ITERATIONS,)) for start in starts]
     best = min((f for f in found if f is not None), key=lambda f: f.score.cost, default=None)
-    return None if best is None else _refitted(best.model, candidate, max_iterations)
+    if best is None:
+        return None
+    more = _behind_anew(best.model, candidate.evidence, (ITERATIONS,))
+    best = best if more is None or more.score.cost > best.score.cost else more
+    return _refitted(best.model, candidate, max_iterations)
 
 
-def _behind_anew(model: Model, evidence: Evidence) -> Fitted | None:
+def _behind_anew(
+    model: Model, evidence: Evidence, choices: Sequence[int] = (FEW_ITERATIONS, ITERATIONS)
+) -> Fitted | None:
     """The model with dynamics found anew; None where the records do not tell them.
 
     Iterations that describe the broadband records better, by a lack that is still there, may describe the others worse.
@@ -132,12 +161,20 @@ def _behind_anew(model: Model, evidence: Evidence) -> Fitted | None:
         return None
     orders = (arx.array("a").size, arx.array("b").size)
     found = []
-    for iterations in (FEW_ITERATIONS, ITERATIONS):
+    for iterations in choices:
         with suppress(DivergenceError, ParameterError, ModelError, IdentificationError):
             dynamics = dynamics_behind(model, evidence.records, broadband, round(arx["delay"]), orders, iterations)
             anew = with_dynamics(model, dynamics.arx)
             found.append(Fitted(anew, score_model(anew, evidence)))
-    return min(found, key=lambda f: f.score.cost, default=None)
+    best = min(found, key=lambda f: f.score.cost, default=None)
+    if ITERATIONS in choices:
+        with suppress(DivergenceError, ParameterError, ModelError, IdentificationError):
+            dynamics = modes_behind(model, evidence.records, broadband, round(arx["delay"]), orders)
+            modes = with_dynamics(model, dynamics.arx)
+            score = score_model(modes, evidence)
+            if best is None or score.cost < best.score.cost - FINER:
+                best = Fitted(modes, score)
+    return best
 
 
 def better(anew: Candidate | None, candidate: Candidate) -> Candidate:
@@ -165,64 +202,6 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
         except (DivergenceError, ParameterError, ModelError, IdentificationError):
             continue
     return min(found, key=lambda f: f.score.cost, default=None)
-
-
-def is_seen(candidate: Candidate) -> bool:
-    """Whether the effect changes any record by so much as could be seen; hum, free per record, has its own rule.
-
-    A change that is the same in all records is the sensor's zero.
-    """
-    assert candidate.fit is not None
-    evidence, model = candidate.evidence, candidate.fit.model
-    with_it, without_it = model.simulate(evidence.records), model.without(candidate.name).simulate(evidence.records)
-    changes = [first - second for first, second in zip(with_it, without_it, strict=True)]
-    counted = [(c, floor) for c, floor in zip(changes, evidence.floors, strict=True) if np.isfinite(floor)]
-    means = np.array([c.mean() for c, _ in counted])
-    zeros = means if evidence.nuisance.offset else np.full(means.size, means.mean())
-    return candidate.name == MainsHum.name or any(
-        np.sqrt(np.mean((c - zero) ** 2)) > SEEN * floor for (c, floor), zero in zip(counted, zeros, strict=True)
-    )
-
-
-def may_be_off(candidate: Candidate) -> bool:
-    """Whether the numbers of the effect could as well all have their off value: Wald's test, the others held.
-
-    A time constant or an exponent has no off value; while it is held, its correlation with a size blurs nothing.
-    """
-    fitted = candidate.fit
-    assert fitted is not None
-    errors, rows = fitted.standard_errors, fitted.model.row
-    own = [n for n in fitted.names if n.startswith(f"{candidate.name}.")]
-    if all(rows(n).off is None for n in own):
-        return False
-    told = sorted((n for n in own if errors[n] > 0.0), key=lambda n: rows(n).off is None)
-    off = np.array([(fitted.values[n] - value) / errors[n] for n in told if (value := rows(n).off) is not None])
-    at, scale, k = [fitted.names.index(n) for n in told], np.array([errors[n] for n in told]), off.size
-    spread = fitted.covariance[np.ix_(at, at)] / np.outer(scale, scale)
-    spread = spread[:k, :k] - spread[:k, k:] @ np.linalg.pinv(spread[k:, k:], hermitian=True) @ spread[k:, :k]
-    return bool(off @ np.linalg.pinv(spread, rcond=1e-9, hermitian=True) @ off < chi2.ppf(0.95, max(1, k)))
-
-
-def is_steady(candidate: Candidate) -> bool:
-    """Whether a hum has about one amplitude in all records: mains does not care what the drive does."""
-    assert candidate.fit is not None
-    evidence, lines = candidate.evidence, 2 * candidate.evidence.nuisance.harmonics
-    frequency = evidence.nuisance.hum_frequency or 0.0
-    amplitudes = np.array(
-        [
-            np.hypot(found[-lines::2], found[1 - lines :: 2])
-            for record, floor, found in zip(evidence.records, evidence.floors, candidate.fit.nuisances, strict=True)
-            if np.isfinite(floor)
-            and found.size >= lines
-            and record.duration * frequency >= PERIODS
-            and record.sample_period * frequency <= RESOLVED
-        ]
-    ).reshape(-1, lines // 2)
-    if len(amplitudes) < FEWEST:
-        return True
-    strongest = amplitudes[:, int(np.argmax(np.median(amplitudes, axis=0)))]
-    low, high = np.quantile(strongest, (0.25, 0.75))
-    return bool(low > STEADY * high)
 
 
 def _absorbed(model: Model, extended: Model, evidence: Evidence) -> Model | None:

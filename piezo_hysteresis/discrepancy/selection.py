@@ -5,7 +5,7 @@ Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 20
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -16,9 +16,10 @@ from ..identification.normal_equations import residuals
 from ..model import Model
 from .candidates import Candidate, alikeness, screen
 from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, contest, finest, refits_of_the_drive, settled, simplest
+from .doubts import is_seen, is_steady, may_be_off
 from .evidence import Evidence
 from .held_out import ADEQUATE, Score
-from .refit import Fitted, is_seen, is_steady, may_be_off, refit, restart, without
+from .refit import Fitted, refit, restart, without
 from .steps import MANY, Rejection, Selection, Step, typical
 
 ALONE = 4.0
@@ -48,6 +49,7 @@ def select(
     null: float,
     effects: Collection[type[Effect]] = CATALOGUE,
     progress: Progress | None = None,
+    is_in_vain: Callable[[Model, Evidence], bool] = lambda model, evidence: False,
 ) -> Selection:
     """Add effects while records left out ask for them.
 
@@ -65,6 +67,8 @@ def select(
         The library to choose from.
     progress : callable, optional
         Called with a word and the fraction done.
+    is_in_vain : callable, optional
+        Asked after every effect that leaves a gap: whether to stop, for the data must be treated first.
     """
     tell = progress or (lambda word, fraction: None)
     baseline, steps, accepted = model, list[Step](), 0
@@ -77,6 +81,8 @@ def select(
             assert step.best.fit is not None
             model, score, evidence = step.best.fit.model, step.best.score, step.best.evidence
             accepted += 1
+            if score.excess > ADEQUATE and is_in_vain(model, evidence):
+                return Selection(baseline, model, score, tuple(steps), null)
         elif step.renewed is not None:
             model, score = step.renewed.model, step.renewed.score
         else:

@@ -86,7 +86,7 @@ def _solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> 
     return theta, float(np.linalg.norm(r[:, -1] - regressors @ theta))
 
 
-def _reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
+def reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
     """Mirror poles outside the unit circle into it and scale B so that |B/A| stays; the number mirrored."""
     poles = np.roots(np.concatenate(([1.0], a)))
     outside = np.abs(poles) > LARGEST_POLE
@@ -101,7 +101,8 @@ def _reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
     return a, b / np.prod(np.maximum(radius, 1.0)), int(outside.sum())
 
 
-def _free_run_error(model: Dynamics, signals: Signals) -> float:
+def free_run_error(model: Dynamics, signals: Signals) -> float:
+    """RMS of the outputs minus the simulation from the inputs alone, every record freed of its offset [unit of y]."""
     squares, count = 0.0, 0
     for u, y in signals:
         error = y - model.simulate(u)
@@ -156,7 +157,7 @@ def identify_arx(
             whitener = np.concatenate(([1.0], candidates[-1].arx.array("a")))
             whitened = [(lfilter([1.0], whitener, u - u[0]), lfilter([1.0], whitener, y - y[0])) for u, y in signals]
             theta, _ = _solve(triangle(whitened, orders, delay))
-        a, b, mirrored = _reflected(theta[:na], theta[na:])
+        a, b, mirrored = reflected(theta[:na], theta[na:])
         told = (Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),)
         try:
             arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
@@ -167,7 +168,7 @@ def identify_arx(
                 raise IdentificationError("ARX: got no dynamics that settle, expected an output that follows the input")
             break
         model = Dynamics(arx, sample_period, one_step, notices=told if mirrored else ())
-        candidates.append(replace(model, free_run_error=_free_run_error(model, signals)))
+        candidates.append(replace(model, free_run_error=free_run_error(model, signals)))
         errors = [c.free_run_error for c in candidates]
         if len(errors) > PATIENCE and min(errors[-PATIENCE:]) > GAINS * min(errors[:-PATIENCE]):
             break
@@ -229,7 +230,7 @@ def compare_orders(signals: Signals, delay: int, sample_period: float, highest: 
     table = []
     for order in range(1, highest + 1):
         theta, left = _solve(regressors, np.r_[:order, highest : highest + order])
-        a, b, _ = _reflected(theta[:order], theta[order:])
+        a, b, _ = reflected(theta[:order], theta[order:])
         model = Dynamics(Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay), sample_period)
         late = [(y - model.simulate(u))[cut:] for (u, y), cut in zip(signals, cuts, strict=True)]
         free_run = float(np.std(np.concatenate([e - e.mean() for e in late])))

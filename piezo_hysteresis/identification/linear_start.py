@@ -16,6 +16,7 @@ from ..model import Model
 from ..record import Record
 from .carried import carried
 from .dynamics import Dynamics, identify_arx
+from .modes import identify_modes
 from .regressors import Signals
 
 ITERATIONS = 12
@@ -59,6 +60,22 @@ def dynamics_behind(
         Steiglitz-McBride iterations at most.
     """
     return identify_arx(hysteresis_signals(model, records, broadband), delay, model.sample_period, orders, iterations)
+
+
+def modes_behind(
+    model: Model, records: Sequence[Record], broadband: Collection[int], delay: int, orders: tuple[int, int]
+) -> Dynamics:
+    """Like `dynamics_behind`, as a sum of modes.
+
+    Raises
+    ------
+    IdentificationError
+        Where the records tell no modes, or the orders are no even number.
+    """
+    if orders[0] != orders[1] or orders[0] % 2:
+        raise IdentificationError(f"modes: got orders {orders}, expected na = nb, an even number")
+    signals = hysteresis_signals(model, records, broadband)
+    return identify_modes(signals, delay, model.sample_period, orders[0], ITERATIONS)
 
 
 def with_dynamics(model: Model, arx: Arx) -> Model:

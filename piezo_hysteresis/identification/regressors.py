@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Signals = Sequence[tuple[Samples, Samples]]
 """Input and output of every record, at one sample period."""
 
-BLOCK = 1 << 12
+BLOCK = 1 << 13
 """Rows of the regressor matrix held at a time."""
 INDEPENDENT = 1e-9
 """Smallest eigenvalue of the correlation matrix from which products determine θ, to 1e-7 or better."""
