@@ -89,7 +89,8 @@ def diagnose(
     ModelError
         If the records are faster than the model.
     """
-    return _diagnosed(experiment, model, effects, progress or (lambda word, fraction: None))
+    with np.errstate(over="ignore", invalid="ignore"):  # trials that run away are told by their cost
+        return _diagnosed(experiment, model, effects, progress or (lambda word, fraction: None))
 
 
 def _diagnosed(

@@ -12,6 +12,7 @@ from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 from scipy.signal import decimate, lfilter
 
 from ..effects import Arx
@@ -27,9 +28,12 @@ SHORTEST = 50
 """Samples of a record at the lower rate at least."""
 SAMPLES = 60_000
 """Samples that are fitted at most."""
-LINEARISATIONS = 15
-CONVERGED = 1e-3
-"""Relative decrease of the squared error at which no further one is made."""
+SIMULATIONS, CONVERGED = 20, 1e-3
+"""Simulations of a fit at most, and the relative decrease of the squared error at which it ends."""
+INDEPENDENT = 1e-13
+"""Least share of the largest eigenvalue from which a direction counts."""
+AWAY = 1e3
+"""Multiple of the output that counts as the residual of sections that run away."""
 
 
 def identify_modes(signals: Signals, delay: int, sample_period: float, order: int, iterations: int) -> Dynamics:
@@ -52,17 +56,21 @@ def identify_modes(signals: Signals, delay: int, sample_period: float, order: in
     ------
     IdentificationError
         If no record is long enough, or poles crowd so much that rounded coefficients do not hold them.
+
+    Notes
+    -----
+    Output error by variable projection, Golub and Pereyra 1973: the numerators follow linearly from the denominators.
     """
-    few = _shortened(signals)
+    few = _beginnings(signals, delay)
     found: list[tuple[float, Array]] = []
     for factor in FACTORS:
         with suppress(IdentificationError):
             sections = _found_at(factor, signals, delay, sample_period, order, iterations)
-            found.append((_linearised(sections, few, delay)[0], sections))
+            found.append((_projected(sections, few)[0], sections))
     if not found:
         raise IdentificationError(f"modes: got no record that tells any, expected {SHORTEST * max(FACTORS)} samples")
     _, sections = min(found, key=lambda f: f[0])
-    a, b = _polynomials(*_fitted(sections, few, delay))
+    a, b = _polynomials(*_fitted(sections, few))
     try:
         if not 1.0 + a.sum() > 0.0:
             raise ParameterError("modes: got no dc gain")
@@ -72,10 +80,11 @@ def identify_modes(signals: Signals, delay: int, sample_period: float, order: in
     return Dynamics(arx, sample_period, free_run_error=free_run_error(Dynamics(arx, sample_period), signals))
 
 
-def _shortened(signals: Signals) -> Signals:
-    """The beginnings of the records, each settled."""
+def _beginnings(signals: Signals, delay: int) -> Signals:
+    """Delayed drive about its start, and output about its mean, of the beginnings of the records, each settled."""
     share = min(1.0, SAMPLES / sum(y.size for _, y in signals))
-    return [(u[: int(share * u.size)], y[: int(share * y.size)]) for u, y in signals]
+    cuts = [(u[: int(share * u.size)], y[: int(share * y.size)]) for u, y in signals]
+    return [(_delayed(u - u[0], delay), y - y.mean()) for u, y in cuts]
 
 
 def _found_at(factor: int, signals: Signals, delay: int, sample_period: float, order: int, iterations: int) -> Array:
@@ -90,7 +99,7 @@ def _found_at(factor: int, signals: Signals, delay: int, sample_period: float, o
     found = identify_arx(slow, max(1, round(delay / factor)), factor * sample_period, (order, order), iterations)
     poles = np.roots(np.concatenate(([1.0], found.arx.array("a")))).astype(complex)
     slowest = np.exp(-1.0 / max(y.size for _, y in slow))
-    modes = poles[(poles.imag > 0.0) & (np.abs(poles) > 0.0)] ** (1.0 / factor)
+    modes = poles[poles.imag > 0.0] ** (1.0 / factor)
     real = poles[(poles.imag == 0.0) & (poles.real > 0.0) & (poles.real < slowest)].real ** (1.0 / factor)
     sections = [(-2.0 * z.real, abs(z) ** 2) for z in modes]
     real = np.concatenate((np.sort(real)[::-1], np.zeros(order)))
@@ -99,80 +108,64 @@ def _found_at(factor: int, signals: Signals, delay: int, sample_period: float, o
     return np.array(sections)
 
 
-def _linearised(sections: Array, signals: Signals, delay: int) -> tuple[float, Array, Array, Array]:
-    """Mean square left by the best numerators, these (k, 2), and inner products of ∂y/∂(a1, a2) and the residual."""
-    columns, outputs = [], []
-    for u, y in signals:
-        shifted = np.concatenate((np.zeros(delay), u[: u.size - delay] - u[0]))
-        shaped = [lfilter([1.0], np.concatenate(([1.0], a)), shifted) for a in sections]
-        taps = np.array([_delayed(s, k) for s in shaped for k in (0, 1)])
-        columns.append(taps - taps.mean(axis=1, keepdims=True))
-        outputs.append(y - y.mean())
-    basis, output = np.concatenate(columns, axis=1), np.concatenate(outputs)
+def _projected(sections: Array, signals: Signals) -> tuple[float, Array, Array, Array]:
+    """Mean square left by the numerators that fit best, these (k, 2), the residual, and what every tap answers."""
+    shaped = [[lfilter([1.0], [1.0, *a], u) for a in sections] for u, _ in signals]
+    basis = _about_means([np.array([_delayed(s, k) for s in one for k in (0, 1)]) for one in shaped])
     scale = np.linalg.norm(basis, axis=1)
     scale[scale == 0.0] = 1.0
     basis /= scale[:, None]
-    inner = basis @ basis.T
-    taps = np.linalg.lstsq(inner, basis @ output, rcond=1e-13)[0]
+    output = np.concatenate([y for _, y in signals])
+    taps = np.linalg.lstsq(basis @ basis.T, basis @ output, rcond=INDEPENDENT)[0]
     residual = output - taps @ basis
     return float(residual @ residual / output.size), (taps / scale).reshape(-1, 2), residual, basis
+
+
+def _slopes(sections: Array, numerators: Array, signals: Signals) -> Array:
+    """∂y/∂(a1, a2) of every section, shape (2k, n)."""
+    both = list(zip(sections, numerators, strict=True))
+    twice = [[-lfilter([1.0], [1.0, *a], lfilter(b, [1.0, *a], u)) for a, b in both] for u, _ in signals]
+    return _about_means([np.array([_delayed(s, k) for s in one for k in (1, 2)]) for one in twice])
+
+
+def _about_means(records: Sequence[Array]) -> Array:
+    """Rows of every record about their means, joined."""
+    return np.concatenate([rows - rows.mean(axis=1, keepdims=True) for rows in records], axis=1)
 
 
 def _delayed(x: Array, samples: int) -> Array:
     return np.concatenate((np.zeros(samples), x[: x.size - samples]))
 
 
-def _slopes(sections: Array, numerators: Array, signals: Signals, delay: int) -> Array:
-    """∂y/∂(a1, a2) of every section, shape (2k, n), freed of the means of the records."""
-    columns = []
-    for u, _ in signals:
-        shifted = np.concatenate((np.zeros(delay), u[: u.size - delay] - u[0]))
-        rows = []
-        for a, b in zip(sections, numerators, strict=True):
-            feedback = np.concatenate(([1.0], a))
-            twice = -lfilter([1.0], feedback, lfilter(b, feedback, shifted))
-            rows += [_delayed(twice, 1), _delayed(twice, 2)]
-        slopes = np.array(rows)
-        columns.append(slopes - slopes.mean(axis=1, keepdims=True))
-    return np.concatenate(columns, axis=1)
+def _fitted(sections: Array, signals: Signals) -> tuple[Array, Array]:
+    """Denominators and numerators of the least output error."""
+    output = np.concatenate([y for _, y in signals])
 
+    def residual(flat: Array) -> Array:
+        tried = flat.reshape(-1, 2)
+        return _projected(tried, signals)[2] if _radius(tried) < LARGEST_POLE else AWAY * output
 
-def _fitted(sections: Array, signals: Signals, delay: int) -> tuple[Array, Array]:
-    """Denominators and numerators at the least squares of the output error: Levenberg-Marquardt on the denominators."""
-    error, numerators, residual, basis = _linearised(sections, signals, delay)
-    damping = 1e-3
-    for _ in range(LINEARISATIONS):
-        slopes = _slopes(sections, numerators, signals, delay)
-        # variable projection: numerators follow
-        slopes -= (slopes @ basis.T) @ np.linalg.pinv(basis @ basis.T, rcond=1e-13, hermitian=True) @ basis
-        size = np.linalg.norm(slopes, axis=1)
-        size[size == 0.0] = 1.0
-        slopes /= size[:, None]
-        gained = False
-        for _ in range(6):
-            inner = slopes @ slopes.T
-            step = np.linalg.lstsq(inner + damping * np.eye(size.size), slopes @ residual, rcond=1e-13)[0] / size
-            tried = sections + step.reshape(-1, 2)
-            if _radius(tried) < LARGEST_POLE:
-                new = _linearised(tried, signals, delay)
-                if new[0] < error:
-                    gained, before = True, error
-                    sections, (error, numerators, residual, basis) = tried, new
-                    damping *= 0.1
-                    break
-            damping *= 10.0
-        if not gained or before - error < CONVERGED * before:
-            break
-    return sections, numerators
+    def slopes(flat: Array) -> Array:
+        now = flat.reshape(-1, 2)
+        _, numerators, _, basis = _projected(now, signals)
+        along = _slopes(now, numerators, signals)
+        inverse = np.linalg.pinv(basis @ basis.T, rcond=INDEPENDENT, hermitian=True)
+        return np.asarray((along @ basis.T @ inverse @ basis - along).T)
+
+    fitted = least_squares(
+        residual, sections.ravel(), slopes, method="lm", x_scale="jac", ftol=CONVERGED, max_nfev=SIMULATIONS
+    )
+    best = fitted.x.reshape(-1, 2)
+    return best, _projected(best, signals)[1]
 
 
 def _radius(sections: Array) -> float:
-    return max(float(np.abs(np.roots(np.concatenate(([1.0], a)))).max(initial=0.0)) for a in sections)
+    return max(float(np.abs(np.roots([1.0, *a])).max(initial=0.0)) for a in sections)
 
 
 def _polynomials(sections: Array, numerators: Array) -> tuple[Array, Array]:
     """a and b of the sum of the sections."""
-    feedbacks = [np.concatenate(([1.0], a)) for a in sections]
+    feedbacks = [np.array([1.0, *a]) for a in sections]
     total = np.zeros(2 * len(sections))
     for k, b in enumerate(numerators):
         others = _product([f for j, f in enumerate(feedbacks) if j != k])
