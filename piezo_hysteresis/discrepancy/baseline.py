@@ -36,8 +36,7 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     """Hysteresis from the slow loops, delay from the steps, dynamics from the broadband records.
 
     What is missing may lead the iterations of the dynamics astray: after the model from many there is one from few.
-    Noise may hide modes that larger motion shows: the next one is from all records that move. Modes far below the
-    sampling rate hide from iterations: the last ones are sums of modes.
+    Noise may hide modes that larger motion shows: the last one is from all records that move.
 
     Parameters
     ----------
@@ -52,17 +51,13 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
         Each to be fitted jointly.
     """
     experiment = Experiment(tuple(records))
-    roles = roles_of(experiment)
-    loops = [i for i in roles.loops if i in fitted]
-    broadband = [i for i in roles.broadband if i in fitted]
     period = experiment.fastest_period
-    at_full_rate = [i for i in fitted if records[i].sample_period < 1.001 * period]
-    moving = [i for i in at_full_rate if not roles.contents[i].is_slow]
-    broadband = broadband or moving  # many sines tell the dynamics too
+    loops = [i for i in roles_of(experiment).loops if i in fitted]
+    broadband, moving = _telling_dynamics(experiment, fitted)
     if not loops or not broadband:
         yield identify(Experiment(experiment.records[: max(fitted) + 1]), held_out=("validation",)).model
         return
-    fast = [records[i] for i in at_full_rate]
+    fast = [records[i] for i in fitted if records[i].sample_period < 1.001 * period]
     try:
         delay = max(1, identify_delay([r for r in fast if r.phase.startswith("step")] or fast).samples)
     except IdentificationError:
@@ -76,9 +71,38 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
         yield _with_dynamics(start, records, (broadband, moving), delay, iterations)
     if moving != broadband:
         yield _with_dynamics(start, records, (moving, broadband), delay, ITERATIONS)
+
+
+def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:
+    """The model with sums of modes for its dynamics: modes far below the sampling rate hide from iterations.
+
+    Parameters
+    ----------
+    model : Model
+        With a hysteresis that has been fitted.
+    records : sequence of Record
+        The experiment, in order.
+    fitted : collection of int
+        Indices of the records that may be used.
+
+    Yields
+    ------
+    Model
+        From broadband records, and from all that move; each to be fitted jointly.
+    """
+    broadband, moving = _telling_dynamics(Experiment(tuple(records)), fitted)
+    delay = round(model[Arx.name]["delay"])
     for chosen in (broadband, moving) if moving != broadband else (broadband,):
         with suppress(IdentificationError):
-            yield with_dynamics(start, modes_behind(start, records, chosen, delay, ORDERS).arx)
+            yield with_dynamics(model, modes_behind(model, records, chosen, delay, ORDERS).arx)
+
+
+def _telling_dynamics(experiment: Experiment, fitted: Collection[int]) -> tuple[list[int], list[int]]:
+    """Broadband records, and all at the full rate that move; many sines tell the dynamics too."""
+    roles, period = roles_of(experiment), experiment.fastest_period
+    fast = [i for i in fitted if experiment.records[i].sample_period < 1.001 * period]
+    moving = [i for i in fast if not roles.contents[i].is_slow]
+    return [i for i in roles.broadband if i in fitted] or moving, moving
 
 
 def _with_dynamics(

@@ -15,13 +15,13 @@ from ..identification.fit import Fit, Progress
 from ..identification.normal_equations import Nuisance
 from ..model import Model
 from ..record import Record
-from .baseline import exact, start_models
+from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model
 from .coarseness import coarseness
 from .evidence import Evidence, extent_of
 from .held_out import ADEQUATE, Score
 from .noise_floor import floors, noise_floors, stroke
-from .refit import clearly_better, joint, renewed
+from .refit import CLEARLY, joint, renewed
 from .sampling import at_period, common_period, less, shortened, slowed
 from .split import reporting
 from .steps import Selection
@@ -150,16 +150,20 @@ def lay_ground(
         baseline = joint(baseline.model, evidence, LAST, PRECISE)
     evidence, score = score_baseline(baseline.model, evidence)
     if score.excess > ADEQUATE:
-        baseline = renewed(_best(baseline, starts, evidence), evidence, LAST, PRECISE)
+        baseline = _best(baseline, starts, evidence)
+        score = score_model(baseline.model, evidence)
+    if score.excess > ADEQUATE:
+        baseline = _best(baseline, modal_models(baseline.model, records, fitted), evidence, CLEARLY)
+        baseline = renewed(baseline, evidence, LAST, PRECISE)
         score = score_model(baseline.model, evidence)
     return Ground(straight, records, lost, noise, least, span, usable, fitted, spared, evidence, baseline, score)
 
 
-def _best(found: Fit, starts: Iterator[Model], evidence: Evidence) -> Fit:
-    """The fit, or one from the starts that are left that is clearly better."""
+def _best(found: Fit, starts: Iterator[Model], evidence: Evidence, leaves: float = 1.0) -> Fit:
+    """The fit, or one from other starts that leaves less than a share of its cost."""
     with suppress(DivergenceError, IdentificationError, ModelError, ParameterError):
         for start in starts:
             other = joint(exact(start), evidence, LAST, PRECISE)
-            if clearly_better(other, found, evidence):
+            if other.cost < leaves * found.cost:
                 found = other
     return found

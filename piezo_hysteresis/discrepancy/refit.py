@@ -25,14 +25,15 @@ from ..identification.linear_start import (
 from ..model import Model
 from .candidates import Candidate, free_numbers, score_model
 from .evidence import Evidence
-from .held_out import ADEQUATE, Score
+from .held_out import Score
 
 LINEAR = ("lag", "dynamics")
 """Families that dynamics of an order high enough can hold."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at which a refit has converged."""
 ANEW, CLEARLY = 3, 0.7
-"""Times that a fit is begun anew at most, and share of the cost that one begun elsewhere may leave."""
+"""Times that a fit is begun anew at most, and share of the cost that it may leave: a little better is a fit also by
+another account of what is missing."""
 FINER = 0.1
 """Gain from which a sum of modes is taken for the dynamics."""
 
@@ -75,13 +76,6 @@ def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: floa
     )
 
 
-def clearly_better(other: Fit, found: Fit, evidence: Evidence) -> bool:
-    """Whether a fit begun elsewhere is preferred: a little better it may be by another account of what is missing."""
-    if other.cost < CLEARLY * found.cost:
-        return True
-    return other.cost < found.cost and score_model(other.model, evidence).excess <= ADEQUATE
-
-
 def renewed(found: Fit, evidence: Evidence, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
     """A fit begun anew behind dynamics found anew, while that helps.
 
@@ -95,7 +89,7 @@ def renewed(found: Fit, evidence: Evidence, max_iterations: int, tolerance: floa
             other = joint(anew.model, evidence, max_iterations, tolerance)
         except (DivergenceError, ParameterError, ModelError, IdentificationError):
             break
-        if not clearly_better(other, found, evidence):
+        if other.cost > CLEARLY * found.cost:
             break
         found = other
     return found
