@@ -12,7 +12,7 @@ import yaml
 ROOT = Path(__file__).parents[1]
 PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
 ROSDEP = {"yaml": "python3-yaml", "rosbags": "python3-rosbags-pip"}
-NO_KEY = {"mcap"}
+NO_KEY = {"mcap", "threadpoolctl"}
 """No rosdep key; the README names them for pip."""
 
 

@@ -21,12 +21,12 @@ from .evidence import Evidence
 from .explicit_step import KIND, is_stepped, without_steps
 from .few_records import diagnose_few
 from .gap import Gap, measure_gap
-from .ground import LAST, PRECISE, Ground, lay_ground
+from .ground import Ground, lay_ground
 from .held_out import ADEQUATE
 from .localise import Place, localise
 from .next_experiment import decide
 from .reach import beyond_reach
-from .refit import joint, restart
+from .refit import LAST, PRECISE, joint, restart
 from .sampling import NOISE_WIDTH, quieted, voltage_noise
 from .selection import NAMED, select
 from .steps import Selection

@@ -21,7 +21,7 @@ from .coarseness import coarseness
 from .evidence import Evidence, extent_of
 from .held_out import ADEQUATE, Score
 from .noise_floor import floors, noise_floors, stroke
-from .refit import CLEARLY, joint, renewed
+from .refit import LAST, PRECISE, clearly_better, joint, renewed
 from .sampling import at_period, common_period, less, shortened, slowed
 from .split import reporting
 from .steps import Selection
@@ -30,8 +30,6 @@ Array = NDArray[np.float64]
 
 SEARCHED, FITTED = 6_000, 50_000
 """Samples of a fast record that take part in the search, and in the last fit."""
-LAST, PRECISE = 25, 1e-4
-"""Linearisations of the last fit, and relative decrease of the cost at which it has converged."""
 UNSURE = 0.3
 """Share of what slow samples have lost that counts as floor: the rest is made good."""
 
@@ -153,17 +151,17 @@ def lay_ground(
         baseline = _best(baseline, starts, evidence)
         score = score_model(baseline.model, evidence)
     if score.excess > ADEQUATE:
-        baseline = _best(baseline, modal_models(baseline.model, records, fitted), evidence, CLEARLY)
-        baseline = renewed(baseline, evidence, LAST, PRECISE)
-        score = score_model(baseline.model, evidence)
+        for modal in modal_models(baseline.model, records, fitted):
+            baseline, score = clearly_better(modal, baseline, score, evidence) or (baseline, score)
+        baseline, score = renewed(baseline, score, evidence)
     return Ground(straight, records, lost, noise, least, span, usable, fitted, spared, evidence, baseline, score)
 
 
-def _best(found: Fit, starts: Iterator[Model], evidence: Evidence, leaves: float = 1.0) -> Fit:
-    """The fit, or one from other starts that leaves less than a share of its cost."""
+def _best(found: Fit, starts: Iterator[Model], evidence: Evidence) -> Fit:
+    """The fit, or a better one from other starts."""
     with suppress(DivergenceError, IdentificationError, ModelError, ParameterError):
         for start in starts:
             other = joint(exact(start), evidence, LAST, PRECISE)
-            if other.cost < leaves * found.cost:
+            if other.cost < found.cost:
                 found = other
     return found

@@ -31,8 +31,10 @@ LINEAR = ("lag", "dynamics")
 """Families that dynamics of an order high enough can hold."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at which a refit has converged."""
+LAST, PRECISE = 25, 1e-4
+"""Linearisations of a last fit, and relative decrease of the cost at which it has converged."""
 ANEW, CLEARLY = 3, 0.7
-"""Times that a fit is begun anew at most, and share of the cost that it may leave: a little better is a fit also by
+"""Times that a baseline is begun anew at most, and share of V that it may leave: a little better is a fit also by
 another account of what is missing."""
 FINER = 0.1
 """Gain from which a sum of modes is taken for the dynamics."""
@@ -76,23 +78,28 @@ def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: floa
     )
 
 
-def renewed(found: Fit, evidence: Evidence, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
-    """A fit begun anew behind dynamics found anew, while that helps.
+def clearly_better(start: Model, found: Fit, score: Score, evidence: Evidence) -> tuple[Fit, Score] | None:
+    """The fit from another start, and its score, where records left out prefer it clearly; None elsewhere."""
+    with suppress(DivergenceError, ParameterError, ModelError, IdentificationError):
+        other = joint(start, evidence, LAST, PRECISE)
+        told = score_model(other.model, evidence)
+        if other.cost < found.cost and told.excess < CLEARLY * score.excess:
+            return other, told
+    return None
+
+
+def renewed(found: Fit, score: Score, evidence: Evidence) -> tuple[Fit, Score]:
+    """A baseline and its score, begun anew behind dynamics found anew, while that helps.
 
     Dynamics are found behind the hysteresis of the model before, which was fitted without them.
     """
     for _ in range(ANEW):
         anew = _behind_anew(found.model, evidence)
-        if anew is None:
+        better_one = None if anew is None else clearly_better(anew.model, found, score, evidence)
+        if better_one is None:
             break
-        try:
-            other = joint(anew.model, evidence, max_iterations, tolerance)
-        except (DivergenceError, ParameterError, ModelError, IdentificationError):
-            break
-        if other.cost > CLEARLY * found.cost:
-            break
-        found = other
-    return found
+        found, score = better_one
+    return found, score
 
 
 def refit(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:

@@ -98,14 +98,12 @@ def _found_at(factor: int, signals: Signals, delay: int, sample_period: float, o
         raise IdentificationError(f"modes: got no record of {SHORTEST * factor} samples")
     found = identify_arx(slow, max(1, round(delay / factor)), factor * sample_period, (order, order), iterations)
     poles = np.roots(np.concatenate(([1.0], found.arx.array("a")))).astype(complex)
-    slowest = np.exp(-1.0 / max(y.size for _, y in slow))
     modes = poles[poles.imag > 0.0] ** (1.0 / factor)
-    real = poles[(poles.imag == 0.0) & (poles.real > 0.0) & (poles.real < slowest)].real ** (1.0 / factor)
-    sections = [(-2.0 * z.real, abs(z) ** 2) for z in modes]
-    real = np.concatenate((np.sort(real)[::-1], np.zeros(order)))
-    pairs = range(order // 2 - len(sections))
-    sections += [(-real[2 * k] - real[2 * k + 1], real[2 * k] * real[2 * k + 1]) for k in pairs]
-    return np.array(sections)
+    if not modes.size:
+        raise IdentificationError(f"modes: got none at a rate lower by {factor}, expected a pair of poles")
+    sections = np.zeros((order // 2, 2))  # what is no mode is no pole: slow ones would imitate creep
+    sections[: modes.size] = np.column_stack((-2.0 * modes.real, np.abs(modes) ** 2))
+    return sections
 
 
 def _projected(sections: Array, signals: Signals) -> tuple[float, Array, Array, Array]:
