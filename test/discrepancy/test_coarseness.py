@@ -44,6 +44,34 @@ def test_most_of_what_averages_miss_is_made_good(drive, factor):
     assert np.std(slow.displacement - point - change) < 0.4 * missed
 
 
+RINGING = STAGE.with_effect(Arx(a=(-1.9, 0.95), b=(0.05,), delay=1.0))
+"""A mode at 360 Hz with a damping ratio of 0.11."""
+
+
+@pytest.mark.parametrize("factor", [2, 4, 10])
+@pytest.mark.parametrize("noise", [0.0, 5e-4])
+def test_the_ringing_after_a_kink_is_made_good(factor, noise):
+    time = PERIOD * np.arange(8000)
+    drive = 10.0 * (1.0 - np.abs(2.0 * np.mod(8.0 * time, 1.0) - 1.0))
+    (displacement,) = RINGING.simulate([Record(drive, np.zeros(drive.size), PERIOD)])
+    displacement += noise * np.ptp(displacement) * np.random.default_rng(1).normal(size=displacement.size)
+    slow = Record(drive, displacement, PERIOD).decimate(factor)
+    (change,), (point,) = coarseness(RINGING, [slow]), RINGING.simulate([slow])
+    floor = noise * np.ptp(displacement) / np.sqrt(factor)
+    missed = np.sqrt(max(np.var(slow.displacement - point) - floor**2, 0.0))
+    left = np.sqrt(max(np.var(slow.displacement - point - change) - floor**2, 0.0))
+    assert missed > 1e-3 * np.ptp(slow.displacement)
+    assert left < 0.4 * missed
+
+
+def test_what_a_residual_does_not_hold_is_not_taken_out():
+    time = PERIOD * np.arange(8000)
+    drive = 10.0 * (1.0 - np.abs(2.0 * np.mod(8.0 * time, 1.0) - 1.0))
+    (displacement,) = STAGE.simulate([Record(drive, np.zeros(drive.size), PERIOD)])
+    slow = Record(drive, displacement, PERIOD).decimate(4)
+    assert np.std(coarseness(RINGING, [slow])[0]) < 1e-4 * np.ptp(displacement)
+
+
 def test_records_that_are_not_slow_are_left_alone():
     drive = np.random.default_rng(0).normal(size=500)
     record = Record(drive, 1e-6 * drive, PERIOD)

@@ -43,6 +43,12 @@ def test_a_hidden_effect_is_named_and_its_gap_closes_on_unseen_records(name):
     assert found.gap.after <= 1.3 * found.gap.floor
 
 
+def test_a_rate_law_is_not_left_in_the_valley_of_another():
+    found = answered(Case("effects", ("rate_dependent_hysteresis",), 2, 5e-4))
+    assert found.names == ("rate_dependent_hysteresis",)
+    assert found.gap.after <= 1.2 * found.gap.floor
+
+
 def test_what_is_in_no_catalogue_is_unknown():
     found = answered(hidden(group="uncatalogued", extra={"unknown": UNKNOWN["line"], "unknown_name": ("line",)}))
     assert found.verdict is Verdict.UNKNOWN
