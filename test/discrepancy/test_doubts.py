@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.candidates import Candidate
+from piezo_hysteresis.discrepancy.doubts import may_be_off
 from piezo_hysteresis.discrepancy.evidence import Evidence
 from piezo_hysteresis.discrepancy.held_out import Score
-from piezo_hysteresis.discrepancy.doubts import may_be_off
 from piezo_hysteresis.effects import BoucWen, GainDrift, HysteresisMemory
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit import Fit
