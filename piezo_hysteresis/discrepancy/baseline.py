@@ -20,11 +20,12 @@ from ..identification.linear_start import (
     ITERATIONS,
     dynamics_behind,
     follower,
+    form_of,
     hysteresis_signals,
-    modes_behind,
     with_dynamics,
 )
-from ..identification.roles import roles_of
+from ..identification.modes import identify_modes
+from ..identification.roles import Roles, roles_of
 from ..model import Model
 from ..record import Experiment, Record
 
@@ -51,20 +52,21 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
         Each to be fitted jointly.
     """
     experiment = Experiment(tuple(records))
-    period = experiment.fastest_period
-    loops = [i for i in roles_of(experiment).loops if i in fitted]
-    broadband, moving = _telling_dynamics(experiment, fitted)
+    roles, at_full_rate = roles_of(experiment), _at_full_rate(experiment, fitted)
+    loops = [i for i in roles.loops if i in fitted]
+    broadband, moving = _telling_dynamics(roles, fitted, at_full_rate)
     if not loops or not broadband:
         yield identify(Experiment(experiment.records[: max(fitted) + 1]), held_out=("validation",)).model
         return
-    fast = [records[i] for i in fitted if records[i].sample_period < 1.001 * period]
+    fast = [records[i] for i in at_full_rate]
     try:
         delay = max(1, identify_delay([r for r in fast if r.phase.startswith("step")] or fast).samples)
     except IdentificationError:
         delay = None
     voltage = max(float(max(r.voltage.max(), -r.voltage.min())) for r in records)
     reach = max(float(r.displacement.max() - r.displacement.min()) for r in records)
-    frame = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1)), period, voltage, reach)
+    loop = (BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1))
+    frame = Model(loop, experiment.fastest_period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or _delay_without_steps(start, records, broadband)
     for iterations in (ITERATIONS, FEW_ITERATIONS):
@@ -90,18 +92,23 @@ def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int
     Model
         From broadband records, and from all that move; each to be fitted jointly.
     """
-    broadband, moving = _telling_dynamics(Experiment(tuple(records)), fitted)
-    delay = round(model[Arx.name]["delay"])
+    experiment = Experiment(tuple(records))
+    broadband, moving = _telling_dynamics(roles_of(experiment), fitted, _at_full_rate(experiment, fitted))
     for chosen in (broadband, moving) if moving != broadband else (broadband,):
         with suppress(IdentificationError):
-            yield with_dynamics(model, modes_behind(model, records, chosen, delay, ORDERS).arx)
+            signals = hysteresis_signals(model, records, chosen)
+            yield with_dynamics(model, identify_modes(signals, *form_of(model), ITERATIONS).arx)
 
 
-def _telling_dynamics(experiment: Experiment, fitted: Collection[int]) -> tuple[list[int], list[int]]:
+def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:
+    return [i for i in fitted if experiment[i].sample_period < 1.001 * experiment.fastest_period]
+
+
+def _telling_dynamics(
+    roles: Roles, fitted: Collection[int], at_full_rate: Collection[int]
+) -> tuple[list[int], list[int]]:
     """Broadband records, and all at the full rate that move; many sines tell the dynamics too."""
-    roles, period = roles_of(experiment), experiment.fastest_period
-    fast = [i for i in fitted if experiment.records[i].sample_period < 1.001 * period]
-    moving = [i for i in fast if not roles.contents[i].is_slow]
+    moving = [i for i in at_full_rate if not roles.contents[i].is_slow]
     return [i for i in roles.broadband if i in fitted] or moving, moving
 
 

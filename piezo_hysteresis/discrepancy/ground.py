@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ..identification.carried import select as select_records
 from ..identification.fit import Fit, Progress
 from ..identification.normal_equations import Nuisance
@@ -21,7 +20,7 @@ from .coarseness import coarseness
 from .evidence import Evidence, extent_of
 from .held_out import ADEQUATE, Score
 from .noise_floor import floors, noise_floors, stroke
-from .refit import LAST, PRECISE, clearly_better, joint, renewed
+from .refit import FAILURES, LAST, PRECISE, clearly_better, joint, renewed
 from .sampling import at_period, common_period, less, shortened, slowed
 from .split import reporting
 from .steps import Selection
@@ -159,7 +158,7 @@ def lay_ground(
 
 def _best(found: Fit, starts: Iterator[Model], evidence: Evidence) -> Fit:
     """The fit, or a better one from other starts."""
-    with suppress(DivergenceError, IdentificationError, ModelError, ParameterError):
+    with suppress(*FAILURES):
         for start in starts:
             other = joint(exact(start), evidence, LAST, PRECISE)
             if other.cost < found.cost:

@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 
 from ..effects import Arx
 from ..errors import DivergenceError, IdentificationError, ModelError, ParameterError
-from ..identification.dynamics import identify_arx
+from ..identification.dynamics import Dynamics, identify_arx
 from ..identification.fit import Fit, fit
 from ..identification.linear_start import (
     FEW_ITERATIONS,
     ITERATIONS,
-    dynamics_behind,
+    form_of,
     hysteresis_signals,
-    modes_behind,
     with_dynamics,
 )
+from ..identification.modes import identify_modes
 from ..model import Model
 from .candidates import Candidate, free_numbers, score_model
 from .evidence import Evidence
@@ -36,8 +36,10 @@ LAST, PRECISE = 25, 1e-4
 ANEW, CLEARLY = 3, 0.7
 """Times that a baseline is begun anew at most, and share of V that it may leave: a little better is a fit also by
 another account of what is missing."""
-FINER = 0.1
+MODAL_GAIN = 0.1
 """Gain from which a sum of modes is taken for the dynamics."""
+FAILURES = (DivergenceError, IdentificationError, ModelError, ParameterError)
+"""What a trial may end with."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -80,7 +82,7 @@ def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: floa
 
 def clearly_better(start: Model, found: Fit, score: Score, evidence: Evidence) -> tuple[Fit, Score] | None:
     """The fit from another start, and its score, where records left out prefer it clearly; None elsewhere."""
-    with suppress(DivergenceError, ParameterError, ModelError, IdentificationError):
+    with suppress(*FAILURES):
         other = joint(start, evidence, LAST, PRECISE)
         told = score_model(other.model, evidence)
         if other.cost < found.cost and told.excess < CLEARLY * score.excess:
@@ -119,7 +121,7 @@ def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Candid
     try:
         result = joint(model, candidate.evidence, max_iterations)
         score = score_model(result.model, candidate.evidence)
-    except (DivergenceError, ParameterError, ModelError, IdentificationError):
+    except FAILURES:
         return None
     return replace(candidate, effect=result.model[candidate.name], score=score, fit=result)
 
@@ -157,24 +159,25 @@ def _behind_anew(
 
     Iterations that describe the broadband records better, by a lack that is still there, may describe the others worse.
     """
-    broadband, arx = evidence.broadband(), model["arx"]
-    if not broadband or not isinstance(arx, Arx):
+    broadband = evidence.broadband()
+    if not broadband or not isinstance(model["arx"], Arx):
         return None
-    orders = (arx.array("a").size, arx.array("b").size)
-    found = []
-    for iterations in choices:
-        with suppress(DivergenceError, ParameterError, ModelError, IdentificationError):
-            dynamics = dynamics_behind(model, evidence.records, broadband, round(arx["delay"]), orders, iterations)
-            anew = with_dynamics(model, dynamics.arx)
-            found.append(Fitted(anew, score_model(anew, evidence)))
-    best = min(found, key=lambda f: f.score.cost, default=None)
-    if ITERATIONS in choices:
-        with suppress(DivergenceError, ParameterError, ModelError, IdentificationError):
-            dynamics = modes_behind(model, evidence.records, broadband, round(arx["delay"]), orders)
-            modes = with_dynamics(model, dynamics.arx)
-            score = score_model(modes, evidence)
-            if best is None or score.cost < best.score.cost - FINER:
-                best = Fitted(modes, score)
+    found, best = list[Fitted](), None
+
+    def behind(dynamics: Dynamics) -> Fitted:
+        anew = with_dynamics(model, dynamics.arx)
+        return Fitted(anew, score_model(anew, evidence))
+
+    with suppress(*FAILURES):
+        signals = hysteresis_signals(model, evidence.records, broadband)
+        for iterations in choices:
+            with suppress(*FAILURES):
+                found.append(behind(identify_arx(signals, *form_of(model), iterations)))
+        best = min(found, key=lambda f: f.score.cost, default=None)
+        if ITERATIONS in choices:
+            modes = behind(identify_modes(signals, *form_of(model), ITERATIONS))
+            if best is None or modes.score.cost < best.score.cost - MODAL_GAIN:
+                best = modes
     return best
 
 
@@ -200,7 +203,7 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
         try:
             fitted = joint(start, evidence, max_iterations)
             found.append(Fitted(fitted.model, score_model(fitted.model, evidence)))
-        except (DivergenceError, ParameterError, ModelError, IdentificationError):
+        except FAILURES:
             continue
     return min(found, key=lambda f: f.score.cost, default=None)
 
@@ -210,15 +213,14 @@ def _absorbed(model: Model, extended: Model, evidence: Evidence) -> Model | None
 
     A joint fit may have stopped before its G held a mode that it has room for: what G can hold is no missing effect.
     """
-    broadband, arx = evidence.broadband(), model["arx"]
-    if not broadband or not isinstance(arx, Arx):
+    broadband = evidence.broadband()
+    if not broadband or not isinstance(model["arx"], Arx):
         return None
     inputs = hysteresis_signals(model, evidence.records, broadband)
     outputs = extended.simulate(evidence.records)
     signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
     try:
-        orders = (arx.array("a").size, arx.array("b").size)
-        found = identify_arx(signals, round(arx["delay"]), model.sample_period, orders, ITERATIONS)
+        found = identify_arx(signals, *form_of(model), ITERATIONS)
         return with_dynamics(model, found.arx)
     except (IdentificationError, ParameterError, DivergenceError):
         return None

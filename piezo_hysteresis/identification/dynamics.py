@@ -86,7 +86,7 @@ def _solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> 
     return theta, float(np.linalg.norm(r[:, -1] - regressors @ theta))
 
 
-def reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
+def _reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
     """Mirror poles outside the unit circle into it and scale B so that |B/A| stays; the number mirrored."""
     poles = np.roots(np.concatenate(([1.0], a)))
     outside = np.abs(poles) > LARGEST_POLE
@@ -101,14 +101,23 @@ def reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
     return a, b / np.prod(np.maximum(radius, 1.0)), int(outside.sum())
 
 
-def free_run_error(model: Dynamics, signals: Signals) -> float:
-    """RMS of the outputs minus the simulation from the inputs alone, every record freed of its offset [unit of y]."""
+def settling(a: Samples, b: Samples, delay: int) -> Arx | None:
+    """The ARX of these coefficients; None where it does not settle."""
+    try:
+        arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
+    except ParameterError:
+        return None
+    return arx if 1.0 + a.sum() > 0.0 else None
+
+
+def in_free_run(model: Dynamics, signals: Signals) -> Dynamics:
+    """The model with its free-run error on the signals, every record freed of its offset."""
     squares, count = 0.0, 0
     for u, y in signals:
         error = y - model.simulate(u)
         squares += float(np.sum((error - error.mean()) ** 2))
         count += y.size
-    return float(np.sqrt(squares / count))
+    return replace(model, free_run_error=float(np.sqrt(squares / count)))
 
 
 def identify_arx(
@@ -157,18 +166,15 @@ def identify_arx(
             whitener = np.concatenate(([1.0], candidates[-1].arx.array("a")))
             whitened = [(lfilter([1.0], whitener, u - u[0]), lfilter([1.0], whitener, y - y[0])) for u, y in signals]
             theta, _ = _solve(triangle(whitened, orders, delay))
-        a, b, mirrored = reflected(theta[:na], theta[na:])
+        a, b, mirrored = _reflected(theta[:na], theta[na:])
         told = (Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),)
-        try:
-            arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
-        except ParameterError:  # the iterations run away
-            arx = None
-        if arx is None or not 1.0 + a.sum() > 0.0:
+        arx = settling(a, b, delay)
+        if arx is None:  # the iterations run away
             if not candidates:
                 raise IdentificationError("ARX: got no dynamics that settle, expected an output that follows the input")
             break
         model = Dynamics(arx, sample_period, one_step, notices=told if mirrored else ())
-        candidates.append(replace(model, free_run_error=free_run_error(model, signals)))
+        candidates.append(in_free_run(model, signals))
         errors = [c.free_run_error for c in candidates]
         if len(errors) > PATIENCE and min(errors[-PATIENCE:]) > GAINS * min(errors[:-PATIENCE]):
             break
@@ -230,7 +236,7 @@ def compare_orders(signals: Signals, delay: int, sample_period: float, highest: 
     table = []
     for order in range(1, highest + 1):
         theta, left = _solve(regressors, np.r_[:order, highest : highest + order])
-        a, b, _ = reflected(theta[:order], theta[order:])
+        a, b, _ = _reflected(theta[:order], theta[order:])
         model = Dynamics(Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay), sample_period)
         late = [(y - model.simulate(u))[cut:] for (u, y), cut in zip(signals, cuts, strict=True)]
         free_run = float(np.std(np.concatenate([e - e.mean() for e in late])))

@@ -16,7 +16,6 @@ from ..model import Model
 from ..record import Record
 from .carried import carried
 from .dynamics import Dynamics, identify_arx
-from .modes import identify_modes
 from .regressors import Signals
 
 ITERATIONS = 12
@@ -62,22 +61,6 @@ def dynamics_behind(
     return identify_arx(hysteresis_signals(model, records, broadband), delay, model.sample_period, orders, iterations)
 
 
-def modes_behind(
-    model: Model, records: Sequence[Record], broadband: Collection[int], delay: int, orders: tuple[int, int]
-) -> Dynamics:
-    """Like `dynamics_behind`, as a sum of modes.
-
-    Raises
-    ------
-    IdentificationError
-        Where the records tell no modes, or the orders are no even number.
-    """
-    if orders[0] != orders[1] or orders[0] % 2:
-        raise IdentificationError(f"modes: got orders {orders}, expected na = nb, an even number")
-    signals = hysteresis_signals(model, records, broadband)
-    return identify_modes(signals, delay, model.sample_period, orders[0], ITERATIONS)
-
-
 def with_dynamics(model: Model, arx: Arx) -> Model:
     """The model with other dynamics, scaled so that its dc gain, the gauge, stays.
 
@@ -100,6 +83,12 @@ def dynamics_of(model: Model) -> Arx:
     arx = model["arx"]
     assert isinstance(arx, Arx)
     return arx
+
+
+def form_of(model: Model) -> tuple[int, float, tuple[int, int]]:
+    """Delay in samples, sample period [s] and orders of the dynamics in a model."""
+    arx = dynamics_of(model)
+    return round(arx["delay"]), model.sample_period, (arx.array("a").size, arx.array("b").size)
 
 
 def follower(model: Model, delay: int, orders: tuple[int, int], pole: float = 0.5) -> Arx:

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.signal import decimate, lfilter
 
-from ..effects import Arx
-from ..errors import IdentificationError, ParameterError
-from .dynamics import LARGEST_POLE, Dynamics, free_run_error, identify_arx
+from ..errors import IdentificationError
+from .dynamics import LARGEST_POLE, Dynamics, identify_arx, in_free_run, settling
 from .regressors import Signals
 
 Array = NDArray[np.float64]
@@ -36,7 +36,9 @@ AWAY = 1e3
 """Multiple of the output that counts as the residual of sections that run away."""
 
 
-def identify_modes(signals: Signals, delay: int, sample_period: float, order: int, iterations: int) -> Dynamics:
+def identify_modes(
+    signals: Signals, delay: int, sample_period: float, orders: tuple[int, int], iterations: int
+) -> Dynamics:
     """The best sum of modes, begun at several lower rates.
 
     Parameters
@@ -47,37 +49,38 @@ def identify_modes(signals: Signals, delay: int, sample_period: float, order: in
         d, samples.
     sample_period : float
         Sample period [s].
-    order : int
-        na = nb, even.
+    orders : (int, int)
+        na and nb, equal and even.
     iterations : int
         Steiglitz-McBride iterations at most at a lower rate.
 
     Raises
     ------
     IdentificationError
-        If no record is long enough, or poles crowd so much that rounded coefficients do not hold them.
+        On other orders, if no record is long enough or tells a mode, or if poles crowd so much that rounded
+        coefficients do not hold them.
 
     Notes
     -----
     Output error by variable projection, Golub and Pereyra 1973: the numerators follow linearly from the denominators.
     """
+    if orders[0] != orders[1] or orders[0] % 2:
+        raise IdentificationError(f"modes: got orders {orders}, expected na = nb, an even number")
     few = _beginnings(signals, delay)
     found: list[tuple[float, Array]] = []
     for factor in FACTORS:
         with suppress(IdentificationError):
-            sections = _found_at(factor, signals, delay, sample_period, order, iterations)
-            found.append((_projected(sections, few)[0], sections))
+            sections = _found_at(factor, signals, delay, sample_period, orders, iterations)
+            residual = _projected(sections, few)[1]
+            found.append((float(residual @ residual), sections))
     if not found:
         raise IdentificationError(f"modes: got no record that tells any, expected {SHORTEST * max(FACTORS)} samples")
     _, sections = min(found, key=lambda f: f[0])
     a, b = _polynomials(*_fitted(sections, few))
-    try:
-        if not 1.0 + a.sum() > 0.0:
-            raise ParameterError("modes: got no dc gain")
-        arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
-    except ParameterError as problem:
-        raise IdentificationError(f"modes: {problem}; the poles crowd too much for coefficients") from None
-    return Dynamics(arx, sample_period, free_run_error=free_run_error(Dynamics(arx, sample_period), signals))
+    arx = settling(a, b, delay)
+    if arx is None:
+        raise IdentificationError("modes: got poles that crowd so much that coefficients in double precision miss them")
+    return in_free_run(Dynamics(arx, sample_period), signals)
 
 
 def _beginnings(signals: Signals, delay: int) -> Signals:
@@ -87,8 +90,10 @@ def _beginnings(signals: Signals, delay: int) -> Signals:
     return [(_delayed(u - u[0], delay), y - y.mean()) for u, y in cuts]
 
 
-def _found_at(factor: int, signals: Signals, delay: int, sample_period: float, order: int, iterations: int) -> Array:
-    """Denominators (order/2, 2) of sections, from dynamics found at a lower rate."""
+def _found_at(
+    factor: int, signals: Signals, delay: int, sample_period: float, orders: tuple[int, int], iterations: int
+) -> Array:
+    """Denominators (na/2, 2) of sections, from dynamics found at a lower rate."""
     slow = [
         (decimate(u - u[0], factor, ftype="fir"), decimate(y - y[0], factor, ftype="fir"))
         for u, y in signals
@@ -96,18 +101,18 @@ def _found_at(factor: int, signals: Signals, delay: int, sample_period: float, o
     ]
     if not slow:
         raise IdentificationError(f"modes: got no record of {SHORTEST * factor} samples")
-    found = identify_arx(slow, max(1, round(delay / factor)), factor * sample_period, (order, order), iterations)
+    found = identify_arx(slow, max(1, round(delay / factor)), factor * sample_period, orders, iterations)
     poles = np.roots(np.concatenate(([1.0], found.arx.array("a")))).astype(complex)
     modes = poles[poles.imag > 0.0] ** (1.0 / factor)
     if not modes.size:
         raise IdentificationError(f"modes: got none at a rate lower by {factor}, expected a pair of poles")
-    sections = np.zeros((order // 2, 2))  # what is no mode is no pole: slow ones would imitate creep
+    sections = np.zeros((orders[0] // 2, 2))  # what is no mode is no pole: slow ones would imitate creep
     sections[: modes.size] = np.column_stack((-2.0 * modes.real, np.abs(modes) ** 2))
     return sections
 
 
-def _projected(sections: Array, signals: Signals) -> tuple[float, Array, Array, Array]:
-    """Mean square left by the numerators that fit best, these (k, 2), the residual, and what every tap answers."""
+def _projected(sections: Array, signals: Signals) -> tuple[Array, Array, Array]:
+    """The numerators that fit best (k, 2), the residual that they leave, and what every tap answers."""
     shaped = [[lfilter([1.0], [1.0, *a], u) for a in sections] for u, _ in signals]
     basis = _about_means([np.array([_delayed(s, k) for s in one for k in (0, 1)]) for one in shaped])
     scale = np.linalg.norm(basis, axis=1)
@@ -115,8 +120,7 @@ def _projected(sections: Array, signals: Signals) -> tuple[float, Array, Array, 
     basis /= scale[:, None]
     output = np.concatenate([y for _, y in signals])
     taps = np.linalg.lstsq(basis @ basis.T, basis @ output, rcond=INDEPENDENT)[0]
-    residual = output - taps @ basis
-    return float(residual @ residual / output.size), (taps / scale).reshape(-1, 2), residual, basis
+    return (taps / scale).reshape(-1, 2), output - taps @ basis, basis
 
 
 def _slopes(sections: Array, numerators: Array, signals: Signals) -> Array:
@@ -139,22 +143,23 @@ def _fitted(sections: Array, signals: Signals) -> tuple[Array, Array]:
     """Denominators and numerators of the least output error."""
     output = np.concatenate([y for _, y in signals])
 
+    @lru_cache(maxsize=1)  # slopes are asked for where the residual has just been
+    def projected(flat: tuple[float, ...]) -> tuple[Array, Array, Array]:
+        return _projected(np.reshape(flat, (-1, 2)), signals)
+
     def residual(flat: Array) -> Array:
-        tried = flat.reshape(-1, 2)
-        return _projected(tried, signals)[2] if _radius(tried) < LARGEST_POLE else AWAY * output
+        return projected(tuple(flat))[1] if _radius(flat.reshape(-1, 2)) < LARGEST_POLE else AWAY * output
 
     def slopes(flat: Array) -> Array:
-        now = flat.reshape(-1, 2)
-        _, numerators, _, basis = _projected(now, signals)
-        along = _slopes(now, numerators, signals)
+        numerators, _, basis = projected(tuple(flat))
+        along = _slopes(flat.reshape(-1, 2), numerators, signals)
         inverse = np.linalg.pinv(basis @ basis.T, rcond=INDEPENDENT, hermitian=True)
         return np.asarray((along @ basis.T @ inverse @ basis - along).T)
 
     fitted = least_squares(
         residual, sections.ravel(), slopes, method="lm", x_scale="jac", ftol=CONVERGED, max_nfev=SIMULATIONS
     )
-    best = fitted.x.reshape(-1, 2)
-    return best, _projected(best, signals)[1]
+    return fitted.x.reshape(-1, 2), projected(tuple(fitted.x))[0]
 
 
 def _radius(sections: Array) -> float:

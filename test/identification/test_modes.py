@@ -11,6 +11,8 @@ from piezo_hysteresis.identification.dynamics import identify_arx
 from piezo_hysteresis.identification.linear_start import ITERATIONS
 from piezo_hysteresis.identification.modes import identify_modes
 
+from .test_dynamics import poles
+
 PERIOD = 2e-5
 NOISE = 5e-4
 PLANTS = [
@@ -24,8 +26,7 @@ def answer(drive, modes):
     """Sum of modes of frequency [Hz], damping ratio and static gain."""
     y = np.zeros(drive.size)
     for frequency, damping, gain in modes:
-        pole = np.exp(2 * np.pi * frequency * PERIOD * (-damping + 1j * np.sqrt(1 - damping**2)))
-        feedback = np.real(np.poly([pole, np.conj(pole)]))
+        feedback = poles(frequency, damping)
         y += gain * lfilter([0.0, feedback.sum()], feedback, drive)
     return y
 
@@ -43,7 +44,7 @@ def frequencies(dynamics):
 
 @pytest.mark.parametrize("modes", PLANTS)
 def test_all_modes_are_found_under_noise(modes):
-    found = identify_modes([recorded(modes)], 1, PERIOD, 8, ITERATIONS)
+    found = identify_modes([recorded(modes)], 1, PERIOD, (8, 8), ITERATIONS)
     assert found.free_run_error == pytest.approx(NOISE, rel=0.1)
     for frequency, _, _ in modes:
         assert np.abs(frequencies(found) / frequency - 1.0).min() < 0.01
@@ -58,15 +59,14 @@ def test_four_modes_are_met_closer_than_by_least_squares_of_the_arx(modes):
         return np.std(dynamics.simulate(drive) - clean)
 
     at_full_rate = identify_arx([(drive, y)], 1, PERIOD, (8, 8), ITERATIONS)
-    assert error(at_full_rate) > 3 * error(identify_modes([(drive, y)], 1, PERIOD, 8, ITERATIONS))
+    assert error(at_full_rate) > 3 * error(identify_modes([(drive, y)], 1, PERIOD, (8, 8), ITERATIONS))
 
 
 @given(frequency=st.floats(80.0, 3000.0), damping=st.floats(0.01, 0.3), seed=st.integers(0, 99))
 def test_one_mode_is_known_to_a_hundredth(frequency, damping, seed):
-    found = identify_modes([recorded([(frequency, damping, 1.0)], seed)], 1, PERIOD, 4, ITERATIONS)
+    found = identify_modes([recorded([(frequency, damping, 1.0)], seed)], 1, PERIOD, (4, 4), ITERATIONS)
     band = np.array([0.0, 0.5, 1.0]) * frequency
-    pole = np.exp(2 * np.pi * frequency * PERIOD * (-damping + 1j * np.sqrt(1 - damping**2)))
-    feedback = np.real(np.poly([pole, np.conj(pole)]))
+    feedback = poles(frequency, damping)
     z = np.exp(-2j * np.pi * band * PERIOD)
     exact = feedback.sum() * z / np.polyval(feedback[::-1], z)
     np.testing.assert_allclose(found.response(band), exact, rtol=0.02)
@@ -74,10 +74,10 @@ def test_one_mode_is_known_to_a_hundredth(frequency, damping, seed):
 
 def test_offsets_of_records_do_not_count():
     signals = [(u, y + 3.0 * k) for k, (u, y) in enumerate([recorded(PLANTS[0], 0), recorded(PLANTS[0], 1)])]
-    assert identify_modes(signals, 1, PERIOD, 8, ITERATIONS).free_run_error == pytest.approx(NOISE, rel=0.1)
+    assert identify_modes(signals, 1, PERIOD, (8, 8), ITERATIONS).free_run_error == pytest.approx(NOISE, rel=0.1)
 
 
 def test_a_record_too_short_for_a_lower_rate_is_refused():
     drive, y = recorded(PLANTS[0])
     with pytest.raises(IdentificationError, match="expected"):
-        identify_modes([(drive[:150], y[:150])], 1, PERIOD, 8, ITERATIONS)
+        identify_modes([(drive[:150], y[:150])], 1, PERIOD, (8, 8), ITERATIONS)
