@@ -18,6 +18,8 @@ CLOSE = 0.3
 """Share of the best gain by which a rival may lie behind."""
 HOPELESS_BESIDE = 0.6
 """Share of the gain of a best at the floor by which another one may lie behind it and still be refitted."""
+NEAR = 0.1
+"""C up to which hardly any record is above its floor: nothing is won by dynamics anew, nor by others than rivals."""
 AGAIN = 3
 """Refits that begin once more behind dynamics found anew."""
 RESTARTS = 4
@@ -70,6 +72,8 @@ def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: S
 
 def _anew(candidate: Candidate) -> Candidate:
     """The refit behind dynamics found anew; an effect of the drive, behind which all else stands, from every start."""
+    if candidate.score.cost <= NEAR:
+        return candidate
     anew = restart(candidate, FIRST)
     if anew.effect.place is not Place.DRIVE or anew.score.excess <= ADEQUATE:
         return anew
@@ -93,8 +97,8 @@ def _from_elsewhere(best: Candidate, before: Score) -> Candidate:
 
 def _is_far_behind(candidate: Candidate, best: Candidate, before: Score) -> bool:
     """Whether the best is at the floor and the other by so much short of it that it is no rival."""
-    gain = before.cost - best.score.cost
-    return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > HOPELESS_BESIDE * gain
+    most = 2.0 * LEAST_GAIN if best.score.cost <= NEAR else HOPELESS_BESIDE * (before.cost - best.score.cost)
+    return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > most
 
 
 def settled(candidate: Candidate, before: Score) -> Candidate:

@@ -147,8 +147,7 @@ def lay_ground(
         baseline = joint(baseline.model, evidence, LAST, PRECISE)
     evidence, score = score_baseline(baseline.model, evidence)
     if score.excess > ADEQUATE:
-        baseline = _best(baseline, starts, evidence)
-        score = score_model(baseline.model, evidence)
+        baseline, score = _best(baseline, score, starts, evidence)
     if score.excess > ADEQUATE:
         for modal in modal_models(baseline.model, records, fitted):
             baseline, score = clearly_better(modal, baseline, score, evidence) or (baseline, score)
@@ -156,11 +155,12 @@ def lay_ground(
     return Ground(straight, records, lost, noise, least, span, usable, fitted, spared, evidence, baseline, score)
 
 
-def _best(found: Fit, starts: Iterator[Model], evidence: Evidence) -> Fit:
-    """The fit, or a better one from other starts."""
+def _best(found: Fit, score: Score, starts: Iterator[Model], evidence: Evidence) -> tuple[Fit, Score]:
+    """The fit and its score, or those from another start: one that records left out prefer, and that fits better."""
     with suppress(*FAILURES):
-        for start in starts:
-            other = joint(exact(start), evidence, LAST, PRECISE)
-            if other.cost < found.cost:
-                found = other
-    return found
+        for start in map(exact, starts):
+            if score_model(start, evidence).cost < score.cost:
+                other = joint(start, evidence, LAST, PRECISE)
+                if other.cost < found.cost:
+                    found, score = other, score_model(other.model, evidence)
+    return found, score

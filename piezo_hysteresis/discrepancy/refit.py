@@ -81,8 +81,13 @@ def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: floa
 
 
 def clearly_better(start: Model, found: Fit, score: Score, evidence: Evidence) -> tuple[Fit, Score] | None:
-    """The fit from another start, and its score, where records left out prefer it clearly; None elsewhere."""
+    """The fit from another start, and its score, where records left out prefer it clearly; None elsewhere.
+
+    They judge the start first, after one linear step: one that is no better then has not become clearly better.
+    """
     with suppress(*FAILURES):
+        if score_model(start, evidence).excess >= score.excess:
+            return None
         other = joint(start, evidence, LAST, PRECISE)
         told = score_model(other.model, evidence)
         if other.cost < found.cost and told.excess < CLEARLY * score.excess:
