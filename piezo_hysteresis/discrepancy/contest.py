@@ -18,8 +18,6 @@ CLOSE = 0.3
 """Share of the best gain by which a rival may lie behind."""
 HOPELESS_BESIDE = 0.6
 """Share of the gain of a best at the floor by which another one may lie behind it and still be refitted."""
-NEAR = 0.1
-"""C up to which hardly any record is above its floor: nothing is won by dynamics anew, nor by others than rivals."""
 AGAIN = 3
 """Refits that begin once more behind dynamics found anew."""
 RESTARTS = 4
@@ -70,9 +68,16 @@ def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: S
     return refits
 
 
+def refits_of_twins(model: Model, candidates: Sequence[Candidate], best: Candidate, before: Score) -> list[Candidate]:
+    """Refits from every start of what slow drive cannot tell from the best: only other dynamics let it show."""
+    twins = {type(best.effect).twin, *(c.name for c in candidates if c.effect.twin == best.name)}
+    anew = (from_all_starts(model, c, FIRST) for c in candidates if c.name in twins)
+    return [settled(c, before) for c in anew if c is not None]
+
+
 def _anew(candidate: Candidate) -> Candidate:
     """The refit behind dynamics found anew; an effect of the drive, behind which all else stands, from every start."""
-    if candidate.score.cost <= NEAR:
+    if candidate.score.cost <= LEAST_GAIN:  # less is left than counts as a gain
         return candidate
     anew = restart(candidate, FIRST)
     if anew.effect.place is not Place.DRIVE or anew.score.excess <= ADEQUATE:
@@ -97,7 +102,7 @@ def _from_elsewhere(best: Candidate, before: Score) -> Candidate:
 
 def _is_far_behind(candidate: Candidate, best: Candidate, before: Score) -> bool:
     """Whether the best is at the floor and the other by so much short of it that it is no rival."""
-    most = 2.0 * LEAST_GAIN if best.score.cost <= NEAR else HOPELESS_BESIDE * (before.cost - best.score.cost)
+    most = 2.0 * LEAST_GAIN if best.score.cost <= LEAST_GAIN else HOPELESS_BESIDE * (before.cost - best.score.cost)
     return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > most
 
 

@@ -15,7 +15,18 @@ from ..identification.fit import Progress
 from ..identification.normal_equations import residuals
 from ..model import Model
 from .candidates import Candidate, alikeness, screen
-from .contest import CLOSE, FIRST, LATER, LEAST_GAIN, contest, finest, refits_of_the_drive, settled, simplest
+from .contest import (
+    CLOSE,
+    FIRST,
+    LATER,
+    LEAST_GAIN,
+    contest,
+    finest,
+    refits_of_the_drive,
+    refits_of_twins,
+    settled,
+    simplest,
+)
 from .doubts import is_seen, is_steady, may_be_off
 from .evidence import Evidence
 from .held_out import ADEQUATE, Score
@@ -145,6 +156,8 @@ def _turn(
     refits = contest(model, likely, before, tell)
     if not refits:
         return None
+    if refits[0].score.excess > ADEQUATE and (others := refits_of_twins(model, screened, refits[0], before)):
+        refits = sorted(_best_of_each([*refits, *others]), key=lambda c: c.score.cost)
     best, alone, objection = _judged(refits, before, null, keeps)
     if objection is not None and (late := refits_of_the_drive(model, screened, before)):
         refits = sorted(_best_of_each([*refits, *late]), key=lambda c: c.score.cost)
