@@ -67,7 +67,8 @@ def diagnose_few(
     tell("baseline", 0.0)
     state = model or identify(known, progress=lambda word, part: tell(word, 0.2 * part)).model
     start = model or identify(known, memory=True, progress=lambda word, part: tell(word, 0.2 + 0.2 * part)).model
-    least, noise = floors(records), noise_floors(records)
+    noise = noise_floors(records)
+    least = floors(records, noise)
     blocks, origin = blocks_of(records, used)
     weights = np.array([np.inf if k is None else least[k] for k in origin])
     runs = sum(not r.continues for r in records)

@@ -120,7 +120,8 @@ def lay_ground(
     records = tuple(slowed(r) for r in given)
     spared = reporting(records, usable)
     fitted = [i for i in usable if i not in spared]
-    noise, least, span = noise_floors(records), floors(records), stroke(records)
+    noise, span = noise_floors(records), stroke(records)
+    least = floors(records, noise)
     at_full_rate = [r for r, g in zip(records, given, strict=True) if r.sample_period == g.sample_period]
     period = model.sample_period if model is not None else common_period(at_full_rate or records)
     records = straight = tuple(at_period(r, period) for r in records)

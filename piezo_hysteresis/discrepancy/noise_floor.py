@@ -158,6 +158,6 @@ def _speed(record: Record, noise: float) -> float:
     return float(np.sqrt(max(0.0, float(np.mean(steps**2)) - 2.0 * noise**2))) / record.sample_period
 
 
-def floors(records: Sequence[Record]) -> Array:
-    """Floor of every record [m], shape (r,): the larger of its noise and the adequacy floor."""
-    return np.maximum(noise_floors(records), ADEQUACY * stroke(records))
+def floors(records: Sequence[Record], noise: Array | None = None) -> Array:
+    """Floor of every record [m], shape (r,): the larger of its noise, if known already, and the adequacy floor."""
+    return np.maximum(noise_floors(records) if noise is None else noise, ADEQUACY * stroke(records))

@@ -93,10 +93,11 @@ def compare(
     """
     models, nuisances = dict(models or {}), nuisances or {}
     records = experiment.records
+    noise = noise_floors(records)
     return Comparison(
         experiment=experiment,
         models=models,
         errors={label: errors(model, experiment, nuisances.get(label)) for label, model in models.items()},
-        noise=noise_floors(records),
-        floors=floors(records) if record_floors is None else np.asarray(record_floors, dtype=float),
+        noise=noise,
+        floors=floors(records, noise) if record_floors is None else np.asarray(record_floors, dtype=float),
     )
