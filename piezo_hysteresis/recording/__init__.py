@@ -44,7 +44,7 @@ from .gcs_array import GcsArray
 from .layout import Column, Layout
 from .mat import Mat
 from .npz import Npz
-from .onset import is_within_its_loop
+from .onset import departures, is_within_its_loop
 from .quality import inspect
 from .rosbag2 import Rosbag2, recorded_model
 
@@ -135,6 +135,12 @@ def _one(place: Path, chosen: Format, layout: Layout) -> Experiment:
     midway = {i for i, r in enumerate(records) if is_within_its_loop(r)}
     told = [Notice("truncated", _WITHIN, records[i].phase) for i in sorted(midway)]
     records = tuple(replace(r, truncated=True) if i in midway else r for i, r in enumerate(records))
+    came_from = departures(replace(experiment, records=records))
+    records = tuple(replace(r, initial_voltage=came_from.get(i, r.initial_voltage)) for i, r in enumerate(records))
+    if came_from:
+        phases = ", ".join(dict.fromkeys(records[i].phase for i in came_from))
+        levels = " or ".join(f"{v:.4g} V" for v in sorted(set(came_from.values())))
+        told.append(Notice("in_motion", _IN_MOTION.format(phases=phases, levels=levels)))
     return replace(experiment, records=records).noting(*told)
 
 
@@ -163,6 +169,7 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
 
 
 _WITHIN = "begins on a branch of its loop: what came before is not recorded; a settled stage needs initial_voltage"
+_IN_MOTION = "{phases}: the first sample lies on a ramp from {levels}, taken as where the stage had settled"
 _BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
 
 
