@@ -20,6 +20,8 @@ PARTS = 16
 """Parts into which a sample is divided at most."""
 SMOOTHER = 0.97
 """Share of the unevenness, or of the square, of a residual that a change leaves at most."""
+KINKED = 0.6
+"""Third over second difference of a drive from which it turns within a sample: curves take many samples to bend."""
 ITS_SIZE = (0.7, 1.3)
 """Multiple of a change that the residual holds, where the change is what it lacks."""
 
@@ -44,7 +46,8 @@ def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
     list of (n,) ndarray
         By record; zero where nothing is lost, or the record is not slow.
     """
-    parts = [min(PARTS, 2 * int(0.5005 * r.sample_period / model.sample_period)) for r in records]
+    most = [min(PARTS, 2 * int(0.5005 * r.sample_period / model.sample_period)) for r in records]
+    parts = [n if _turns_sharply(r) else 1 for r, n in zip(records, most, strict=True)]
     straight = model.simulate(records)
     changes = []
     for abrupt in (False, True):
@@ -70,6 +73,13 @@ def _holds(residual: Array, change: Array) -> bool:
         return False
     left = residual - change
     return bool(ITS_SIZE[0] < residual @ change / size < ITS_SIZE[1] and left @ left < SMOOTHER * power)
+
+
+def _turns_sharply(record: Record) -> bool:
+    """Whether the drive has kinks; what a model says otherwise of a curve at another rate, it owes to its dynamics."""
+    before = [float(record.voltage[0]) if record.continues else record.settled_voltage] * 2
+    bends = np.diff(record.voltage, 2, prepend=before)
+    return bool(np.abs(np.diff(bends)).max(initial=0.0) > KINKED * np.abs(bends).max(initial=0.0))
 
 
 def _unevenness(residual: Array) -> float:
