@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..effects import BoucWen, Effect, MainsHum
 from ..errors import DivergenceError, ModelError, ParameterError
 from ..identification.fit import Fit, gauge
-from ..identification.normal_equations import Gram, Nuisance, grams
+from ..identification.normal_equations import Gram, grams
 from ..model import Model
 from .evidence import Evidence
 from .held_out import Score, held_out, indispensable
@@ -49,14 +49,19 @@ class Candidate:
         return self.effect.name
 
 
-def free_numbers(model: Model, nuisance: Nuisance) -> list[str]:
-    """Numbers of a model that a joint fit adjusts: all but the chosen ones, the delay and what is free per record."""
+def free_numbers(model: Model, evidence: Evidence) -> list[str]:
+    """Numbers of a model that a joint fit adjusts: all but the chosen ones, the delay and what is free per record.
+
+    Settling where no two records begin at different levels is no number of the evidence.
+    """
     names = []
     for name in model.values():
         row = model.row(name)
         if not (row.fixed or row.per_record or name == "arx.delay"):
             names.append(name)
-    skipped = {"offset.y0", "offset.settling"} if nuisance.offset else set()
+    skipped = {"offset.y0"} if evidence.nuisance.offset else set()
+    if evidence.nuisance.offset or not evidence.begins_at_levels:
+        skipped.add("offset.settling")
     skipped |= {f"{MainsHum.name}.f"}
     if loop_is_off(model):  # and stays so
         skipped |= {f"{BoucWen.name}.{n}" for n in ("A", "beta", "gamma")}
@@ -90,7 +95,7 @@ def score_baseline(model: Model, evidence: Evidence) -> tuple[Evidence, Score]:
 
 
 def _products(model: Model, evidence: Evidence) -> tuple[list[Gram], Array, Array]:
-    names = free_numbers(model, evidence.nuisance)
+    names = free_numbers(model, evidence)
     return grams(model, evidence.records, names, evidence.nuisance), evidence.floors, directions(model, names)
 
 
@@ -99,7 +104,7 @@ def screen(model: Model, evidence: Evidence, effects: Iterable[type[Effect]]) ->
 
     Effects that are off at their start share one pass over the data; a finite start enters by the change it makes.
     """
-    base = free_numbers(model, evidence.nuisance)
+    base = free_numbers(model, evidence)
     starts = [(effect, effect.starts(evidence.extent)) for effect in effects if _fits(model, evidence, effect)]
     found: list[Candidate] = []
     for turn in range(max((len(s) for _, s in starts), default=0)):
@@ -134,9 +139,7 @@ def _screen_off(model: Model, evidence: Evidence, base: list[str], members: list
             extended = trial
         except ModelError:
             members = [m for m in members if m is not effect]
-    own = {
-        e.name: [n for n in free_numbers(extended, evidence.nuisance) if n.startswith(f"{e.name}.")] for e in members
-    }
+    own = {e.name: [n for n in free_numbers(extended, evidence) if n.startswith(f"{e.name}.")] for e in members}
     names = base + [n for e in members for n in own[e.name]]
     products = grams(extended, evidence.records, names, evidence.nuisance)
     columns = directions(model, base, len(names) - len(base))
@@ -179,7 +182,7 @@ def alikeness(first: Candidate, second: Candidate, model: Model) -> float:
     For effects of several numbers the signature is the direction of the linearised step.
     """
     evidence = first.evidence
-    base = free_numbers(model, evidence.nuisance)
+    base = free_numbers(model, evidence)
     now = model.simulate(evidence.records)
     changes = []
     for candidate in (first, second):

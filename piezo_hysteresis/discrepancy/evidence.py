@@ -17,6 +17,8 @@ from ..record import Record
 
 Array = NDArray[np.float64]
 
+LEVELS_APART = 0.05
+"""Share of the voltage range from which two levels at which records begin count as two."""
 MOVES = 30.0
 """Power over noise from which the spectrum of the displacement counts as motion."""
 
@@ -44,6 +46,13 @@ class Evidence:
     nuisance: Nuisance
     extent: Extent
     alone: tuple[int, ...] = ()
+
+    @property
+    def begins_at_levels(self) -> bool:
+        """Whether the stage had settled at more than one level: what it does there beyond a constant can be told."""
+        levels = [r.settled_voltage for r in self.records if not r.continues]
+        most = LEVELS_APART * (self.extent.voltage_max - self.extent.voltage_min)
+        return bool(levels) and max(levels) - min(levels) > most
 
     def broadband(self) -> list[int]:
         """Records whose drive determines linear dynamics."""

@@ -93,7 +93,7 @@ def propose(first: Model, second: Model, names: tuple[str, str], evidence: Evide
     evidence : Evidence
         What has been recorded: it binds the common parameters.
     """
-    free = free_numbers(first, evidence.nuisance)
+    free = free_numbers(first, evidence)
     directions = gauge(first, free)
     known = weighted_sum(grams(first, evidence.records, free, evidence.nuisance), evidence.floors)
     prior = directions.T @ known[:-1, :-1] @ directions

@@ -72,7 +72,7 @@ def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: floa
     return fit(
         model,
         evidence.records,
-        free_numbers(model, evidence.nuisance),
+        free_numbers(model, evidence),
         floors=evidence.floors.tolist(),
         nuisance=evidence.nuisance,
         max_iterations=max_iterations,
