@@ -19,6 +19,7 @@ _MISSED = 0.3
 _PARTS = 32
 _CONSTANT_SPEED = 0.75
 _SEVERE_SHARE = 0.05
+_ROUGH_SHARE, _FEW = 0.001, 3
 
 
 def channel_defects(record: Record) -> list[Notice]:
@@ -124,7 +125,7 @@ def _dropouts(record: Record) -> list[Notice]:
     if not count:
         return []
     text = f"the displacement drops out {count} times, {samples} samples in all"
-    return [Notice("dropout", text, record.phase, severe=samples > 0.001 * record.size)]
+    return [Notice("dropout", text, record.phase, severe=samples > max(_FEW, _ROUGH_SHARE * record.size))]
 
 
 def _ramps(values: Samples) -> bool:
