@@ -20,8 +20,10 @@ PARTS = 16
 """Parts into which a sample is divided at most."""
 SMOOTHER = 0.97
 """Share of the unevenness, or of the square, of a residual that a change leaves at most."""
-KINKED = 0.6
-"""Third over second difference of a drive from which it turns within a sample: curves take many samples to bend."""
+KINKED = 3.0
+"""How far a bend of the drive stands out of those three samples before and after it where it is a kink: curves go on."""
+TINY = 1e-12
+"""Share of the drive below which it stands still."""
 ITS_SIZE = (0.7, 1.3)
 """Multiple of a change that the residual holds, where the change is what it lacks."""
 
@@ -77,9 +79,10 @@ def _holds(residual: Array, change: Array) -> bool:
 
 def _turns_sharply(record: Record) -> bool:
     """Whether the drive has kinks; what a model says otherwise of a curve at another rate, it owes to its dynamics."""
-    before = [float(record.voltage[0]) if record.continues else record.settled_voltage] * 2
-    bends = np.diff(record.voltage, 2, prepend=before)
-    return bool(np.abs(np.diff(bends)).max(initial=0.0) > KINKED * np.abs(bends).max(initial=0.0))
+    before = [float(record.voltage[0]) if record.continues else record.settled_voltage] * 5
+    bends = np.abs(np.diff(np.concatenate((before, record.voltage, record.voltage[-1:].repeat(3))), 2))
+    around = np.maximum(bends[:-6], bends[6:])
+    return bool(np.any((bends[3:-3] > KINKED * around) & (bends[3:-3] > 0.5 * bends.max())))
 
 
 def _unevenness(residual: Array) -> float:
@@ -131,7 +134,8 @@ def sharp_drive(averages: Array, before: float, parts: int, *, abrupt: bool = Fa
     at = (part + 0.5) / parts
     bent = np.where(at < 0.5, start + 2.0 * at * (peak - start), peak + (2.0 * at - 1.0) * (end - peak))
     height = end - start
-    early = np.divide(end - middle, height, out=np.full_like(height, 0.5), where=height != 0.0)
+    rises = np.abs(height) > TINY * np.abs(averages).max(initial=0.0)
+    early = np.divide(end - middle, height, out=np.full_like(height, 0.5), where=rises)
     jumping = end - height * np.clip(early * parts - part, 0.0, 1.0)
     overshoots = abrupt | ((peak - start) * (end - peak) < 0.0)
     goes_on = (middle - start) * (end - middle) >= 0.0

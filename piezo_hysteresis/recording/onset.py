@@ -19,7 +19,7 @@ _SAME_VOLTAGE = 1e-3
 _APART = 0.01
 _STRAIGHT, _NEAR = 0.1, 0.05
 _AHEAD = (0.5, 1.0)
-"""Samples from where a ramp begins to its first sample: an average stands for the middle of its time."""
+"""Samples from where a ramp begins to its first sample: for averages half of one, or a little more."""
 
 
 def is_within_its_loop(record: Record) -> bool:
@@ -96,15 +96,15 @@ def departures(experiment: Experiment) -> dict[int, float]:
     are 0 V and those at which other records rest when they begin.
     """
     begins_at_rest = (r for r in experiment if r.size > 1 and not r.continues and r.voltage[1] == r.voltage[0])
-    levels, found = {0.0, *(r.settled_voltage for r in begins_at_rest)}, dict[int, float]()
+    levels, found = {r.settled_voltage for r in begins_at_rest}, dict[int, float]()
     for i, record in enumerate(experiment):
         if record.continues or record.truncated or record.initial_voltage is not None or record.size < 3:
             continue
         first, step = float(record.voltage[0]), float(record.voltage[1] - record.voltage[0])
         if abs(float(record.voltage[2] - record.voltage[1]) - step) > _STRAIGHT * abs(step):
             continue
-        for level in sorted(levels, key=lambda v: abs(v - first)):
-            if min(abs(first - ahead * step - level) for ahead in _AHEAD) < _NEAR * abs(step):
+        for level in (*sorted(levels, key=lambda v: abs(v - first)), 0.0):
+            if step and _AHEAD[0] - _NEAR < (first - level) / step < _AHEAD[1] + _NEAR:
                 found[i] = level
                 break
     return found

@@ -44,6 +44,15 @@ def test_most_of_what_averages_miss_is_made_good(drive, factor):
     assert np.std(slow.displacement - point - change) < 0.4 * missed
 
 
+def test_a_curve_loses_nothing_even_by_a_model_of_slow_dynamics():
+    time = PERIOD * np.arange(20_000)
+    drive = 5.0 * (1.0 - np.cos(2.0 * np.pi * 10.0 * time))
+    slow = averaged(drive, 10)
+    wrong = STAGE.with_effect(Arx(a=(-0.995,), b=(0.005,), delay=1.0))
+    (change,) = coarseness(wrong, [slow])
+    assert not change.any()
+
+
 RINGING = STAGE.with_effect(Arx(a=(-1.9, 0.95), b=(0.05,), delay=1.0))
 """A mode at 360 Hz with a damping ratio of 0.11."""
 

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import inspect, read, write
 from piezo_hysteresis.recording.lag import lag_of
-from piezo_hysteresis.recording.onset import is_within_its_loop
+from piezo_hysteresis.recording.onset import departures, is_within_its_loop
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
 PERIOD = 1e-4
@@ -163,6 +165,12 @@ def test_a_sensor_that_hangs_is_stuck():
     assert "stuck" in kinds(Record(drive, y, PERIOD, "sine_5hz"))
 
 
+def test_one_sample_of_a_ring_down_makes_no_recording_worthless():
+    y = 1.665e-5 + 5e-9 * np.random.default_rng(1).normal(size=600)
+    y[:4] = 1.7256e-5, 1.6750e-5, 1.6473e-5, 1.6803e-5
+    assert not any(n.severe for n in found("dropout", Record(3.5 + 1e-3 * np.arange(600), y, 1e-3, "hold")))
+
+
 @pytest.mark.parametrize("length", [1, 7, 40])
 def test_drop_outs_are_counted(length):
     drive = sine()
@@ -234,6 +242,34 @@ def test_a_fast_sine_begins_within_its_loop_only_where_it_was_running_before(fre
     cut = round(5.0 / frequency / 2e-5)
     late = Record(settled.voltage[cut:], settled.displacement[cut:], settled.sample_period, "sine")
     assert is_within_its_loop(late)
+
+
+@given(
+    level=st.sampled_from([0.0, -20.0, 7.5]),
+    slope=st.floats(0.01, 3.0) | st.floats(-3.0, -0.01),
+    factor=st.integers(1, 100),
+)
+def test_a_ramp_from_rest_is_known_by_its_first_samples(level, slope, factor):
+    ramp = level + slope * np.arange(1, 401)
+    slow = replace(Record(ramp, np.zeros(ramp.size), PERIOD).decimate(factor), initial_voltage=None)
+    resting = Record(np.full(20, level), np.zeros(20), PERIOD, "rest")
+    assert departures(Experiment((resting, slow))) == {1: level}
+    for known in (replace(slow, continues=True), replace(slow, truncated=True), replace(slow, initial_voltage=1.0)):
+        assert departures(Experiment((resting, known))) == {}
+    elsewhere = replace(slow, voltage=slow.voltage + 5.0 * slope * factor)
+    assert departures(Experiment((resting, elsewhere))) != {1: level}
+
+
+def test_a_slow_ramp_from_rest_is_followed_from_its_first_sample(tmp_path):
+    plant = SimulatedStage(seed=1)
+    ramp = np.repeat([0.0, 5.0], [1, 10_000])
+    ramp[1:2001] = np.linspace(0.0, 5.0, 2000)
+    slow = replace(plant.play(ramp[1:], phase="staircase").decimate(500), initial_voltage=None)
+    write(Experiment((plant.play(np.zeros(2000), phase="rest"), slow)), tmp_path / "run")
+    experiment = read(tmp_path / "run")
+    assert experiment.named("staircase")[0].settled_voltage == 0.0
+    (told,) = [n for n in experiment.notices if n.kind == "in_motion"]
+    assert "staircase" in told.message and "0 V" in told.message
 
 
 def test_records_that_begin_alike_at_different_displacements_are_told():
