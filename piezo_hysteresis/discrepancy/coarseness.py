@@ -21,7 +21,7 @@ PARTS = 16
 SMOOTHER = 0.97
 """Share of the unevenness, or of the square, of a residual that a change leaves at most."""
 KINKED = 3.0
-"""How far a bend of the drive stands out of those three samples before and after it where it is a kink: curves go on."""
+"""How far a bend of the drive stands out of those three samples before and behind where it is a kink: curves go on."""
 TINY = 1e-12
 """Share of the drive below which it stands still."""
 ITS_SIZE = (0.7, 1.3)
