@@ -28,9 +28,9 @@ from .next_experiment import decide
 from .reach import beyond_reach
 from .refit import LAST, PRECISE, joint, restart
 from .sampling import NOISE_WIDTH, quieted, voltage_noise
-from .selection import NAMED, select
+from .selection import select
 from .steps import Selection
-from .verdict import FEWEST, is_makeshift, verdict_of
+from .verdict import FEWEST, is_explained, is_makeshift, verdict_of
 
 Array = NDArray[np.float64]
 
@@ -147,7 +147,7 @@ def _concluded(
     """The last fits, the gap on records set aside, and what follows."""
     records, least, evidence = ground.records, ground.least, ground.evidence
     tell("gap", 0.85)
-    named = bool(selection.accepted) and selection.explained(selection.score) >= NAMED and not is_makeshift(selection)
+    named = is_explained(selection) and not is_makeshift(selection)
     whole = ground.whole
     plain = selection.baseline if selection.accepted else selection.model  # the search may have found better dynamics
     first = joint(plain, replace(evidence, records=whole), LAST, PRECISE)

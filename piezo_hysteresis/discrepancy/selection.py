@@ -39,8 +39,6 @@ DECISIVE = 0.5
 """Gain over the model fitted anew without an effect from which it needs no other proof that it is not off."""
 KEEPS = (0.8, 0.5)
 """Share of V beyond noise that may remain after the first accepted effect, and after further ones."""
-NAMED = 0.6
-"""Explained fraction of the gap from which a family is named."""
 REFITS = 6
 """Candidates that are refitted jointly."""
 HOPELESS = 0.02

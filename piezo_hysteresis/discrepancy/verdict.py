@@ -8,7 +8,6 @@ from ..effects import ExtraResonance
 from .diagnosis import Verdict
 from .gap import Gap
 from .held_out import ADEQUATE
-from .selection import NAMED
 from .steps import Selection
 
 FEWEST = 4
@@ -16,8 +15,18 @@ FEWEST = 4
 FORESEEN, UNFORESEEN = 1.1, 1.5
 """Gap on records set aside, in floors: up to the first nothing is missing, though some that were fitted are not quite
 foretold by the others; from the second something is, though those lack nothing."""
+NAMED, NAMED_FAR = 0.6, 0.75
+"""Explained fraction of the gap from which a family is named; and where what is left is large."""
+FAR = 10.0
+"""V from which what is left is large: an effect of another family of much the same shape explains that much, too."""
 LINEAR_LEAVES = 2.0 * ADEQUATE
 """V that an effect of linear dynamics may leave: they are fitted with it, and hold what is linear."""
+
+
+def is_explained(selection: Selection) -> bool:
+    """Whether the effects that were added explain enough for a name."""
+    share = NAMED if selection.score.excess <= FAR else NAMED_FAR
+    return bool(selection.accepted) and selection.explained(selection.score) >= share
 
 
 def is_makeshift(selection: Selection) -> bool:
@@ -56,7 +65,7 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
             told = f"those set aside, where a gap of {gap.after / gap.floor:.1f} floors remains"
             return Verdict.UNKNOWN, f"No name: nothing is missing on the records that were fitted, but on {told}."
         return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
-    if closed >= NAMED and is_makeshift(selection):
+    if is_explained(selection) and is_makeshift(selection):
         told = f"{names} explains {100 * closed:.0f} %, but what is linear leaves nothing where it is named rightly"
         return Verdict.UNKNOWN, f"No name: {told}."
     if selection.accepted and not falls:
