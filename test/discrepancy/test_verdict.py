@@ -1,0 +1,48 @@
+"""What a name asks for."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from piezo_hysteresis.discrepancy.candidates import Candidate
+from piezo_hysteresis.discrepancy.evidence import Evidence, extent_of
+from piezo_hysteresis.discrepancy.held_out import Score
+from piezo_hysteresis.discrepancy.steps import Selection, Step
+from piezo_hysteresis.discrepancy.verdict import is_explained
+from piezo_hysteresis.effects import Arx, BoucWen, Creep
+from piezo_hysteresis.identification.normal_equations import Nuisance
+from piezo_hysteresis.model import Model
+from piezo_hysteresis.record import Record
+
+STAGE = Model((BoucWen(), Arx(b=(1.0,))), 1e-4, 10.0, 1e-5)
+RECORD = Record(np.linspace(0.0, 10.0, 100), np.zeros(100), 1e-4)
+EVIDENCE = Evidence((RECORD,), np.ones(1), Nuisance(), extent_of([RECORD], STAGE))
+
+
+def selection(explained, leaves):
+    """A search that found creep, which explains a share of the gap and leaves so many V."""
+    before, after = (
+        Score(np.full(10, np.sqrt(v)), np.zeros(1)) for v in (1.0 + (leaves - 1.0) / (1.0 - explained) ** 2, leaves)
+    )
+    step = Step(before, Candidate(Creep(), EVIDENCE, after), True, (), ())
+    return Selection(STAGE, STAGE, after, (step,), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("explained", "leaves", "enough"),
+    [(0.65, 2.0, True), (0.55, 2.0, False), (0.65, 100.0, False), (0.8, 100.0, True)],
+)
+def test_of_an_effect_that_leaves_a_large_gap_more_is_asked(explained, leaves, enough):
+    assert is_explained(selection(explained, leaves)) is enough
+
+
+@given(st.floats(0.0, 0.99), st.floats(1.1, 1e4), st.floats(0.0, 0.99), st.floats(1.1, 1e4))
+def test_who_explains_more_and_leaves_less_is_not_asked_for_more(first, leaves, second, leaves_second):
+    if first <= second and leaves >= leaves_second:
+        assert is_explained(selection(first, leaves)) <= is_explained(selection(second, leaves_second))
+
+
+def test_nothing_added_explains_nothing():
+    score = Score(np.full(10, 5.0), np.zeros(1))
+    assert not is_explained(Selection(STAGE, STAGE, score, (), 1.0))
