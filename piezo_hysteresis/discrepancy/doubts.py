@@ -1,11 +1,11 @@
-"""What speaks against an effect that gains: that none sees it, that it may be off, that a hum follows the drive."""
+"""What speaks against an effect that gains: none sees it, it may be off, a hum follows the drive, a limit is none."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.stats import chi2
 
-from ..effects import MainsHum
+from ..effects import AmplifierSaturation, MainsHum
 from .candidates import Candidate
 
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
@@ -50,6 +50,12 @@ def may_be_off(candidate: Candidate) -> bool:
     spread = fitted.covariance[np.ix_(at, at)] / np.outer(scale, scale)
     spread = spread[:k, :k] - spread[:k, k:] @ np.linalg.pinv(spread[k:, k:], hermitian=True) @ spread[k:, :k]
     return bool(off @ np.linalg.pinv(spread, rcond=1e-9, hermitian=True) @ off < chi2.ppf(0.95, max(1, k)))
+
+
+def bends_all_along(candidate: Candidate) -> bool:
+    """Whether a limit bends over more than the whole drive: that is a curve, and no end of a range."""
+    saturates = candidate.name == AmplifierSaturation.name
+    return saturates and candidate.effect["corner"] > candidate.evidence.extent.span
 
 
 def is_steady(candidate: Candidate) -> bool:

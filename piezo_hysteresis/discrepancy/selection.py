@@ -27,7 +27,7 @@ from .contest import (
     settled,
     simplest,
 )
-from .doubts import is_seen, is_steady, may_be_off
+from .doubts import bends_all_along, is_seen, is_steady, may_be_off
 from .evidence import Evidence
 from .held_out import ADEQUATE, Score
 from .refit import Fitted, refit, restart, without
@@ -207,7 +207,7 @@ def _judged(
     refits: list[Candidate], before: Score, null: float, keeps: float
 ) -> tuple[Candidate, Fitted | None, str | None]:
     """The best refit, the model fitted anew without it where it comes to that, and what speaks against the effect."""
-    best = finest(simplest(refits), before)
+    best = finest(simplest([c for c in refits if not bends_all_along(c)] or refits), before)
     gain, left = before.cost - best.score.cost, _left(best.score, before, null)
     if gain < LEAST_GAIN or left > keeps:
         told = (
@@ -230,6 +230,8 @@ def _objection(best: Candidate, alone: Fitted | None, null: float, keeps: float)
         return "all its numbers could as well be off"
     if not is_seen(best):
         return "changes no record by as much as half its floor"
+    if bends_all_along(best):
+        return "its bend is wider than the drive: a curve, and no limit"
     if best.name == MainsHum.name and not is_steady(best):
         return "its amplitude follows the drive from record to record"
     return None

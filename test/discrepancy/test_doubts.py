@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.candidates import Candidate
-from piezo_hysteresis.discrepancy.doubts import may_be_off
+from piezo_hysteresis.discrepancy.doubts import bends_all_along, may_be_off
 from piezo_hysteresis.discrepancy.evidence import Evidence
 from piezo_hysteresis.discrepancy.held_out import Score
-from piezo_hysteresis.effects import BoucWen, GainDrift, HysteresisMemory
+from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, GainDrift, HysteresisMemory
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit import Fit
 from piezo_hysteresis.identification.normal_equations import Nuisance
@@ -40,6 +40,12 @@ def test_a_size_that_its_time_constant_blurs_is_a_size_all_the_same():
 
 def test_a_size_below_its_error_may_be_off():
     assert may_be_off(gain_drift(0.05, along=1.0, across=0.1))
+
+
+@pytest.mark.parametrize(("corner", "curve"), [(0.1, False), (4.0, False), (30.0, True)])
+def test_a_limit_whose_bend_is_wider_than_the_drive_is_none(corner, curve):
+    saturation = AmplifierSaturation(upper=9.0, corner=corner)
+    assert bends_all_along(fitted(saturation, (), np.empty((0, 0)))) is curve
 
 
 @pytest.mark.parametrize("blind", [1e6, 1e145])
