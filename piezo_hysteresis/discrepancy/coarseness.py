@@ -49,7 +49,7 @@ def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
         By record; zero where nothing is lost, or the record is not slow.
     """
     most = [min(PARTS, 2 * int(0.5005 * r.sample_period / model.sample_period)) for r in records]
-    parts = [n if _turns_sharply(r) else 1 for r, n in zip(records, most, strict=True)]
+    parts = [n if n > 1 and _turns_sharply(r) else 1 for r, n in zip(records, most, strict=True)]
     straight = model.simulate(records)
     changes = []
     for abrupt in (False, True):

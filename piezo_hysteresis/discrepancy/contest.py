@@ -59,16 +59,16 @@ def contest(model: Model, candidates: Sequence[Candidate], before: Score, tell: 
 
 def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
     """Refits of effects of the drive: dynamics have taken them up, so that no score test sees them."""
-    return _from_all_starts(model, [c for c in candidates if c.effect.place is Place.DRIVE], before)
+    return _settled_from_all_starts(model, [c for c in candidates if c.effect.place is Place.DRIVE], before)
 
 
 def refits_of_twins(model: Model, candidates: Sequence[Candidate], best: Candidate, before: Score) -> list[Candidate]:
     """Refits of what slow drive cannot tell from the best: only other dynamics let it show."""
     twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
-    return _from_all_starts(model, twins, before)
+    return _settled_from_all_starts(model, twins, before)
 
 
-def _from_all_starts(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
+def _settled_from_all_starts(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
     anew = (from_all_starts(model, c, FIRST) for c in candidates)
     return [settled(c, before) for c in anew if c is not None]
 

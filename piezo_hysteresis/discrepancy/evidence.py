@@ -51,8 +51,7 @@ class Evidence:
     def begins_at_levels(self) -> bool:
         """Whether the stage had settled at more than one level: what it does there beyond a constant can be told."""
         levels = [r.settled_voltage for r in self.records if not r.continues]
-        most = LEVELS_APART * (self.extent.voltage_max - self.extent.voltage_min)
-        return bool(levels) and max(levels) - min(levels) > most
+        return bool(levels) and max(levels) - min(levels) > LEVELS_APART * self.extent.span
 
     def broadband(self) -> list[int]:
         """Records whose drive determines linear dynamics."""

@@ -155,10 +155,10 @@ def _turn(
     if not refits:
         return None
     if refits[0].score.excess > ADEQUATE and (others := refits_of_twins(model, screened, refits[0], before)):
-        refits = sorted(_best_of_each([*refits, *others]), key=lambda c: c.score.cost)
+        refits = _best_of_each([*refits, *others])
     best, alone, objection = _judged(refits, before, null, keeps)
     if objection is not None and (late := refits_of_the_drive(model, screened, before)):
-        refits = sorted(_best_of_each([*refits, *late]), key=lambda c: c.score.cost)
+        refits = _best_of_each([*refits, *late])
         best, alone, objection = _judged(refits, before, null, keeps)
     objection = objection or _untried_twin(type(best.effect), effects)
     accepted, rivals = objection is None, list[Candidate]()
@@ -185,9 +185,9 @@ def _turn(
 
 
 def _best_of_each(refits: list[Candidate]) -> list[Candidate]:
-    """Of the refits of an effect the best one."""
+    """Of the refits of every effect the best one, best first."""
     worst_first = sorted(refits, key=lambda c: -c.score.cost)
-    return list({c.name: c for c in worst_first}.values())
+    return sorted({c.name: c for c in worst_first}.values(), key=lambda c: c.score.cost)
 
 
 def _others(screened: list[Candidate], refits: list[Candidate]) -> list[Candidate]:

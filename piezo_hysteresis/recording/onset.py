@@ -101,10 +101,10 @@ def departures(experiment: Experiment) -> dict[int, float]:
         if record.continues or record.truncated or record.initial_voltage is not None or record.size < 3:
             continue
         first, step = float(record.voltage[0]), float(record.voltage[1] - record.voltage[0])
-        if abs(float(record.voltage[2] - record.voltage[1]) - step) > _STRAIGHT * abs(step):
+        if abs(float(record.voltage[2] - record.voltage[1]) - step) >= _STRAIGHT * abs(step):
             continue
         for level in (*sorted(levels, key=lambda v: abs(v - first)), 0.0):
-            if step and _AHEAD[0] - _NEAR < (first - level) / step < _AHEAD[1] + _NEAR:
+            if _AHEAD[0] - _NEAR < (first - level) / step < _AHEAD[1] + _NEAR:
                 found[i] = level
                 break
     return found

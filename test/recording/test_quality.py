@@ -262,9 +262,8 @@ def test_a_ramp_from_rest_is_known_by_its_first_samples(level, slope, factor):
 
 def test_a_slow_ramp_from_rest_is_followed_from_its_first_sample(tmp_path):
     plant = SimulatedStage(seed=1)
-    ramp = np.repeat([0.0, 5.0], [1, 10_000])
-    ramp[1:2001] = np.linspace(0.0, 5.0, 2000)
-    slow = replace(plant.play(ramp[1:], phase="staircase").decimate(500), initial_voltage=None)
+    ramp = np.append(np.linspace(0.0, 5.0, 2000), np.full(8000, 5.0))
+    slow = replace(plant.play(ramp, phase="staircase").decimate(500), initial_voltage=None)
     write(Experiment((plant.play(np.zeros(2000), phase="rest"), slow)), tmp_path / "run")
     experiment = read(tmp_path / "run")
     assert experiment.named("staircase")[0].settled_voltage == 0.0
