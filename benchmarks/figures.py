@@ -49,7 +49,8 @@ class Figures:
         """The table, numbers to three digits."""
         table = Table(title=self.title, title_justify="left")
         for k, column in enumerate(self.columns):
-            table.add_column(column, justify="left" if all(isinstance(row[k], str) for row in self.rows) else "right")
+            words = all(isinstance(row[k], str) for row in self.rows)
+            table.add_column(column, justify="left" if words else "right", overflow="fold")
         for row in self.rows:
             table.add_row(*(_shown(cell) for cell in row))
         return table

@@ -1,7 +1,7 @@
 """Kernels beside the same loops in C, and beside scipy with plain Python.
 
-Ours and C take turns; of gcc -O3 with and without -march=native the faster one counts. The results are compared before
-anything is timed. Processor time of one core, warm.
+Ours and C take turns, C by gcc -O3 with and without -march=native: numba compiles for the machine it runs on. The
+results are compared before anything is timed. Processor time of one core, warm.
 
     python -m benchmarks.kernels --samples 10000000
 """
@@ -129,12 +129,12 @@ def compare(u: np.ndarray) -> Figures:
             np.testing.assert_allclose(python(), own()[: short.size], rtol=1e-9, atol=1e-12 * np.ptp(own()))
             mine, *others = seconds(own, *peers, repeats=9 if u.size < 5e6 else 3)
             (slow,) = seconds(python, repeats=2)
-            c, python_speed = min(others, default=None), short.size / slow / 1e6
-            speed = u.size / mine / 1e6
-            beside = (u.size / c / 1e6, mine / c) if c else (None, None)
+            speed, python_speed = u.size / mine / 1e6, short.size / slow / 1e6
+            beside = [cell for c in others for cell in (u.size / c / 1e6, mine / c)]
             rows.append((name, speed, *beside, python_speed, speed / python_speed))
-    told = "gcc -O3" if compiler() else "gcc not found: no C beside it"
-    columns = ("loop", "M samples/s", "C, M samples/s", "time / C", "Python + lfilter", "faster than Python by")
+    told = "M samples/s" if compiler() else "M samples/s, gcc not found: no C beside it"
+    c_columns = [head for flags in FLAGS[: len(built)] for head in (" ".join(("C", *flags)), "time over it")]
+    columns = ("loop", "ours", *c_columns, "Python + lfilter", "over Python")
     return Figures(f"Kernels, {u.size:.0e} samples, {told}", columns, rows)
 
 

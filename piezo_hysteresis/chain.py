@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .effects import Effect, Place, Setting
 from .effects.block import Block, MemorylessBlock, State, SumBlock
 from .effects.channel_block import ChannelBlock
-from .errors import DivergenceError
+from .errors import DivergenceError, ModelError
 from .kernel import kernel
 
 Array = NDArray[np.float64]
@@ -29,11 +29,22 @@ BLOCK = 32768
 
 
 @kernel
-def is_within(x: Array, limit: float) -> bool:
-    """Whether every |x_i| is below `limit`; not a number is not."""
+def take_in(x: Array, factor: float, y: Array) -> bool:
+    """y (n,) = factor · x (n,); whether every x_i is finite."""
     outside = 0
     for i in range(x.size):
-        outside |= not abs(x[i]) < limit
+        y[i] = factor * x[i]
+        outside |= not abs(x[i]) < np.inf
+    return outside == 0
+
+
+@kernel
+def hand_out(y: Array, factor: float, limit: float) -> bool:
+    """y (n,) times `factor` in place; whether every |y_i| is below `limit` then, which not a number is not."""
+    outside = 0
+    for i in range(y.size):
+        y[i] *= factor
+        outside |= not abs(y[i]) < limit
     return outside == 0
 
 
@@ -112,6 +123,11 @@ class Chain:
         self.blocks = tuple(block for _, block in parts)
         self.channels = frozenset(b.channel for b in self.blocks if isinstance(b, ChannelBlock))
         """Names of the extra channels that are used."""
+        first, last = self.blocks[0], self.blocks[-1]
+        # changes of unit at the ends are made where samples are taken in and handed out
+        self._factor_in, begin = (first.factor, 1) if isinstance(first, _Scale) else (1.0, 0)
+        self._factor_out, end = (last.factor, -1) if isinstance(last, _Scale) else (1.0, None)
+        self._inner = range(len(self.blocks))[begin:end]
 
     def rest(self, voltage: float, time: float = 0.0) -> ChainState:
         """State of a stage settled at `voltage` [V]; `time` is that of the first sample [s]."""
@@ -163,6 +179,8 @@ class Chain:
 
         Raises
         ------
+        ModelError
+            On samples that are not finite.
         DivergenceError
             With effect, sample and time of the first runaway.
         """
@@ -171,25 +189,31 @@ class Chain:
         for start in range(0, u.size, BLOCK):
             part = slice(start, start + BLOCK)
             here = u[part].copy() if copy else u[part]
-            y[part], state = self._run(here, state, self.channels_in(channels, part), start)
+            state = self._run(here, state, self.channels_in(channels, part), start, y[part])
         return y, state
 
     def channels_in(self, channels: Channels | None, part: slice) -> Channels:
         """Copies of the channels that are used, for some of the samples."""
         return {name: c[part].copy() for name, c in (channels or {}).items() if name in self.channels}
 
-    def _run(self, u: Array, state: ChainState, channels: Channels, first: int) -> tuple[Array, ChainState]:
-        states, inputs, x = [], [], u
-        for block, s in zip(self.blocks, state.blocks, strict=True):
-            inputs.append(float(x[-1]))
-            if isinstance(block, ChannelBlock):
-                s = channels.get(block.channel)
-            x, s = block.run(x, s)
-            states.append(s)
-        if not is_within(x, RUNAWAY * self.setting.displacement_scale):
+    def _run(self, u: Array, state: ChainState, channels: Channels, first: int, y: Array) -> ChainState:
+        states, inputs = list(state.blocks), [float(u[-1])] * len(self.blocks)
+        x = np.empty(u.size) if self._inner else y
+        if not take_in(u, self._factor_in, x):
+            raise ModelError(f"voltage: sample {first + int((~np.isfinite(u)).argmax())} is not finite")
+        for k in self._inner:
+            block, inputs[k] = self.blocks[k], float(x[-1])
+            s = channels.get(block.channel) if isinstance(block, ChannelBlock) else states[k]
+            if k < self._inner[-1]:
+                x, states[k] = block.run(x, s)
+            else:
+                states[k] = block.run_into(x, s, y)
+        if self._inner.stop < len(self.blocks):
+            inputs[-1] = float(y[-1])
+        if not hand_out(y, self._factor_out, RUNAWAY * self.setting.displacement_scale):
             self._tell_divergence(u, state, channels, first)
         time = state.time + u.size * self.setting.sample_period
-        return x, ChainState(tuple(states), tuple(inputs), time)
+        return ChainState(tuple(states), tuple(inputs), time)
 
     def _tell_divergence(self, u: Array, state: ChainState, channels: Channels, first: int) -> None:
         x = u

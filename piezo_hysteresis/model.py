@@ -34,11 +34,16 @@ def samples(values: ArrayLike, name: str) -> Array:
     ModelError
         On another shape, no sample, or a non-finite one.
     """
+    array = _row(values, name)
+    if not are_finite(array):
+        raise ModelError(f"{name}: sample {int((~np.isfinite(array)).argmax())} is not finite")
+    return array
+
+
+def _row(values: ArrayLike, name: str) -> Array:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1 or array.size == 0:
         raise ModelError(f"{name}: got shape {array.shape}, expected one dimension with at least one sample")
-    if not are_finite(array):
-        raise ModelError(f"{name}: sample {int((~np.isfinite(array)).argmax())} is not finite")
     return array
 
 
@@ -193,7 +198,7 @@ class Model:
         DivergenceError
             If the output runs away.
         """
-        return self.at(self.sample_period).run(samples(voltage, "voltage"), state, channels)
+        return self.at(self.sample_period).run(_row(voltage, "voltage"), state, channels)
 
     def simulate(self, records: Record | Iterable[Record]) -> list[Array]:
         """Free-run displacement [m] of every record, each at its own sample period.

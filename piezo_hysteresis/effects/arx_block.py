@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernel import kernel
+from ..kernel import fma, kernel
 from .block import Array, State
 from .linear_block import LinearBlock
 
@@ -38,41 +38,49 @@ def padded(coefficients: Array) -> Array:
 @kernel
 def weigh(x, taps, y):
     """y_i = Σ_k taps_k x_(i + K − k) with K + 1 taps, a multiple of `ORDER`; x (n + K,), y (n,)."""
-    y[:] = 0.0
     for k in range(0, taps.size, 8):
         t0, t1, t2, t3 = taps[k], taps[k + 1], taps[k + 2], taps[k + 3]
         t4, t5, t6, t7 = taps[k + 4], taps[k + 5], taps[k + 6], taps[k + 7]
         past = x[taps.size - 8 - k :]  # indices from zero: a negative one would count from the end, and cost the check
         for i in range(y.size):
-            near = (t0 * past[i + 7] + t1 * past[i + 6]) + (t2 * past[i + 5] + t3 * past[i + 4])
-            far = (t4 * past[i + 3] + t5 * past[i + 2]) + (t6 * past[i + 1] + t7 * past[i])
-            y[i] += near + far
+            total = y[i] if k else 0.0
+            total = fma(t7, past[i], total)
+            total = fma(t6, past[i + 1], total)
+            total = fma(t5, past[i + 2], total)
+            total = fma(t4, past[i + 3], total)
+            total = fma(t3, past[i + 4], total)
+            total = fma(t2, past[i + 5], total)
+            total = fma(t1, past[i + 6], total)
+            y[i] = fma(t0, past[i + 7], total)
 
 
 @kernel
-def recur(a, z, y):
-    """y_i −= Σ_k a_k y_(i − k) in place; z (a.size,) = outputs before, newest first, updated; `ORDER` or more of a."""
+def recur(a, z, x, y0, y):
+    """y_i = y0 + s_i with s_i = x_i − Σ_k a_k s_(i − k); z (a.size,) = s before, newest first, updated.
+
+    a has `ORDER` coefficients or more; x and y may be the same.
+    """
     a1, a2, a3, a4, a5, a6, a7, a8 = a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7]
     y1, y2, y3, y4, y5, y6, y7, y8 = z[0], z[1], z[2], z[3], z[4], z[5], z[6], z[7]
     for i in range(y.size):
-        total = y[i]
+        total = x[i]
         for k in range(a.size - 1, 7, -1):
-            total -= a[k] * z[k]
+            total = fma(-a[k], z[k], total)
         # the newest output comes last: everything else is ready before it
-        total = total - a8 * y8
-        total = total - a7 * y7
-        total = total - a6 * y6
-        total = total - a5 * y5
-        total = total - a4 * y4
-        total = total - a3 * y3
-        total = total - a2 * y2
-        total = total - a1 * y1
+        total = fma(-a8, y8, total)
+        total = fma(-a7, y7, total)
+        total = fma(-a6, y6, total)
+        total = fma(-a5, y5, total)
+        total = fma(-a4, y4, total)
+        total = fma(-a3, y3, total)
+        total = fma(-a2, y2, total)
+        total = fma(-a1, y1, total)
         if a.size > 8:
             for k in range(a.size - 1, 8, -1):
                 z[k] = z[k - 1]
             z[8] = y8
         y8, y7, y6, y5, y4, y3, y2, y1 = y7, y6, y5, y4, y3, y2, y1, total
-        y[i] = total
+        y[i] = y0 + total
     z[0], z[1], z[2], z[3], z[4], z[5], z[6], z[7] = y1, y2, y3, y4, y5, y6, y7, y8
 
 
@@ -80,18 +88,18 @@ def recur(a, z, y):
 def arx_row(x, x0, y0, taps, offset, a, z, y):
     """y (n,) = y0 + x (n,) − x0 through taps delayed by offset and 1/A; z (inputs + a.size,) is updated."""
     inputs = offset + taps.size - 1
-    held = np.empty(inputs + min(TILE, x.size))
+    held, weighted = np.empty(inputs + min(TILE, x.size)), np.empty(min(TILE, x.size))
     held[:inputs] = z[:inputs]
     for start in range(0, x.size, TILE):
         near, out = x[start : start + TILE], y[start : start + TILE]
         n = near.size
         for i in range(n):
             held[inputs + i] = near[i] - x0
-        weigh(held[: inputs + n - offset], taps, out)
+        weigh(held[: inputs + n - offset], taps, weighted[:n])
         if a.size:
-            recur(a, z[inputs:], out)
-        for i in range(n):
-            out[i] += y0
+            recur(a, z[inputs:], weighted[:n], y0, out)
+        else:
+            out[:] = y0 + weighted[:n]
         for i in range(inputs):
             held[i] = held[n + i]
     z[:inputs] = held[:inputs]
@@ -116,8 +124,8 @@ def arx_slopes(x, y, at_rest, taps_slope, first, a, interpolation, na, poles, be
     by_x[:past_x], by_x[past_x:] = before_x, x
     by_y[:na], by_y[na:] = before_y, y
     if a.size:
-        recur(a, poles[0], by_x[past_x:])
-        recur(a, poles[1], by_y[na:])
+        recur(a, poles[0], by_x[past_x:], 0.0, by_x[past_x:])
+        recur(a, poles[1], by_y[na:], 0.0, by_y[na:])
     for j in range(na):
         past, rest = by_y[na - 1 - j :], at_rest[j]
         for i in range(n):
@@ -157,10 +165,13 @@ class ArxBlock(LinearBlock):
         return np.zeros((rows, self.offset + self.taps.size - 1 + self.feedback.size))
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
-        x0, z = state
-        y, z = np.empty_like(x), z.copy()
+        y = np.empty_like(x)
+        return y, self.run_into(x, state, y)
+
+    def run_into(self, x: Array, state: State, y: Array) -> State:
+        x0, z = state[0], state[1].copy()
         arx_row(x, x0, self.gain * x0, self.taps, self.offset, self.feedback, z[0], y)
-        return y, (x0, z)
+        return x0, z
 
     def filter(self, x: Array, z: Array, y: Array) -> Array:
         z, rest = z.copy(), np.zeros(len(x))

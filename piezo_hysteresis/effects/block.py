@@ -48,6 +48,11 @@ class Block(ABC):
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         """Next samples: y of shape (n,), and the state after them."""
 
+    def run_into(self, x: Array, state: State, y: Array) -> State:
+        """`run` with y (n,) filled; to be overridden where writing it there spares a pass over the memory."""
+        y[:], state = self.run(x, state)
+        return state
+
     @abstractmethod
     def rest_tangent(self, x0: float, dx0: Array) -> State:
         """Tangent state at rest, for incoming slopes dx0 of shape (m,)."""

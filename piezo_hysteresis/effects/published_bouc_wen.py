@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernel import kernel
+from ..kernel import fma, kernel
 from ..parameter import Parameter
 from .block import Array, Block, State
 from .bouc_wen import MODIFIED_BOUC_WEN, check_bounded
@@ -48,11 +48,17 @@ class PublishedBoucWen(Effect):
 
 
 @kernel
-def step(h, drive, damp, turn, n):
-    """h of Eq. (7) after drive = A Δv, damp = β|Δv|, turn = γ Δv; for n = 1 little waits for the last h."""
+def step(h, dv, a, beta, gamma, n):
+    """h of Eq. (7) after Δv; for n = 1 little waits for the last h."""
     if n == 1.0:
-        return (h * (1.0 - damp) + drive) - turn * abs(h)
-    return h + (drive - (damp * h + turn * abs(h)) * abs(h) ** (n - 1.0))
+        return fma(-gamma * dv, abs(h), fma(h, fma(-beta, abs(dv), 1.0), a * dv))
+    return h + (a * dv - (beta * abs(dv) * h + gamma * dv * abs(h)) * abs(h) ** (n - 1.0))
+
+
+@kernel
+def output(x, h, p1, p2):
+    """w of Eq. (6)."""
+    return fma(fma(p1 * x, x, p2), x, h)
 
 
 @kernel
@@ -64,9 +70,8 @@ def run_published(v, p, state, w):
         x = v[i]
         dv = x - last
         last = x
-        damp, turn = beta * abs(dv), gamma * dv
-        h = step(h, a * dv, damp, turn, n)
-        w[i] = p1 * x * x * x + p2 * x + h
+        h = step(h, dv, a, beta, gamma, n)
+        w[i] = output(x, h, p1, p2)
     state[0], state[1] = h, last
 
 
@@ -87,8 +92,8 @@ def linearise_plain(v, p, state, tangent, w, dw):
         by_beta = keep * by_beta - abs(dv) * h
         by_gamma = keep * by_gamma - dv * abs(h)
         row_a[i], row_beta[i], row_gamma[i] = by_a, by_beta, by_gamma
-        h = step(h, a * dv, damp, turn, 1.0)
-        w[i] = p1 * x * x * x + p2 * x + h
+        h = step(h, dv, a, beta, gamma, 1.0)
+        w[i] = output(x, h, p1, p2)
     for i in range(v.size):
         row_1[i], row_2[i] = v[i] * v[i] * v[i], v[i]
     state[0], state[1] = h, last
@@ -129,8 +134,8 @@ def linearise_published(v, dv_in, p, state, tangent, last_in, w, dw):
         by_gamma = keep * by_gamma - power * dv * size
         dw[m, i], dw[m + 1, i], dw[m + 2, i] = by_a, by_beta, by_gamma
         dw[m + 3, i], dw[m + 4, i] = x * x * x, x
-        h = step(h, a * dv, damp, turn, n)
-        w[i] = p1 * x * x * x + p2 * x + h
+        h = step(h, dv, a, beta, gamma, n)
+        w[i] = output(x, h, p1, p2)
     state[0], state[1] = h, last
     tangent[m], tangent[m + 1], tangent[m + 2] = by_a, by_beta, by_gamma
 
