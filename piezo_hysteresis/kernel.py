@@ -42,6 +42,6 @@ else:
         double = numba.types.float64
         return double(double, double, double), lambda context, builder, signature, numbers: builder.fma(*numbers)
 
-    @overload(fma)
+    @overload(fma, strict=False)  # annotations count as a difference
     def _fma(x: Any, y: Any, z: Any) -> Any:
         return lambda x, y, z: _rounded_once(x, y, z)
