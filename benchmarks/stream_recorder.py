@@ -1,42 +1,32 @@
-"""`StreamRecorder`: the third process of the streaming benchmark, which sends waveforms and records."""
+"""`StreamRecorder`: the third process of the streaming benchmark, which records."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.task import Future
-from sensor_msgs.msg import PointCloud2
 
+from benchmarks.stream_sender import ENDED
 from piezo_hysteresis.nodes.bag_recorder import BagRecorder
-from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
-from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
+from piezo_hysteresis.nodes.conversions import values_of
+from piezo_hysteresis.nodes.quality import COMMAND_STATUS
 
 PATIENCE = 60.0
 CATCH_UP = 5.0
 """What the model node may be behind at the end [s]; what comes later counts as lost."""
-
-
+_ON_ITS_WAY = 1.0
+"""Time that a waveform takes to the driver at most [s]."""
 _LOOK = 0.05
 """Time between two looks at what is waited for [s]."""
 
 
-@dataclass
-class Command:
-    """A waveform that was played, and the index of its first sample."""
-
-    voltage: np.ndarray
-    first: int
-
-
 class StreamRecorder:
-    """Sends waveforms, and records an axis.
+    """Records an axis, and what became of the waveforms that were sent to it.
 
     Parameters
     ----------
@@ -50,6 +40,13 @@ class StreamRecorder:
         Raises where a node has ended.
     topics : collection of str
         What is recorded.
+
+    Attributes
+    ----------
+    begun : int
+        Waveforms that the driver has begun.
+    played : list of int
+        Index of the first sample of every waveform that was played to its end.
     """
 
     def __init__(
@@ -59,15 +56,19 @@ class StreamRecorder:
         self._node = Node("recorder", namespace=namespace)
         self._executor.add_node(self._node)
         self._never = Future()
-        self._ended: dict[str, dict[str, str]] = {}
-        self._command = self._node.create_publisher(PointCloud2, "command", COMMAND)
+        self.begun, self.played = 0, list[int]()
+        self._failure = ""
         self._node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
         self.bag = BagRecorder(self._node, folder, topics)
 
     def _on_status(self, status: DiagnosticStatus) -> None:
         told = values_of(status)
-        if told["state"] in ("refused", "stopped", "done"):
-            self._ended[status.name] = {**told, "reason": status.message}
+        if told["state"] == "playing":
+            self.begun += 1
+        elif told["state"] == "done":
+            self.played.append(int(told["first_index"]))
+        elif told["state"] in ENDED:
+            self._failure = f"the driver did not play {status.name}: {status.message}"
 
     def wait(self, done: Callable[[], bool], what: str, timeout: float = PATIENCE) -> None:
         """Spin until `done`."""
@@ -76,6 +77,8 @@ class StreamRecorder:
             self._executor.spin_until_future_complete(self._never, timeout_sec=_LOOK)
             if time.monotonic() > end:
                 raise TimeoutError(f"{what}: nothing after {timeout:g} s")
+            if self._failure:
+                raise RuntimeError(self._failure)
             self._check()
 
     def pause(self, duration: float) -> None:
@@ -83,23 +86,17 @@ class StreamRecorder:
         end = time.monotonic() + duration
         self.wait(lambda: time.monotonic() > end, "the end of a pause", duration + PATIENCE)
 
-    def send(self, voltage: np.ndarray, sample_period: float, name: str) -> None:
-        """Have a waveform played; without a stamp, for where no core is free it may be old when it comes."""
-        self.wait(lambda: self._command.get_subscription_count() > 0, "the driver")
-        self._command.publish(command_to_cloud(voltage, sample_period, name))
+    def follow(self, size: int) -> None:
+        """Spin until all has been played and recorded, and the model node had its time to catch up.
 
-    def played(self, voltage: np.ndarray, sample_period: float, name: str) -> Command:
-        """Spin until it has been played to its end."""
-        self.wait(lambda: name in self._ended, f"the end of {name}", voltage.size * sample_period + PATIENCE)
-        told = self._ended[name]
-        if told["state"] != "done":
-            raise RuntimeError(f"the driver did not play {name}: {told['reason']}")
-        return Command(voltage, int(told["first_index"]))
-
-    def follow(self, command: Command) -> None:
-        """Spin until the samples of a command have been recorded and the model node had its time to catch up."""
-        last = (command.first + command.voltage.size - 1) % 2**32
-        self.wait(lambda: self.bag.holds(last), "the last sample")
+        Parameters
+        ----------
+        size : int
+            Samples of a waveform.
+        """
+        self.pause(_ON_ITS_WAY)
+        self.wait(lambda: len(self.played) == self.begun, "the end of the last waveform")
+        self.wait(lambda: self.bag.holds((self.played[-1] + size - 1) % 2**32), "the last sample")
         caught_up, end = self.bag.counts["samples"], time.monotonic() + CATCH_UP
         while self.bag.counts["predicted_samples"] < caught_up and time.monotonic() < end:
             self.pause(0.1)

@@ -1,6 +1,7 @@
 """Streaming over DDS: driver, model node and a recorder as processes of their own; nothing may be lost.
 
-The driver plays sines and slow loops without a pause; this process is the recorder. It writes every topic to a bag, at
+The driver plays sines and slow loops, one after the other, which a fourth process sends; this one is the recorder. It
+writes every topic to a bag, at
 the first rate once more the samples and predictions alone, and counts the samples in it afterwards. Latency counts from
 the last sample of a block to its residual in the recorder's hands. Beside it stands what three processes take that hand
 on as much by rclpy alone.
@@ -31,7 +32,8 @@ from sensor_msgs.msg import PointCloud2
 from benchmarks.figures import Cell, Figures, alone
 from benchmarks.relay import processor_time, relayed
 from benchmarks.simulation import ARX
-from benchmarks.stream_recorder import Command, StreamRecorder
+from benchmarks.stream_recorder import StreamRecorder
+from benchmarks.stream_sender import sender
 from examples.demo.processes import Processes
 from piezo_hysteresis.effects import BoucWen
 from piezo_hysteresis.identification.drive import DriveLimits
@@ -47,7 +49,7 @@ from piezo_hysteresis.recording.bag import Bag
 NODES = ("driver_node", "model_node")
 BLOCKS = ("samples", "predicted_samples")
 LARGE_BLOCKS = Path(__file__).parents[1] / "config" / "large_blocks.xml"
-"""Room for large blocks; and a process that was stopped, or gets no core, is not taken for dead after a second."""
+"""Room for large blocks."""
 LONGEST = 500_000
 """Samples of a command at most."""
 PROMISED = 500e3
@@ -82,6 +84,7 @@ def stream(
     period = 1.0 / rate
     voltage = waveform(rate, min(duration, LONGEST / rate))
     save(Model((BoucWen(), ARX), period, 10.0, 3e-5), folder / "model.yaml")
+    np.save(folder / "waveform.npy", voltage)
     with ExitStack() as stack:
         executor, recorders, ids = make_executor(), list[StreamRecorder](), dict[str, list[int]]()
         stack.callback(executor.shutdown)
@@ -95,24 +98,24 @@ def stream(
             for name in NODES:
                 ids.setdefault(name, []).append(processes.ids[name])
         for recorder in recorders:
-            recorder.wait(lambda bag=recorder.bag: bag.counts["predicted_samples"] > 0, "the first prediction")
-        recorders[0].pause(2.0)
+            for name in BLOCKS:
+                recorder.wait(lambda bag=recorder.bag, name=name: bag.counts[name] > 0, f"the first {name}")
+        ends = []
+        for axis, recorder in enumerate(recorders):
+            ends.append(stack.enter_context(sender(f"/bench_{axis}", period, folder / "waveform.npy")))
+            recorder.wait(lambda one=recorder: one.begun > 0, "the first waveform")
         begin, own = time.monotonic(), time.process_time()
         spent = {name: sum(map(processor_time, ids[name])) for name in NODES}
-        commands: list[list[Command]] = [[] for _ in recorders]
-        while time.monotonic() < begin + duration:
-            name = f"stream_{len(commands[0])}"
-            for recorder in recorders:
-                recorder.send(voltage, period, name)
-            for recorder, played in zip(recorders, commands, strict=True):
-                played.append(recorder.played(voltage, period, name))
+        recorders[0].pause(duration)
         elapsed = time.monotonic() - begin
         shares = [100 * (sum(map(processor_time, ids[name])) - spent[name]) / elapsed for name in NODES]
         shares.append(100 * (time.process_time() - own) / elapsed)
-        for recorder, played in zip(recorders, commands, strict=True):
-            recorder.follow(played[-1])
+        for end in ends:
+            end()
+        for recorder in recorders:
+            recorder.follow(voltage.size)
         sizes = [*(max(map(memory, ids[name])) for name in NODES), memory(os.getpid())]
-    counted = [count(folder / f"bag_{axis}", commands[axis], f"/bench_{axis}") for axis in range(axes)]
+    counted = [count(folder / f"bag_{k}", voltage, one.played, f"/bench_{k}") for k, one in enumerate(recorders)]
     figures = {name: _over_axes(name, [one[name] for one, _ in counted]) for name in counted[0][0]}
     names = ("driver", "model node", "recorder")
     figures = {
@@ -134,9 +137,9 @@ def _over_axes(name: str, values: list[Cell]) -> Cell:
     return max(numbers) if name.startswith("latency") else sum(numbers)
 
 
-def count(bag: Path, commands: list[Command], namespace: str) -> tuple[dict[str, Cell], list[str]]:
-    """Samples sent, received and predicted, latencies, and what is wrong with them."""
-    first, last = commands[0].first, commands[-1].first + commands[-1].voltage.size - 1
+def count(bag: Path, voltage: np.ndarray, firsts: list[int], namespace: str) -> tuple[dict[str, Cell], list[str]]:
+    """Samples sent, received and predicted, latencies, and what is wrong with them; `firsts` of every waveform."""
+    first, last = firsts[0], firsts[-1] + voltage.size - 1
     sent = (last - first) % 2**32 + 1
     topics = {f"{namespace}/{name}": name for name in BLOCKS}
     places: dict[str, list[np.ndarray]] = {name: [] for name in topics.values()}
@@ -159,10 +162,10 @@ def count(bag: Path, commands: list[Command], namespace: str) -> tuple[dict[str,
         if unique < sent or numbers.size > unique:
             failures.append(f"{name}: {sent - unique} lost, {numbers.size - unique} doubled")
     at, played = np.concatenate(places["samples"]), np.concatenate(voltages)
-    for k, command in enumerate(commands):
-        own = (at - (command.first - first)) % 2**32
-        inside = own < command.voltage.size
-        other = int((np.abs(played[inside] - command.voltage[own[inside]]) > 1.001 * STEP).sum())
+    for k, begin in enumerate(firsts):
+        own = (at - (begin - first)) % 2**32
+        inside = own < voltage.size
+        other = int((np.abs(played[inside] - voltage[own[inside]]) > 1.001 * STEP).sum())
         if other:
             failures.append(f"command {k}: {other} samples further from the command than a converter step")
     middle, late, latest = np.percentile(latencies, (50, 99, 100)).tolist()

@@ -1,0 +1,80 @@
+"""The process that has a waveform played over and over while a stream is recorded.
+
+Packing and sending megabytes would keep a recorder from the blocks that come meanwhile.
+
+    scripts/run python -m benchmarks.stream_sender /stage_x 2e-5 waveform.npy
+"""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.task import Future
+from sensor_msgs.msg import PointCloud2
+
+from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
+from piezo_hysteresis.nodes.executor import make_executor, spin_until
+from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
+from piezo_hysteresis.nodes.sending import is_heard, send
+
+ENDED = ("done", "stopped", "refused")
+_LOOK = 0.05
+"""Time between two looks for the driver [s]."""
+
+
+@contextmanager
+def sender(namespace: str, sample_period: float, waveform: Path) -> Iterator[Callable[[], None]]:
+    """Have the waveform of a file played until the function that is given is called, which does not wait."""
+    command = [sys.executable, "-m", __name__, namespace, repr(sample_period), str(waveform)]
+    process = subprocess.Popen(command)
+    try:
+        yield process.terminate
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def main(namespace: str, sample_period: float, waveform: Path) -> None:
+    """Send it whenever the one before has ended; until a signal comes, or one is not played to its end.
+
+    Without a stamp, for where no core is free it may be old when it comes.
+    """
+    cloud = command_to_cloud(np.load(waveform), sample_period, "")
+    rclpy.init()
+    node, executor = Node("sender", namespace=namespace), make_executor()
+    publisher = node.create_publisher(PointCloud2, "command", COMMAND)
+    states: dict[str, Future[str]] = {}
+
+    def take(status: DiagnosticStatus) -> None:
+        state = values_of(status)["state"]
+        if state in ENDED and status.name in states:
+            states.pop(status.name).set_result(state)
+
+    node.create_subscription(DiagnosticStatus, "command_status", take, COMMAND_STATUS)
+    executor.add_node(node)
+    with suppress(ExternalShutdownException):
+        while not is_heard(publisher):
+            executor.spin_until_future_complete(Future(), timeout_sec=_LOOK)
+        state = "done"
+        for name in map("stream_{}".format, itertools.count()):
+            if state != "done":
+                break
+            cloud.header.frame_id = name
+            ended = states[name] = Future()
+            send(publisher, cloud)
+            spin_until(executor, ended)
+            state = ended.result()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], float(sys.argv[2]), Path(sys.argv[3]))
