@@ -25,8 +25,9 @@ from sensor_msgs.msg import PointCloud2
 from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.executor import make_executor, spin_until
 from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
-from piezo_hysteresis.nodes.sending import is_heard, send
+from piezo_hysteresis.nodes.sending import send
 
+DRIVER = "driver_node"
 ENDED = ("done", "stopped", "refused")
 _LOOK = 0.05
 """Time between two looks for the driver [s]."""
@@ -62,8 +63,14 @@ def main(namespace: str, sample_period: float, waveform: Path) -> None:
 
     node.create_subscription(DiagnosticStatus, "command_status", take, COMMAND_STATUS)
     executor.add_node(node)
+
+    def is_known() -> bool:
+        """Whether the driver takes commands; a recorder that was found before it does too."""
+        takers = node.get_subscriptions_info_by_topic(publisher.topic_name)
+        return DRIVER in {taker.node_name for taker in takers} and len(takers) == publisher.get_subscription_count()
+
     with suppress(ExternalShutdownException):
-        while not is_heard(publisher):
+        while not is_known():
             executor.spin_until_future_complete(Future(), timeout_sec=_LOOK)
         state = "done"
         for name in map("stream_{}".format, itertools.count()):

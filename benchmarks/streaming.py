@@ -104,10 +104,11 @@ def stream(
         for axis, recorder in enumerate(recorders):
             ends.append(stack.enter_context(sender(f"/bench_{axis}", period, folder / "waveform.npy")))
             recorder.wait(lambda one=recorder: one.begun > 0, "the first waveform")
-        begin, own = time.monotonic(), time.process_time()
+        begin, own, span = time.monotonic(), time.process_time(), [time.time_ns()]
         spent = {name: sum(map(processor_time, ids[name])) for name in NODES}
         recorders[0].pause(duration)
         elapsed = time.monotonic() - begin
+        span.append(time.time_ns())
         shares = [100 * (sum(map(processor_time, ids[name])) - spent[name]) / elapsed for name in NODES]
         shares.append(100 * (time.process_time() - own) / elapsed)
         for end in ends:
@@ -115,7 +116,7 @@ def stream(
         for recorder in recorders:
             recorder.follow(voltage.size)
         sizes = [*(max(map(memory, ids[name])) for name in NODES), memory(os.getpid())]
-    counted = [count(folder / f"bag_{k}", voltage, one.played, f"/bench_{k}") for k, one in enumerate(recorders)]
+    counted = [count(folder / f"bag_{k}", voltage, one.played, f"/bench_{k}", span) for k, one in enumerate(recorders)]
     figures = {name: _over_axes(name, [one[name] for one, _ in counted]) for name in counted[0][0]}
     names = ("driver", "model node", "recorder")
     figures = {
@@ -137,8 +138,13 @@ def _over_axes(name: str, values: list[Cell]) -> Cell:
     return max(numbers) if name.startswith("latency") else sum(numbers)
 
 
-def count(bag: Path, voltage: np.ndarray, firsts: list[int], namespace: str) -> tuple[dict[str, Cell], list[str]]:
-    """Samples sent, received and predicted, latencies, and what is wrong with them; `firsts` of every waveform."""
+def count(
+    bag: Path, voltage: np.ndarray, firsts: list[int], namespace: str, span: list[int]
+) -> tuple[dict[str, Cell], list[str]]:
+    """Samples sent, received and predicted, latencies, and what is wrong with them.
+
+    `firsts` are the first samples of the waveforms; latencies are those of the time `span` [ns].
+    """
     first, last = firsts[0], firsts[-1] + voltage.size - 1
     sent = (last - first) % 2**32 + 1
     topics = {f"{namespace}/{name}": name for name in BLOCKS}
@@ -152,7 +158,7 @@ def count(bag: Path, voltage: np.ndarray, firsts: list[int], namespace: str) -> 
         places[topics[message.topic]].append(place[inside])
         if "voltage" in columns:
             voltages.append(columns["voltage"][inside])
-        elif inside.all():
+        elif span[0] <= message.time_ns <= span[1]:
             latencies.append((message.time_ns - from_stamp(cloud.header.stamp)) * 1e-6 - 1e3 * columns["time"][-1])
     failures, received = [], []
     for name, found in places.items():
