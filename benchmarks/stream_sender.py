@@ -72,15 +72,13 @@ def main(namespace: str, sample_period: float, waveform: Path) -> None:
     with suppress(ExternalShutdownException):
         while not is_known():
             executor.spin_until_future_complete(Future(), timeout_sec=_LOOK)
-        state = "done"
         for name in map("stream_{}".format, itertools.count()):
-            if state != "done":
-                break
             cloud.header.frame_id = name
             ended = states[name] = Future()
             send(publisher, cloud)
             spin_until(executor, ended)
-            state = ended.result()
+            if ended.result() != "done":
+                break
 
 
 if __name__ == "__main__":

@@ -1,10 +1,9 @@
 """Streaming over DDS: driver, model node and a recorder as processes of their own; nothing may be lost.
 
 The driver plays sines and slow loops, one after the other, which a fourth process sends; this one is the recorder. It
-writes every topic to a bag, at
-the first rate once more the samples and predictions alone, and counts the samples in it afterwards. Latency counts from
-the last sample of a block to its residual in the recorder's hands. Beside it stands what three processes take that hand
-on as much by rclpy alone.
+writes every topic to a bag, at the first rate once more the samples and predictions alone, and counts the samples in it
+afterwards. Latency counts from the last sample of a block to its residual in the recorder's hands. Beside it stands
+what three processes take that hand on as much by rclpy alone.
 
 The exit code is 1 where a sample is missing, doubled, or was played at another voltage than was commanded, up to
 500 kHz; beyond, the highest rate is sought that loses nothing. All processes take `config/large_blocks.xml`.

@@ -34,10 +34,11 @@ class CommandSender:
         self._thread: threading.Thread | None = None
         self._called_off = threading.Event()
 
-    @property
-    def subscribers(self) -> int:
-        """Matched subscribers of `command`."""
-        return int(self._publisher.get_subscription_count())
+    def reaches(self, driver: str) -> bool:
+        """Whether the node `driver` of this namespace takes what is sent; a recorder alone plays nothing."""
+        takers = self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
+        wanted = (driver, self._node.get_namespace())
+        return wanted in {(taker.node_name, taker.node_namespace) for taker in takers}
 
     def send(self, phase: Phase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
         """Send a phase, stamped when it is packed and leaves: its age shall be that of its way.

@@ -67,8 +67,8 @@ class DriverLink:
         """What is still missing before a phase can be sent; empty when nothing is."""
         if self.limits is None:
             return f"a configured '{self._driver}' in {self._node.get_namespace()}"
-        if self._command.subscribers == 0:
-            return "a subscriber of 'command'"
+        if not self._command.reaches(self._driver):
+            return f"a subscription of '{self._driver}' to 'command'"
         if self._newest is None:
             return "a first 'voltage'; is the driver active?"
         return ""

@@ -5,8 +5,10 @@ import time
 
 import numpy as np
 import pytest
+from sensor_msgs.msg import PointCloud2
 
 from piezo_hysteresis.identification.protocol import Phase
+from piezo_hysteresis.nodes.command_sender import CommandSender
 from piezo_hysteresis.nodes.driver_link import DriverLink
 
 pytestmark = pytest.mark.nodes
@@ -79,3 +81,11 @@ def test_what_is_called_off_while_it_is_packed_never_leaves(shared_lab, link):
 
     lab.wait(played, "the next command")
     assert lab.states(statuses, "called_off") == []
+
+
+def test_only_the_driver_counts_a_recorder_plays_nothing(shared_lab, link):
+    lab = shared_lab
+    sender = CommandSender(lab.second_node("sender"))
+    lab.second_node("recorder").create_subscription(PointCloud2, "command", lambda cloud: None, 10)
+    lab.wait(lambda: sender.reaches("recorder") and sender.reaches("driver_node"), "both")
+    assert not sender.reaches("other_driver")
