@@ -25,7 +25,7 @@ from sensor_msgs.msg import PointCloud2
 from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.executor import make_executor, spin_until
 from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
-from piezo_hysteresis.nodes.sending import send
+from piezo_hysteresis.nodes.sending import is_taken_by, send
 
 DRIVER = "driver_node"
 ENDED = ("done", "stopped", "refused")
@@ -66,8 +66,8 @@ def main(namespace: str, sample_period: float, waveform: Path) -> None:
 
     def is_known() -> bool:
         """Whether the driver takes commands; a recorder that was found before it does too."""
-        takers = node.get_subscriptions_info_by_topic(publisher.topic_name)
-        return DRIVER in {taker.node_name for taker in takers} and len(takers) == publisher.get_subscription_count()
+        everybody = publisher.get_subscription_count() == node.count_subscribers("command")
+        return everybody and is_taken_by(DRIVER, node, publisher)
 
     with suppress(ExternalShutdownException):
         while not is_known():

@@ -13,7 +13,7 @@ from sensor_msgs.msg import PointCloud2
 from ..identification.protocol import Phase
 from .conversions import command_to_cloud
 from .quality import COMMAND
-from .sending import send
+from .sending import is_taken_by, send
 
 _LONGEST_WAY = 2.0
 """Wait for a waveform that is on its way when it is called off [s]."""
@@ -36,9 +36,7 @@ class CommandSender:
 
     def reaches(self, driver: str) -> bool:
         """Whether the node `driver` of this namespace takes what is sent; a recorder alone plays nothing."""
-        takers = self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
-        wanted = (driver, self._node.get_namespace())
-        return wanted in {(taker.node_name, taker.node_namespace) for taker in takers}
+        return is_taken_by(driver, self._node, self._publisher)
 
     def send(self, phase: Phase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
         """Send a phase, stamped when it is packed and leaves: its age shall be that of its way.

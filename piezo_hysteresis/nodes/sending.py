@@ -1,6 +1,7 @@
 """`send`: publish so that a middleware that is short of time costs a message at worst, never the node.
 
-`is_heard` spares the making of messages that nobody takes.
+`is_heard` spares the making of messages that nobody takes, `is_taken_by` the sending of those that the one who has to
+act on them would miss.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 ATTEMPTS = 5
@@ -28,3 +30,9 @@ def send(publisher: Publisher, message: Any) -> bool:
 def is_heard(publisher: Publisher) -> bool:
     """Whether anybody is there to take what a publisher sends."""
     return bool(publisher.get_subscription_count())
+
+
+def is_taken_by(taker: str, node: Node, publisher: Publisher) -> bool:
+    """Whether the node `taker` of the namespace of `node` subscribes to what its publisher sends."""
+    takers = node.get_subscriptions_info_by_topic(publisher.topic_name)
+    return (taker, node.get_namespace()) in {(one.node_name, one.node_namespace) for one in takers}
