@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .change_of_unit import ChangeOfUnit, hand_out, take_in
 from .effects import Effect, Place, Setting
-from .effects.block import Block, MemorylessBlock, State, SumBlock
+from .effects.block import Block, State, SumBlock
 from .effects.channel_block import ChannelBlock
-from .errors import DivergenceError, ModelError
-from .kernel import kernel
+from .errors import DivergenceError
+from .finite import not_finite
 
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
@@ -26,44 +27,6 @@ RUNAWAY = 1e9
 
 BLOCK = 32768
 """Samples that go through the whole chain together, so that they stay in the cache of the processor."""
-
-
-@kernel
-def take_in(x: Array, factor: float, y: Array) -> bool:
-    """y (n,) = factor · x (n,); whether every x_i is finite."""
-    outside = 0
-    for i in range(x.size):
-        y[i] = factor * x[i]
-        outside |= not abs(x[i]) < np.inf
-    return outside == 0
-
-
-@kernel
-def hand_out(y: Array, factor: float, limit: float) -> bool:
-    """y (n,) times `factor` in place; whether every |y_i| is below `limit` then, which not a number is not."""
-    outside = 0
-    for i in range(y.size):
-        y[i] *= factor
-        outside |= not abs(y[i]) < limit
-    return outside == 0
-
-
-class _Scale(MemorylessBlock):
-    def __init__(self, factor: float) -> None:
-        self.factor = factor
-
-    def value(self, x: Array) -> Array:
-        return x * self.factor
-
-    def slope(self, x: Array) -> Array:
-        return np.full(x.size, self.factor)
-
-    def by_parameter(self, x: Array) -> Array:
-        return np.empty((0, x.size))
-
-    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        dx *= self.factor
-        return x * self.factor, dx, None, None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,12 +74,12 @@ class Chain:
             hysteresis = [(hysteresis[0][0], SumBlock(tuple(b for _, b in hysteresis)))]
         parts = [
             *blocks(Place.DRIVE),
-            ("voltage_scale", _Scale(1.0 / setting.voltage_scale)),
+            ("voltage_scale", ChangeOfUnit(1.0 / setting.voltage_scale)),
             *hysteresis,
             *blocks(Place.MATERIAL),
             *blocks(Place.DYNAMICS),
             *blocks(Place.SENSOR),
-            ("displacement_scale", _Scale(setting.displacement_scale)),
+            ("displacement_scale", ChangeOfUnit(setting.displacement_scale)),
             *blocks(Place.ENVIRONMENT),
         ]
         self.labels = tuple(label for label, _ in parts)
@@ -125,8 +88,8 @@ class Chain:
         """Names of the extra channels that are used."""
         first, last = self.blocks[0], self.blocks[-1]
         # changes of unit at the ends are made where samples are taken in and handed out
-        self._factor_in, begin = (first.factor, 1) if isinstance(first, _Scale) else (1.0, 0)
-        self._factor_out, end = (last.factor, -1) if isinstance(last, _Scale) else (1.0, None)
+        self._factor_in, begin = (first.factor, 1) if isinstance(first, ChangeOfUnit) else (1.0, 0)
+        self._factor_out, end = (last.factor, -1) if isinstance(last, ChangeOfUnit) else (1.0, None)
         self._inner = range(len(self.blocks))[begin:end]
 
     def rest(self, voltage: float, time: float = 0.0) -> ChainState:
@@ -200,7 +163,7 @@ class Chain:
         states, inputs = list(state.blocks), [float(u[-1])] * len(self.blocks)
         x = np.empty(u.size) if self._inner else y
         if not take_in(u, self._factor_in, x):
-            raise ModelError(f"voltage: sample {first + int((~np.isfinite(u)).argmax())} is not finite")
+            raise not_finite("voltage", u, first)
         for k in self._inner:
             block, inputs[k] = self.blocks[k], float(x[-1])
             s = channels.get(block.channel) if isinstance(block, ChannelBlock) else states[k]

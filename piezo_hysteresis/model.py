@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from .chain import Chain, ChainState, ChainTangent, Channels
 from .effects import CHAIN, Effect, Offset, Setting
 from .errors import ModelError
+from .finite import row
 from .parameter import Parameter, Value
-from .record import Record, are_finite
+from .record import Record
 
 Array = NDArray[np.float64]
 
@@ -24,27 +25,6 @@ HOLD_STEPS = 8
 
 def _place(effect: Effect) -> tuple[int, int]:
     return int(effect.place), CHAIN.index(type(effect)) if type(effect) in CHAIN else len(CHAIN)
-
-
-def samples(values: ArrayLike, name: str) -> Array:
-    """As float64, finite, shape (n,); not a copy where the values are that already.
-
-    Raises
-    ------
-    ModelError
-        On another shape, no sample, or a non-finite one.
-    """
-    array = _row(values, name)
-    if not are_finite(array):
-        raise ModelError(f"{name}: sample {int((~np.isfinite(array)).argmax())} is not finite")
-    return array
-
-
-def _row(values: ArrayLike, name: str) -> Array:
-    array = np.asarray(values, dtype=np.float64)
-    if array.ndim != 1 or array.size == 0:
-        raise ModelError(f"{name}: got shape {array.shape}, expected one dimension with at least one sample")
-    return array
 
 
 def channels_of(record: Record) -> Channels:
@@ -198,7 +178,7 @@ class Model:
         DivergenceError
             If the output runs away.
         """
-        return self.at(self.sample_period).run(_row(voltage, "voltage"), state, channels)
+        return self.at(self.sample_period).run(row(voltage, "voltage"), state, channels)
 
     def simulate(self, records: Record | Iterable[Record]) -> list[Array]:
         """Free-run displacement [m] of every record, each at its own sample period.

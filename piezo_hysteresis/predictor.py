@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from .chain import Chain, ChainState
 from .continuity import LONGEST_SILENCE, Continuity
 from .errors import DivergenceError, RecordError
-from .model import Model, samples
+from .finite import samples
+from .model import Model
 from .running_rms import RunningRms
 from .sensor_zero import SensorZero
 from .voltage_history import FULL_SAMPLES, VoltageHistory, is_held
