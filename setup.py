@@ -42,9 +42,9 @@ setup(
     zip_safe=True,
     entry_points={
         "console_scripts": [
-            f"driver_node = {NAME}.nodes.driver_node:main",
-            f"model_node = {NAME}.nodes.model_node:main",
-            f"identification_node = {NAME}.nodes.identification_node:main",
+            f"driver_node = {NAME}.nodes.driver.driver_node:main",
+            f"model_node = {NAME}.nodes.model.model_node:main",
+            f"identification_node = {NAME}.nodes.identification.identification_node:main",
             f"piezo = {NAME}.cli.main:main",
         ]
     },

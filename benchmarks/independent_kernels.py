@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from piezo_hysteresis.kernel import kernel
+from piezo_hysteresis.blocks.kernel import kernel
 
 
 @kernel

@@ -19,11 +19,11 @@ from scipy.signal import lfilter
 from benchmarks.c_loops import CLoops, compiler
 from benchmarks.figures import Cell, Figures, alone, seconds
 from benchmarks.simulation import ARX, PERIOD, measure, record
-from piezo_hysteresis.chain import BLOCK
+from piezo_hysteresis.blocks.arx import ArxBlock, arx_row
 from piezo_hysteresis.effects import BoucWen, Effect, PublishedBoucWen
-from piezo_hysteresis.effects.arx_block import ArxBlock, arx_row
-from piezo_hysteresis.effects.published_bouc_wen import run_published
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.effects.hysteresis.published_bouc_wen import run_published
+from piezo_hysteresis.model.chain import BLOCK
+from piezo_hysteresis.model.model import Model
 
 FLAGS = (("-O3",), ("-O3", "-march=native"))
 LOOP = PublishedBoucWen()

@@ -19,8 +19,9 @@ from benchmarks import published_plant as plant
 from benchmarks import recovery
 from benchmarks.figures import Cell, Figures
 from piezo_hysteresis.effects import PublishedBoucWen
-from piezo_hysteresis.identification import identify, three_steps
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification import identify
+from piezo_hysteresis.identification.steps import three_steps
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
 INPUT_LAGS, OUTPUT_LAGS = [2, 3, 4, 5, 6], [1, 2, 3]

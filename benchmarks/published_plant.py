@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from piezo_hysteresis.kernel import kernel
+from piezo_hysteresis.blocks.kernel import kernel
 
 SAMPLE_PERIOD = 2e-5
 DELAY = 3

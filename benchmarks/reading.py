@@ -20,7 +20,7 @@ from rich.console import Console
 from benchmarks.figures import Figures, show
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import write
-from piezo_hysteresis.recording.intake import ENOUGH
+from piezo_hysteresis.recording.segmentation.decimating_buffer import ENOUGH
 
 PERIOD = 1e-4
 _READER = """

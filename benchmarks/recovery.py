@@ -18,10 +18,10 @@ import numpy as np
 from benchmarks import published_plant as plant
 from benchmarks.figures import Cell, Figures, alone
 from piezo_hysteresis.effects import Arx, PublishedBoucWen
-from piezo_hysteresis.identification import excitation, protocol
-from piezo_hysteresis.identification.drive import DriveLimits
 from piezo_hysteresis.identification.identify import identify
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.protocol import excitation, protocol
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
 METRE = 1e-5

@@ -26,12 +26,12 @@ from rclpy.publisher import Publisher
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 
-from piezo_hysteresis.nodes.cloud_stream import CloudWriter
-from piezo_hysteresis.nodes.conversions import to_stamp
-from piezo_hysteresis.nodes.executor import make_executor, spin_until
-from piezo_hysteresis.nodes.quality import DEEP, SAMPLES
-from piezo_hysteresis.nodes.sample_block import SAMPLES as LAYOUT
-from piezo_hysteresis.nodes.sending import send
+from piezo_hysteresis.nodes.messages.cloud_stream import CloudWriter
+from piezo_hysteresis.nodes.messages.conversions import to_stamp
+from piezo_hysteresis.nodes.messages.samples import SAMPLES as LAYOUT
+from piezo_hysteresis.nodes.runtime.executor import make_executor, spin_until
+from piezo_hysteresis.nodes.runtime.qos import DEEP, SAMPLES
+from piezo_hysteresis.nodes.runtime.sending import send
 
 BLOCK = 0.01
 """Time that a block covers, as that of the driver [s]."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.figures import Cell, Figures, alone, seconds
 from piezo_hysteresis.effects import CATALOGUE, Arx, BoucWen, Effect
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 ARX = Arx(

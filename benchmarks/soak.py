@@ -31,8 +31,8 @@ from benchmarks.soak_keeper import BEFORE, LOST, Keeper
 from benchmarks.soak_processes import Soaked
 from benchmarks.stage_log import STEP, StageLog
 from benchmarks.streaming import LARGE_BLOCKS
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import dumps, load
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import dumps, load
 
 ROOT = Path(__file__).parent.parent
 MODEL = ROOT / "config" / "published_stage.yaml"

@@ -21,8 +21,8 @@ from std_srvs.srv import Trigger
 
 from benchmarks.soak_keeper import Keeper
 from benchmarks.soak_processes import NAMESPACE, Soaked
-from piezo_hysteresis.nodes.conversions import command_to_cloud
-from piezo_hysteresis.nodes.quality import COMMAND, LATCHED
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud
+from piezo_hysteresis.nodes.runtime.qos import COMMAND, LATCHED
 
 RELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 

@@ -19,10 +19,10 @@ from sensor_msgs.msg import PointCloud2
 
 from benchmarks.soak_processes import NAMESPACE
 from piezo_hysteresis.errors import PiezoError
-from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
-from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
-from piezo_hysteresis.nodes.sample_block import PREDICTED_SAMPLES, SampleBlock, samples_from_cloud
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
+from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, SampleBlock, samples_from_cloud
+from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS
 from piezo_hysteresis.recording import Bag
 
 LOST = "samples lost on the way to the keeper, told by the index"

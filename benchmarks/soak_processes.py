@@ -32,7 +32,7 @@ class Soaked:
         module = [sys.executable, "-m"]
         self._programs = {
             "driver_node": log.driver,
-            "model_node": [*module, "piezo_hysteresis.nodes.model_node"],
+            "model_node": [*module, "piezo_hysteresis.nodes.model.model_node"],
             "recorder": [*module, "benchmarks.soak_recorder"],
         }
         self._running: dict[str, subprocess.Popen[bytes]] = {}

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from rclpy.node import Node
 
-from piezo_hysteresis.nodes.bag_recorder import BagRecorder
-from piezo_hysteresis.nodes.process import run
+from piezo_hysteresis.nodes.identification.bag_recorder import BagRecorder
+from piezo_hysteresis.nodes.runtime.process import run
 
 
 class Recorder(Node):

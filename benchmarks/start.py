@@ -31,16 +31,16 @@ from benchmarks.simulation import ARX, PERIOD
 from benchmarks.streaming import LARGE_BLOCKS
 from examples.demo.processes import Processes
 from piezo_hysteresis.effects import BoucWen
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import save
-from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import from_stamp
-from piezo_hysteresis.nodes.quality import SAMPLES
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import save
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.conversions import from_stamp
+from piezo_hysteresis.nodes.runtime.qos import SAMPLES
 
 NAMESPACE = "/start"
 PATIENCE = 60.0
 T = TypeVar("T")
-IMPORTS = ("numpy", "piezo_hysteresis", "piezo_hysteresis.nodes.model_node")
+IMPORTS = ("numpy", "piezo_hysteresis", "piezo_hysteresis.nodes.model.model_node")
 
 
 def import_time(module: str) -> float:

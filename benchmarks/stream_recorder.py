@@ -12,9 +12,9 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from benchmarks.stream_sender import ENDED
-from piezo_hysteresis.nodes.bag_recorder import BagRecorder
-from piezo_hysteresis.nodes.conversions import values_of
-from piezo_hysteresis.nodes.quality import COMMAND_STATUS
+from piezo_hysteresis.nodes.identification.bag_recorder import BagRecorder
+from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.runtime.qos import COMMAND_STATUS
 
 PATIENCE = 60.0
 CATCH_UP = 5.0

@@ -22,10 +22,10 @@ from rclpy.node import Node
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 
-from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
-from piezo_hysteresis.nodes.executor import make_executor, spin_until
-from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS
-from piezo_hysteresis.nodes.sending import is_taken_by, send
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
+from piezo_hysteresis.nodes.runtime.executor import make_executor, spin_until
+from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS
+from piezo_hysteresis.nodes.runtime.sending import is_taken_by, send
 
 DRIVER = "driver_node"
 ENDED = ("done", "stopped", "refused")

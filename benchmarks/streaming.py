@@ -35,15 +35,15 @@ from benchmarks.stream_recorder import StreamRecorder
 from benchmarks.stream_sender import sender
 from examples.demo.processes import Processes
 from piezo_hysteresis.effects import BoucWen
-from piezo_hysteresis.identification.drive import DriveLimits
-from piezo_hysteresis.identification.excitation import sine, triangle
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import save
-from piezo_hysteresis.nodes.bag_recorder import TOPICS
-from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import from_stamp
-from piezo_hysteresis.nodes.executor import make_executor
-from piezo_hysteresis.recording.bag import Bag
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.protocol.excitation import sine, triangle
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import save
+from piezo_hysteresis.nodes.identification.bag_recorder import TOPICS
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.conversions import from_stamp
+from piezo_hysteresis.nodes.runtime.executor import make_executor
+from piezo_hysteresis.recording.bag.bag import Bag
 
 NODES = ("driver_node", "model_node")
 BLOCKS = ("samples", "predicted_samples")

@@ -34,7 +34,7 @@ from piezo_hysteresis.effects import (
     Softening,
 )
 from piezo_hysteresis.errors import DivergenceError
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 FREQUENCIES = (1, 50, 100, 200, 300, 400)

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from piezo_hysteresis.nodes import back_ends, driver_node
+from piezo_hysteresis.acquisition import back_ends
+from piezo_hysteresis.nodes.driver import driver_node
 
 SIMULATED = back_ends.BACK_ENDS["simulated"]
 

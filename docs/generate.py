@@ -15,12 +15,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
+from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
+from piezo_hysteresis.acquisition.settings import DRIVER, IN_FORCE
 from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
-from piezo_hysteresis.nodes.back_ends import BACK_ENDS
-from piezo_hysteresis.nodes.driver_settings import DRIVER, IN_FORCE
-from piezo_hysteresis.nodes.identification_node import IDENTIFICATION
-from piezo_hysteresis.nodes.model_node import MODEL
-from piezo_hysteresis.nodes.parameters import Row, Setting
+from piezo_hysteresis.nodes.identification.identification_node import IDENTIFICATION
+from piezo_hysteresis.nodes.model.model_node import MODEL
+from piezo_hysteresis.nodes.runtime.parameters import Row, Setting
 from piezo_hysteresis.parameter import Parameter
 from piezo_hysteresis.stage.plant import PlantParameters
 

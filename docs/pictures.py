@@ -15,9 +15,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from piezo_hysteresis.identification.drive import DriveLimits
-from piezo_hysteresis.identification.excitation import hold, sine, steps, triangle
-from piezo_hysteresis.report.style import BLACK, BLUE, GREEN, ORANGE, SETTINGS, canvas
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.protocol.excitation import hold, sine, steps, triangle
+from piezo_hysteresis.report.figures.style import BLACK, BLUE, GREEN, ORANGE, SETTINGS, canvas
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 

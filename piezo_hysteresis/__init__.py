@@ -32,22 +32,22 @@ from .errors import PiezoError
 if TYPE_CHECKING:
     from .discrepancy import diagnose
     from .identification import identify
-    from .model import Model
-    from .model_file import load, save
-    from .predictor import Predictor
+    from .model.model import Model
+    from .model.model_file import load, save
+    from .online.predictor import Predictor
     from .record import Experiment, Record
     from .recording import read
 
 _ROOMS = {
     "Experiment": "record",
-    "Model": "model",
-    "Predictor": "predictor",
+    "Model": "model.model",
+    "Predictor": "online.predictor",
     "Record": "record",
     "diagnose": "discrepancy",
     "identify": "identification",
-    "load": "model_file",
+    "load": "model.model_file",
     "read": "recording",
-    "save": "model_file",
+    "save": "model.model_file",
 }
 
 __all__ = [

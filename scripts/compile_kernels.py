@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from piezo_hysteresis.effects import BASELINE, CATALOGUE, Arx, BoucWen, Offset, PublishedBoucWen
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 from piezo_hysteresis.stage.simulated import SimulatedStage
 

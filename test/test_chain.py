@@ -31,7 +31,7 @@ from piezo_hysteresis.effects import (
     ThermalDrift,
 )
 from piezo_hysteresis.errors import DivergenceError
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 PERIOD = 1e-4

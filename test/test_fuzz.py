@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from piezo_hysteresis.cli.plant_option import _read as read_plant
 from piezo_hysteresis.effects import CHAIN
 from piezo_hysteresis.errors import PiezoError
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import dumps, load, loads
-from piezo_hysteresis.parameter_file import LONGEST_TEXT
-from piezo_hysteresis.predictor import Predictor
-from piezo_hysteresis.recording.decimation import FILE, load_decimation
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import dumps, load, loads
+from piezo_hysteresis.model.parameter_file import LONGEST_TEXT
+from piezo_hysteresis.online.predictor import Predictor
+from piezo_hysteresis.recording.segmentation.decimation import FILE, load_decimation
 from piezo_hysteresis.report.json_file import read_json
 
 ALL = Model(tuple(kind() for kind in CHAIN if kind.host is None), 2e-5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from piezo_hysteresis.kernel import fma, kernel
+from piezo_hysteresis.blocks.kernel import fma, kernel
 
 EPSILON = 2.0**-30
 

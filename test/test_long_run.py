@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.continuity import Continuity
+from piezo_hysteresis.acquisition.time_base import TimeBase
 from piezo_hysteresis.effects import Arx, BoucWen, MainsHum, ThermalDrift
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.nodes.time_base import TimeBase
-from piezo_hysteresis.predictor import Predictor
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.online.predictor import Predictor
+from piezo_hysteresis.online.sequence_check import Continuity
 
 DAY = 86_400.0
 EFFECTS = (

@@ -16,7 +16,7 @@ from piezo_hysteresis.effects import (
     effect_named,
 )
 from piezo_hysteresis.errors import ModelError, ParameterError
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 PERIOD = 1e-3

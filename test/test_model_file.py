@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from piezo_hysteresis.effects import BY_NAME, CHAIN, Arx, BoucWen, Offset
 from piezo_hysteresis.errors import ModelError, ParameterError, PiezoError
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import dumps, load, loads, save
-from piezo_hysteresis.model_parameters import from_parameters, hash_number, model_hash, to_parameters
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import dumps, load, loads, save
+from piezo_hysteresis.model.model_parameters import from_parameters, hash_number, model_hash, to_parameters
+from piezo_hysteresis.model.parameter_file import parameters
 from piezo_hysteresis.parameter import Parameter
-from piezo_hysteresis.parameter_file import parameters
 
 MODEL = Model((BoucWen(), Arx(a=[-0.5], b=[1e-05, 0.5]), Offset(y0=3e-9)), 2e-5, displacement_scale=1e-6)
 PUBLISHED = Path(__file__).parent.parent / "config" / "published_stage.yaml"

@@ -68,8 +68,8 @@ def test_executables_name_a_function_that_exists(name):
 
 
 def test_driver_parameters_in_the_file_are_the_defaults_of_the_table():
-    from piezo_hysteresis.nodes.back_ends import BACK_ENDS
-    from piezo_hysteresis.nodes.driver_settings import DRIVER
+    from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
+    from piezo_hysteresis.acquisition.settings import DRIVER
 
     values = yaml.safe_load((ROOT / "config" / "driver.yaml").read_text())["/**"]["ros__parameters"]
     rows = {row.name: row for row in DRIVER}

@@ -28,7 +28,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from piezo_hysteresis import Model, load
 from piezo_hysteresis.identification import DriveLimits
-from piezo_hysteresis.nodes.conversions import values_of
+from piezo_hysteresis.nodes.messages.conversions import values_of
 
 ROOT = Path(__file__).parents[2]
 NAMESPACE = "/demo"

@@ -16,11 +16,11 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from piezo_hysteresis import Model
-from piezo_hysteresis.model_file import loads
-from piezo_hysteresis.model_parameters import hash_number
-from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import command_to_cloud, values_of
-from piezo_hysteresis.nodes.quality import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
+from piezo_hysteresis.model.model_file import loads
+from piezo_hysteresis.model.model_parameters import hash_number
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
+from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
 
 Array = NDArray[np.float64]
 

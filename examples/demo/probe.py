@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from piezo_hysteresis.identification.drive import DriveLimits
-from piezo_hysteresis.identification.excitation import hold, mixture, sine, steps, triangle
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.protocol.excitation import hold, mixture, sine, steps, triangle
 
 
 def probe(limits: DriveLimits) -> NDArray[np.float64]:

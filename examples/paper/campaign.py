@@ -22,7 +22,7 @@ from piezo_hysteresis.identification import (
     paper,
     three_steps,
 )
-from piezo_hysteresis.identification.excitation import triangle
+from piezo_hysteresis.identification.protocol.excitation import triangle
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 

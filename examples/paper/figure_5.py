@@ -11,8 +11,8 @@ import published
 from campaign import experiment, plant, published_steps
 from exhibit import DYNAMIC, MEASURED, STATIC, Exhibit, canvas, main
 
-from piezo_hysteresis.identification.frequency_response import welch
-from piezo_hysteresis.identification.three_steps import voltage_signals
+from piezo_hysteresis.identification.steps.frequency_response import welch
+from piezo_hysteresis.identification.steps.three_steps import voltage_signals
 
 BAND = (100.0, 8000.0)
 """Compared between these frequencies [Hz]; the noise ends at 10 kHz."""

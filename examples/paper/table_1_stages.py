@@ -11,8 +11,8 @@ import published
 from campaign import OPERATORS, TITLES, alone, experiment, joint
 from exhibit import DYNAMIC, STATIC, Exhibit, canvas, main
 
-from piezo_hysteresis.discrepancy.residual import errors
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.discrepancy.residual.residual import errors
+from piezo_hysteresis.model.model import Model
 
 
 def errors_by_frequency(model: Model, operator: str) -> list[float]:

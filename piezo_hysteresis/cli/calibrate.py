@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from ..errors import RecordingError
-from ..parameter_file import number
+from ..model.parameter_file import number
 from ..stage.daqmx.loop_back import loop_back_delay
 from ..stage.daqmx.setup import DaqmxSetup
 from ..stage.daqmx.stage import DaqmxStage

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .. import model_file
 from ..discrepancy import Diagnosis, diagnose
-from ..report.answer_tables import effect_table, gap_table, rejection_table, where_table
-from ..report.comparison import Comparison, compare
+from ..model import model_file
+from ..report.figures.comparison import Comparison, compare
 from ..report.json_file import write_json
 from ..report.page import page
+from ..report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
 from ..report.verdict import answer_verdict
 from . import reading
 from .terminal import console, progress, show, show_notices

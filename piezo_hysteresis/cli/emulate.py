@@ -6,12 +6,12 @@ import argparse
 import signal
 import threading
 
-from ..stage.daqmx.emulator.card import Card
-from ..stage.daqmx.emulator.faults import FAULTS as NI_FAULTS
-from ..stage.daqmx.emulator.server import Server as NiServer
-from ..stage.gcs2.emulator.controller import Controller
-from ..stage.gcs2.emulator.faults import FAULTS as GCS2_FAULTS
-from ..stage.gcs2.emulator.server import Server as Gcs2Server
+from ..emulators.daqmx.card import Card
+from ..emulators.daqmx.faults import FAULTS as NI_FAULTS
+from ..emulators.daqmx.server import Server as NiServer
+from ..emulators.gcs2.controller import Controller
+from ..emulators.gcs2.faults import FAULTS as GCS2_FAULTS
+from ..emulators.gcs2.server import Server as Gcs2Server
 from ..stage.simulated import SimulatedStage
 from .plant_option import add_plant_arguments, plant
 from .terminal import console

@@ -5,14 +5,14 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from .. import model_file
 from ..effects import BoucWen, PublishedBoucWen
 from ..identification.identification import Identification
 from ..identification.identify import identify
-from ..identification.roles import HELD_OUT
+from ..identification.records.roles import HELD_OUT
+from ..model import model_file
 from ..report.json_file import write_json
-from ..report.parameter_table import correlation_table, parameter_table
-from ..report.table import Table
+from ..report.tables.parameter_table import correlation_table, parameter_table
+from ..report.tables.table import Table
 from . import reading
 from .terminal import console, progress, show, show_notices
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 
 from .. import recording
-from ..discrepancy.noise_floor import noise_floors
+from ..discrepancy.residual.noise_floor import noise_floors
 from ..report.json_file import write_json
-from ..report.quality_table import notice_table, record_table
+from ..report.tables.quality_table import notice_table, record_table
 from . import reading
 from .terminal import console, show
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .. import model_file
-from ..identification.normal_equations import Nuisance
-from ..report.comparison import compare
+from ..identification.fit.normal_equations import Nuisance
+from ..model import model_file
+from ..report.figures.comparison import compare
 from ..report.json_file import read_json
 from ..report.page import page
 from . import reading

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 
 from .. import recording
-from ..identification import protocol
-from ..identification.drive import DriveLimits
+from ..identification.protocol import protocol
+from ..identification.protocol.drive_limits import DriveLimits
 from ..record import Experiment, Record
 from ..report.json_file import write_json
 from ..stage.simulated import SimulatedStage

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 
 from ..record import Notice
-from ..report.table import Table
+from ..report.tables.table import Table
 
 WIDTH = 140
 """Columns where standard output is no terminal."""

@@ -6,14 +6,14 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .. import model_file
-from ..discrepancy.correlation import CAPTION, correlate
+from ..discrepancy.residual.correlation import CAPTION, correlate
 from ..errors import RecordError
-from ..identification.normal_equations import Nuisance
-from ..report.comparison import Comparison, compare
-from ..report.error_table import error_table, frequency_table
+from ..identification.fit.normal_equations import Nuisance
+from ..model import model_file
+from ..report.figures.comparison import Comparison, compare
 from ..report.json_file import write_json
-from ..report.table import Table
+from ..report.tables.error_table import error_table, frequency_table
+from ..report.tables.table import Table
 from . import reading
 from .terminal import console, show, show_notices
 
@@ -121,9 +121,9 @@ def _test_table(tests: list[dict[str, Any]]) -> Table:
 
 
 def _draw(comparison: Comparison, folder: Path) -> None:
-    from ..report.gap import gap
-    from ..report.time_series import time_series
-    from ..report.whiteness import whiteness
+    from ..report.figures.gap import gap
+    from ..report.figures.time_series import time_series
+    from ..report.figures.whiteness import whiteness
 
     folder.mkdir(parents=True, exist_ok=True)
     for figure in (gap, time_series, whiteness):

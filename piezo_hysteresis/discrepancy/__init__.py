@@ -9,10 +9,10 @@ from __future__ import annotations
 from .diagnose import diagnose
 from .diagnosis import Diagnosis, Verdict
 from .gap import Gap, measure_gap
-from .localise import Place, localise
-from .noise_floor import floors, noise_floors, stroke
-from .selection import select
-from .steps import Selection
+from .residual.localise import Place, localise
+from .residual.noise_floor import floors, noise_floors, stroke
+from .search.selection import select
+from .search.selection_result import Selection
 
 __all__ = [
     "Diagnosis",

@@ -8,28 +8,28 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..blocks.one_core import on_one_core
 from ..effects import CATALOGUE, Effect
 from ..errors import IdentificationError
-from ..identification.fit import Fit, Progress
-from ..identification.normal_equations import Nuisance, residuals
-from ..identification.roles import CARRYING
-from ..model import Model
-from ..one_core import on_one_core
+from ..identification.fit.fit import Fit, Progress
+from ..identification.fit.normal_equations import Nuisance, residuals
+from ..identification.records.roles import CARRYING
+from ..model.model import Model
 from ..record import Experiment, Notice
 from .diagnosis import Diagnosis, Verdict
-from .evidence import Evidence
-from .explicit_step import KIND, is_stepped, without_steps
-from .few_records import diagnose_few
+from .excitation_check import beyond_reach
 from .gap import Gap, measure_gap
-from .ground import Ground, lay_ground
-from .held_out import ADEQUATE
-from .localise import Place, localise
 from .next_experiment import decide
-from .reach import beyond_reach
-from .refit import LAST, PRECISE, joint, restart
-from .sampling import NOISE_WIDTH, quieted, voltage_noise
-from .selection import select
-from .steps import Selection
+from .residual.explicit_step import KIND, is_stepped, without_steps
+from .residual.localise import Place, localise
+from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
+from .search.baseline_setup import Ground, lay_ground
+from .search.cross_validation import ADEQUATE
+from .search.refit import LAST, PRECISE, joint, restart
+from .search.selection import select
+from .search.selection_result import Selection
+from .search.single_record import diagnose_few
+from .search.training_data import Evidence
 from .verdict import FEWEST, is_explained, is_makeshift, verdict_of
 
 Array = NDArray[np.float64]

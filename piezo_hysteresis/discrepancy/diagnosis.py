@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from ..identification.fit import Fit
-from ..model import Model
+from ..identification.fit.fit import Fit
+from ..model.model import Model
 from ..record import Experiment
 from .gap import Gap
-from .localise import Place
 from .next_experiment import NextExperiment
-from .steps import Rejection, Selection
+from .residual.localise import Place
+from .search.selection_result import Rejection, Selection
 
 SCHEMA = 1
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification.normal_equations import Nuisance, residuals
-from ..model import Model
+from ..identification.fit.normal_equations import Nuisance, residuals
+from ..model.model import Model
 from ..record import Record
-from .held_out import ADEQUATE
+from .search.cross_validation import ADEQUATE
 
 Array = NDArray[np.float64]
 

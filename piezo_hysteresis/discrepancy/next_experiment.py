@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification import excitation
-from ..identification.drive import DriveLimits
-from ..identification.fit import gauge
-from ..identification.normal_equations import grams
-from ..model import Model
+from ..identification.fit.fit import gauge
+from ..identification.fit.normal_equations import grams
+from ..identification.protocol import excitation
+from ..identification.protocol.drive_limits import DriveLimits
+from ..model.model import Model
 from ..record import Record
-from .candidates import free_numbers, weighted_sum
-from .evidence import Evidence
-from .steps import Selection
+from .search.candidates import free_numbers, weighted_sum
+from .search.selection_result import Selection
+from .search.training_data import Evidence
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import numpy as np
 from ..effects import ExtraResonance
 from .diagnosis import Verdict
 from .gap import Gap
-from .held_out import ADEQUATE
-from .steps import Selection
+from .search.cross_validation import ADEQUATE
+from .search.selection_result import Selection
 
 FEWEST = 4
 """Records below which none can be held out and no name is given."""

@@ -7,35 +7,35 @@ u → [amplifier] → [backlash] → v → [h with its terms + plays + even poly
 from __future__ import annotations
 
 from ..errors import ModelError
-from .amplifier_bandwidth import AmplifierBandwidth
-from .amplifier_saturation import AmplifierSaturation
-from .amplifier_slew_limit import AmplifierSlewLimit
-from .arx import Arx
-from .asymmetric_hysteresis import AsymmetricHysteresis
-from .axis_coupling import AxisCoupling
-from .backlash import Backlash
-from .bouc_wen import BoucWen
-from .creep import Creep
-from .creep_exponential import CreepExponential
-from .creep_fractional import CreepFractional
+from .drive.amplifier_bandwidth import AmplifierBandwidth
+from .drive.amplifier_saturation import AmplifierSaturation
+from .drive.amplifier_slew_limit import AmplifierSlewLimit
+from .drive.backlash import Backlash
+from .dynamics.arx import Arx
+from .dynamics.extra_delay import ExtraDelay
+from .dynamics.extra_resonance import ExtraResonance
+from .dynamics.softening import Softening
+from .dynamics.softening_of_one_mode import SofteningOfOneMode
 from .effect import Effect, Place, Setting, Term
-from .even_input_polynomial import EvenInputPolynomial
-from .extra_delay import ExtraDelay
-from .extra_resonance import ExtraResonance
-from .gain_drift import GainDrift
-from .hysteresis_exponent import HysteresisExponent
-from .hysteresis_memory import HysteresisMemory
-from .initial_state import InitialState
-from .mains_hum import MainsHum
-from .offset import Offset
-from .published_bouc_wen import PublishedBoucWen
-from .rate_dependent_hysteresis import RateDependentHysteresis
-from .sensor_bandwidth import SensorBandwidth
-from .sensor_nonlinearity import SensorNonlinearity
-from .softening import Softening
-from .softening_of_one_mode import SofteningOfOneMode
-from .thermal_drift import ThermalDrift
-from .thermal_expansion import ThermalExpansion
+from .environment.axis_coupling import AxisCoupling
+from .environment.mains_hum import MainsHum
+from .environment.thermal_drift import ThermalDrift
+from .environment.thermal_expansion import ThermalExpansion
+from .hysteresis.asymmetric_hysteresis import AsymmetricHysteresis
+from .hysteresis.bouc_wen import BoucWen
+from .hysteresis.even_input_polynomial import EvenInputPolynomial
+from .hysteresis.hysteresis_exponent import HysteresisExponent
+from .hysteresis.hysteresis_memory import HysteresisMemory
+from .hysteresis.initial_state import InitialState
+from .hysteresis.published_bouc_wen import PublishedBoucWen
+from .hysteresis.rate_dependent_hysteresis import RateDependentHysteresis
+from .material.creep import Creep
+from .material.creep_exponential import CreepExponential
+from .material.creep_fractional import CreepFractional
+from .sensor.gain_drift import GainDrift
+from .sensor.offset import Offset
+from .sensor.sensor_bandwidth import SensorBandwidth
+from .sensor.sensor_nonlinearity import SensorNonlinearity
 
 CHAIN: tuple[type[Effect], ...] = (
     AmplifierSaturation,

@@ -14,9 +14,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from ..blocks.block import Block
 from ..errors import ModelError, ParameterError
 from ..parameter import Parameter, Value
-from .block import Block
 from .extent import Extent
 
 

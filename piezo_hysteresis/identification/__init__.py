@@ -6,16 +6,16 @@ What is played: `DriveLimits`, the shapes of `excitation`, a `Protocol` of phase
 
 from __future__ import annotations
 
-from .delay import Delay, identify_delay
-from .drive import DriveLimits
-from .dynamics import Dynamics, compare_orders, identify_arx
-from .fit import Fit, fit
-from .frequency_response import FrequencyResponse, periodic, welch
-from .hysteresis import fit_hysteresis
+from .fit.fit import Fit, fit
 from .identification import Identification
 from .identify import identify
-from .protocol import Phase, Protocol, paper, rich, short
-from .three_steps import ThreeSteps, three_steps
+from .protocol.drive_limits import DriveLimits
+from .protocol.protocol import Phase, Protocol, paper, rich, short
+from .steps.delay import Delay, identify_delay
+from .steps.dynamics import Dynamics, compare_orders, identify_arx
+from .steps.frequency_response import FrequencyResponse, periodic, welch
+from .steps.hysteresis import fit_hysteresis
+from .steps.three_steps import ThreeSteps, three_steps
 
 __all__ = [
     "DriveLimits",

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import Arx
-from ..model import Model
+from ..model.model import Model
 from ..record import Notice, Samples
-from .comparison import Comparison
-from .delay import Delay
-from .dynamics import Dynamics, OrderError
-from .fit import Fit
-from .three_steps import ThreeSteps
+from .fit.fit import Fit
+from .steps.comparison import Comparison
+from .steps.delay import Delay
+from .steps.dynamics import Dynamics, OrderError
+from .steps.three_steps import ThreeSteps
 
 CORRELATED = 0.95
 """Correlation from which two numbers are told to be hard to separate."""

@@ -11,27 +11,27 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..blocks.one_core import on_one_core
 from ..effects import Arx, BoucWen, Effect, Offset
 from ..errors import IdentificationError
-from ..model import Model
-from ..one_core import on_one_core
-from ..provenance import provenance
+from ..model.model import Model
+from ..model.provenance import provenance
 from ..record import Experiment, Notice, Record
-from .comparison import Comparison, compare_inputs
-from .delay import Delay, identify_delay
-from .dynamics import Dynamics, OrderError, choose_order, compare_orders, delay_of
-from .fit import Fit, Progress
-from .hysteresis import fit_hysteresis, hysteresis_name
+from .fit.fit import Fit, Progress
+from .fit.joint import fit_dynamics, fit_lag
+from .fit.normal_equations import Nuisance, residuals
 from .identification import Identification, PhaseError
-from .joint import fit_dynamics, fit_lag
-from .lag import lag_notices
-from .lead_in import known_from_within
-from .leading_step import Blocks, steps_apart
-from .linear_start import dynamics_of, hysteresis_signals
-from .memory import choose_memory
-from .normal_equations import Nuisance, residuals
-from .roles import HELD_OUT, Roles, roles_of
-from .three_steps import ThreeSteps, named, three_steps
+from .records.conditioning_split import known_from_within
+from .records.leading_step import Blocks, steps_apart
+from .records.roles import HELD_OUT, Roles, roles_of
+from .steps.comparison import Comparison, compare_inputs
+from .steps.delay import Delay, identify_delay
+from .steps.dynamics import Dynamics, OrderError, choose_order, compare_orders, delay_of
+from .steps.hysteresis import fit_hysteresis, hysteresis_name
+from .steps.hysteresis_choice import choose_memory
+from .steps.linear_start import dynamics_of, hysteresis_signals
+from .steps.remaining_lag import lag_notices
+from .steps.three_steps import ThreeSteps, named, three_steps
 
 ADEQUATE = 3e-4
 """Share of the range below which a residual does not decide: no lab needs better."""

@@ -35,18 +35,18 @@ from pathlib import Path
 
 from ..errors import RecordingError
 from ..record import Experiment, Notice, Record
-from .bag import Bag
-from .bag_writer import BagWriter
-from .csv import Csv
-from .decimation import load_decimation
-from .format import Format, WritableFormat
-from .gcs_array import GcsArray
-from .layout import Column, Layout
-from .mat import Mat
-from .npz import Npz
-from .onset import departures, is_within_its_loop
-from .quality import inspect
-from .rosbag2 import Rosbag2, recorded_model
+from .bag.bag import Bag
+from .bag.bag_writer import BagWriter
+from .bag.rosbag2 import Rosbag2, recorded_model
+from .checks.initial_condition_check import departures, is_within_its_loop
+from .checks.quality import inspect
+from .formats.csv import Csv
+from .formats.format import Format, WritableFormat
+from .formats.gcs_array import GcsArray
+from .formats.mat import Mat
+from .formats.npz import Npz
+from .segmentation.decimation import load_decimation
+from .table.read_options import Column, Layout
 
 __all__ = [
     "FORMATS", "Bag", "BagWriter", "Csv", "Format", "GcsArray", "Layout", "Mat", "Npz", "Rosbag2",

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
-from .comparison import Comparison
-from .drawing import Drawing
-from .table import Table
+from .figures.comparison import Comparison
+from .figures.drawing import Drawing
+from .tables.table import Table
 from .verdict import Verdict
 from .words import nanometre
 

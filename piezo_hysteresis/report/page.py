@@ -8,25 +8,25 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RecordingError
-from ..identification.fit import Fit
-from .answer_tables import effect_table, gap_table, rejection_table, where_table
-from .bode import bode
-from .comparison import Comparison
-from .creep import creep
+from ..identification.fit.fit import Fit
 from .document import document
-from .drawing import Drawing
-from .error_table import error_table, frequency_table
-from .gap import gap
-from .loops import loops_by_amplitude, loops_by_frequency
-from .parameter_table import correlation_table, parameter_table
-from .quality_table import notice_table, record_table
-from .residual_maps import residual_maps
-from .spectrum import residual_spectrum
-from .step import step
-from .table import Table
-from .time_series import time_series
+from .figures.bode import bode
+from .figures.comparison import Comparison
+from .figures.creep import creep
+from .figures.drawing import Drawing
+from .figures.gap import gap
+from .figures.loops import loops_by_amplitude, loops_by_frequency
+from .figures.residual_maps import residual_maps
+from .figures.spectrum import residual_spectrum
+from .figures.step import step
+from .figures.time_series import time_series
+from .figures.whiteness import whiteness
+from .tables.answer_tables import effect_table, gap_table, rejection_table, where_table
+from .tables.error_table import error_table, frequency_table
+from .tables.parameter_table import correlation_table, parameter_table
+from .tables.quality_table import notice_table, record_table
+from .tables.table import Table
 from .verdict import verdict
-from .whiteness import whiteness
 
 Draw = Callable[[Comparison], Drawing | None]
 Progress = Callable[[str, float], None]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .comparison import Comparison
+from .figures.comparison import Comparison
 from .words import nanometre
 
 ENOUGH = 1.5

@@ -9,8 +9,8 @@ import pytest
 
 from piezo_hysteresis import recording
 from piezo_hysteresis.cli.main import main
-from piezo_hysteresis.identification import excitation
-from piezo_hysteresis.identification.drive import DriveLimits
+from piezo_hysteresis.identification.protocol import excitation
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.stage.simulated import SimulatedStage
 

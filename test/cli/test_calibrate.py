@@ -6,9 +6,9 @@ import pytest
 pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
 pytest.importorskip("grpc")
 
-from piezo_hysteresis.parameter_file import parameters
-from piezo_hysteresis.stage.daqmx.emulator.card import Card
-from piezo_hysteresis.stage.daqmx.emulator.server import Server
+from piezo_hysteresis.emulators.daqmx.card import Card
+from piezo_hysteresis.emulators.daqmx.server import Server
+from piezo_hysteresis.model.parameter_file import parameters
 from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
 from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
 from piezo_hysteresis.stage.simulated import SimulatedStage

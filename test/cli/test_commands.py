@@ -8,9 +8,10 @@ import shutil
 import numpy as np
 import pytest
 
-from piezo_hysteresis import model_file, recording
-from piezo_hysteresis.discrepancy.residual import errors
-from piezo_hysteresis.identification.normal_equations import Nuisance
+from piezo_hysteresis import recording
+from piezo_hysteresis.discrepancy.residual.residual import errors
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model import model_file
 from piezo_hysteresis.stage.hidden import HIDDEN_EFFECTS
 
 

@@ -9,10 +9,11 @@ import sys
 import numpy as np
 import pytest
 
-from piezo_hysteresis import model_file, recording
+from piezo_hysteresis import recording
 from piezo_hysteresis.cli.main import COMMANDS
 from piezo_hysteresis.effects import Arx, BoucWen
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model import model_file
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
 

@@ -14,6 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from piezo_hysteresis import effects
+from piezo_hysteresis.blocks.kernel import fma
+from piezo_hysteresis.blocks.time import TimeBlock
 from piezo_hysteresis.effects import (
     CATALOGUE,
     CHAIN,
@@ -27,10 +29,8 @@ from piezo_hysteresis.effects import (
     SofteningOfOneMode,
     ThermalDrift,
 )
-from piezo_hysteresis.effects.time_block import TimeBlock
 from piezo_hysteresis.errors import DivergenceError, ParameterError
-from piezo_hysteresis.kernel import fma
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model.model import Model
 
 PERIOD = 1e-4
 N = 400

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from piezo_hysteresis.discrepancy.baseline import start_models
+from piezo_hysteresis.discrepancy.search.baseline import start_models
 from piezo_hysteresis.effects import Arx, BoucWen
-from piezo_hysteresis.identification.linear_start import dynamics_of
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.steps.linear_start import dynamics_of
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 PERIOD = 1e-4

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from piezo_hysteresis.discrepancy.coarseness import coarseness, sharp_drive
+from piezo_hysteresis.discrepancy.residual.intersample_error import coarseness, sharp_drive
 from piezo_hysteresis.effects import Arx, BoucWen
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 PERIOD = 1e-4

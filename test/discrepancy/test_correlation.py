@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import correlate as scipy_correlate
 from scipy.signal import lfilter
 
-from piezo_hysteresis.discrepancy.correlation import correlate
+from piezo_hysteresis.discrepancy.residual.correlation import correlate
 from piezo_hysteresis.errors import RecordError
 
 RANDOM = np.random.default_rng(7)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.candidates import Candidate
-from piezo_hysteresis.discrepancy.doubts import bends_all_along, may_be_off
-from piezo_hysteresis.discrepancy.evidence import Evidence
-from piezo_hysteresis.discrepancy.held_out import Score
+from piezo_hysteresis.discrepancy.search.acceptance_tests import bends_all_along, may_be_off
+from piezo_hysteresis.discrepancy.search.candidates import Candidate
+from piezo_hysteresis.discrepancy.search.cross_validation import Score
+from piezo_hysteresis.discrepancy.search.training_data import Evidence
 from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, GainDrift, HysteresisMemory
 from piezo_hysteresis.effects.extent import Extent
-from piezo_hysteresis.identification.fit import Fit
-from piezo_hysteresis.identification.normal_equations import Nuisance
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.fit.fit import Fit
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model.model import Model
 
 EXTENT = Extent(0.0, 10.0, 1e3, 10.0, 1e-5, 2e-5, 100.0, 10.0)
 

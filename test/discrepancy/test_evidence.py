@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.candidates import free_numbers
-from piezo_hysteresis.discrepancy.evidence import Evidence, extent_of
+from piezo_hysteresis.discrepancy.search.candidates import free_numbers
+from piezo_hysteresis.discrepancy.search.training_data import Evidence, extent_of
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
-from piezo_hysteresis.identification.normal_equations import Nuisance
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 STAGE = Model((BoucWen(A=-0.2, beta=3.0), Arx(a=(-0.5,), b=(0.5,)), Offset()), 1e-4, 50.0, 1e-5)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.evidence import Evidence, extent_of
-from piezo_hysteresis.discrepancy.explicit_step import KIND, is_stepped, step_changes, without_steps
+from piezo_hysteresis.discrepancy.residual.explicit_step import KIND, is_stepped, step_changes, without_steps
+from piezo_hysteresis.discrepancy.search.training_data import Evidence, extent_of
 from piezo_hysteresis.effects import Arx, BoucWen, PublishedBoucWen
-from piezo_hysteresis.identification.normal_equations import Nuisance
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
 LOOP = {"A": -0.7, "beta": 3.5, "gamma": 0.6, "p1": 0.05, "p2": 1.6}

@@ -5,8 +5,8 @@ import pytest
 
 from piezo_hysteresis.discrepancy.gap import measure_gap
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
-from piezo_hysteresis.identification.normal_equations import Nuisance
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 MODEL = Model((BoucWen(), Arx(b=[0.25]), Offset()), sample_period=1e-3, displacement_scale=2e-5)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.held_out import Score, held_out, indispensable
-from piezo_hysteresis.identification.normal_equations import Gram
+from piezo_hysteresis.discrepancy.search.cross_validation import Score, held_out, indispensable
+from piezo_hysteresis.identification.fit.normal_equations import Gram
 
 RANDOM = np.random.default_rng(5)
 SIZES = (200, 500, 90, 300)

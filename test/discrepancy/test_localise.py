@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.localise import localise
+from piezo_hysteresis.discrepancy.residual.localise import localise
 from piezo_hysteresis.record import Record
 
 RANDOM = np.random.default_rng(9)

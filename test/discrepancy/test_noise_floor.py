@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.noise_floor import (
+from piezo_hysteresis.discrepancy.residual.noise_floor import (
     ADEQUACY,
     drive_period,
     floors,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from piezo_hysteresis.discrepancy.reach import beyond_reach
+from piezo_hysteresis.discrepancy.excitation_check import beyond_reach
 from piezo_hysteresis.record import Record
 
 TIME = 1e-3 * np.arange(2000)

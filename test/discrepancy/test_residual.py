@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.residual import drive_frequency, errors
+from piezo_hysteresis.discrepancy.residual.residual import drive_frequency, errors
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.errors import ModelError, RecordError
-from piezo_hysteresis.identification.normal_equations import Nuisance
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
 MODEL = Model((BoucWen(), Arx(b=[0.25])), sample_period=1e-3, displacement_scale=2e-5)

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.sampling import at_period, common_period, quieted, shortened, slowed, voltage_noise
+from piezo_hysteresis.discrepancy.residual.sampling import (
+    at_period,
+    common_period,
+    quieted,
+    shortened,
+    slowed,
+    voltage_noise,
+)
 from piezo_hysteresis.record import Record
 
 FAST = 2e-5

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.held_out import ADEQUATE, Score
-from piezo_hysteresis.discrepancy.selection import select
-from piezo_hysteresis.discrepancy.steps import Selection, explained
+from piezo_hysteresis.discrepancy.search.cross_validation import ADEQUATE, Score
+from piezo_hysteresis.discrepancy.search.selection import select
+from piezo_hysteresis.discrepancy.search.selection_result import Selection, explained
 
 
 @given(null=st.floats(0.1, 1.5), gap=st.floats(1.0, 1e4), share=st.floats(0.0, 1.0))

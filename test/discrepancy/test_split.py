@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.split import reporting
+from piezo_hysteresis.discrepancy.search.test_records import reporting
 from piezo_hysteresis.record import Record
 
 KINDS = ("noise", "sine_1hz", "sine_50hz", "triangle", "staircase", "validation")

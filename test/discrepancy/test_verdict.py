@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.candidates import Candidate
-from piezo_hysteresis.discrepancy.evidence import Evidence, extent_of
-from piezo_hysteresis.discrepancy.held_out import Score
-from piezo_hysteresis.discrepancy.steps import Selection, Step
+from piezo_hysteresis.discrepancy.search.candidates import Candidate
+from piezo_hysteresis.discrepancy.search.cross_validation import Score
+from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
+from piezo_hysteresis.discrepancy.search.training_data import Evidence, extent_of
 from piezo_hysteresis.discrepancy.verdict import is_explained
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
-from piezo_hysteresis.identification.normal_equations import Nuisance
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 STAGE = Model((BoucWen(), Arx(b=(1.0,))), 1e-4, 10.0, 1e-5)

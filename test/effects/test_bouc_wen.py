@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from piezo_hysteresis.blocks.bouc_wen_kernel import run_general, run_plain
 from piezo_hysteresis.effects import (
     AsymmetricHysteresis,
     BoucWen,
@@ -18,7 +19,6 @@ from piezo_hysteresis.effects import (
     Setting,
     Term,
 )
-from piezo_hysteresis.effects.loop import run_general, run_plain
 from piezo_hysteresis.errors import ModelError, ParameterError
 
 PERIOD = 1e-3

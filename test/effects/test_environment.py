@@ -8,7 +8,7 @@ import pytest
 from piezo_hysteresis.effects import Arx, AxisCoupling, GainDrift, MainsHum, SensorNonlinearity, ThermalDrift
 from piezo_hysteresis.effects import ThermalExpansion as Expansion
 from piezo_hysteresis.errors import ParameterError
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 PERIOD, SCALE = 1e-2, 1e-5

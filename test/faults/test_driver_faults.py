@@ -18,7 +18,7 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from benchmarks.stage_log import StageLog
-from piezo_hysteresis.nodes.conversions import command_to_cloud, to_stamp, values_of
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, to_stamp, values_of
 
 pytestmark = pytest.mark.nodes
 

@@ -12,8 +12,8 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from benchmarks.naming_cases import Case
-from piezo_hysteresis.nodes.conversions import values_of
-from piezo_hysteresis.nodes.quality import LATCHED
+from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.runtime.qos import LATCHED
 from piezo_hysteresis.recording import read, write
 
 pytestmark = pytest.mark.nodes

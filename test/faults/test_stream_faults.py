@@ -17,10 +17,10 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import String
 
-from piezo_hysteresis.model_file import dumps, save
-from piezo_hysteresis.nodes.conversions import to_stamp, values_of
-from piezo_hysteresis.nodes.quality import LATCHED
-from piezo_hysteresis.nodes.sample_block import samples_to_cloud
+from piezo_hysteresis.model.model_file import dumps, save
+from piezo_hysteresis.nodes.messages.conversions import to_stamp, values_of
+from piezo_hysteresis.nodes.messages.samples import samples_to_cloud
+from piezo_hysteresis.nodes.runtime.qos import LATCHED
 
 from .stream import FALSE, MODEL, PERIOD, SIZE, Stream, foreign, predictions, spoilt, with_bytes
 

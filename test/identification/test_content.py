@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.identification.content import content_of
+from piezo_hysteresis.identification.records.excitation_content import content_of
 from piezo_hysteresis.record import Record
 
 

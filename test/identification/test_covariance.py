@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
-from piezo_hysteresis.identification.fit import fit
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.fit.fit import fit
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 PERIOD, NOISE = 1e-3, 1e-8

@@ -6,9 +6,9 @@ from scipy.signal import lfilter
 
 from benchmarks.published_plant import SAMPLE_PERIOD, STROKE, displacement
 from piezo_hysteresis.errors import IdentificationError
-from piezo_hysteresis.identification import protocol
-from piezo_hysteresis.identification.delay import identify_delay
-from piezo_hysteresis.identification.edges import find_edges
+from piezo_hysteresis.identification.protocol import protocol
+from piezo_hysteresis.identification.records.edges import find_edges
+from piezo_hysteresis.identification.steps.delay import identify_delay
 from piezo_hysteresis.record import Record
 
 STEP = next(p.voltage for p in protocol.paper() if p.name == "step")

@@ -7,10 +7,10 @@ from scipy.signal import lfilter
 from benchmarks.published_plant import A_Z, B_Z, DELAY, SAMPLE_PERIOD, STROKE, hysteresis_output, linear_output
 from piezo_hysteresis.effects import Arx
 from piezo_hysteresis.errors import IdentificationError
-from piezo_hysteresis.identification import protocol
-from piezo_hysteresis.identification.dynamics import Dynamics, choose_order, compare_orders, identify_arx
-from piezo_hysteresis.identification.frequency_response import periodic, welch
-from piezo_hysteresis.identification.linear_start import ITERATIONS
+from piezo_hysteresis.identification.protocol import protocol
+from piezo_hysteresis.identification.steps.dynamics import Dynamics, choose_order, compare_orders, identify_arx
+from piezo_hysteresis.identification.steps.frequency_response import periodic, welch
+from piezo_hysteresis.identification.steps.linear_start import ITERATIONS
 
 PUBLISHED = Dynamics(Arx(a=A_Z[1:], b=B_Z, delay=DELAY), SAMPLE_PERIOD)
 BAND = np.geomspace(1.0, 2000.0, 60)

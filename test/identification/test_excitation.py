@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from piezo_hysteresis.errors import IdentificationError
-from piezo_hysteresis.identification import excitation, protocol
-from piezo_hysteresis.identification.drive import DriveLimits
+from piezo_hysteresis.identification.protocol import excitation, protocol
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 
 LIMITS = DriveLimits()
 

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from piezo_hysteresis.effects import Arx, BoucWen, Setting
 from piezo_hysteresis.errors import IdentificationError
-from piezo_hysteresis.identification import excitation
-from piezo_hysteresis.identification.drive import DriveLimits
-from piezo_hysteresis.identification.hysteresis import Loop, fit_hysteresis, start_hysteresis
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.protocol import excitation
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.steps.hysteresis import Loop, fit_hysteresis, start_hysteresis
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 LIMITS = DriveLimits(sample_period=1e-3)

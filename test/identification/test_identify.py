@@ -7,9 +7,10 @@ import pytest
 
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.errors import IdentificationError, RecordError
-from piezo_hysteresis.identification import DriveLimits, excitation, identify
-from piezo_hysteresis.identification.normal_equations import Nuisance, residuals
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification import DriveLimits, identify
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance, residuals
+from piezo_hysteresis.identification.protocol import excitation
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
 LIMITS = DriveLimits(sample_period=1e-4)

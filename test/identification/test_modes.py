@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from piezo_hysteresis.errors import IdentificationError
-from piezo_hysteresis.identification.dynamics import identify_arx
-from piezo_hysteresis.identification.linear_start import ITERATIONS
-from piezo_hysteresis.identification.modes import identify_modes
+from piezo_hysteresis.identification.steps.dynamics import identify_arx
+from piezo_hysteresis.identification.steps.linear_start import ITERATIONS
+from piezo_hysteresis.identification.steps.modes import identify_modes
 
 from .test_dynamics import poles
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from piezo_hysteresis.errors import IdentificationError
-from piezo_hysteresis.identification.regressors import triangle
+from piezo_hysteresis.identification.steps.regressors import triangle
 
 
 def written_out(signals, na, nb, delay):

@@ -13,8 +13,8 @@ import pytest
 
 os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "SHM")
 
+from piezo_hysteresis.acquisition.stage_lock import StageLock
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.nodes.stage_lock import StageLock
 
 from .lab import Lab
 

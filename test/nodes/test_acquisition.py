@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from piezo_hysteresis.acquisition.drive import Happening
+from piezo_hysteresis.acquisition.memory import MemoryAcquisition
+from piezo_hysteresis.acquisition.playback import Playback
+from piezo_hysteresis.acquisition.streaming import Acquisition
+from piezo_hysteresis.acquisition.time_base import TimeBase
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.nodes.acquisition import Acquisition
-from piezo_hysteresis.nodes.drive import Happening
-from piezo_hysteresis.nodes.memory_acquisition import MemoryAcquisition
-from piezo_hysteresis.nodes.playback import Playback
-from piezo_hysteresis.nodes.time_base import TimeBase
 from piezo_hysteresis.stage.simulated import SimulatedMemoryStage
 
 from .witness import Witness

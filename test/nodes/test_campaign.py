@@ -5,12 +5,12 @@ import time
 import numpy as np
 import pytest
 
+from piezo_hysteresis.acquisition import back_ends
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.identification.protocol import Phase, Protocol
-from piezo_hysteresis.nodes import back_ends
-from piezo_hysteresis.nodes.campaign import campaign
-from piezo_hysteresis.nodes.driver_link import DriverLink
-from piezo_hysteresis.nodes.driver_node import DriverNode
+from piezo_hysteresis.identification.protocol.protocol import Phase, Protocol
+from piezo_hysteresis.nodes.driver.driver_node import DriverNode
+from piezo_hysteresis.nodes.identification.driver_client import DriverLink
+from piezo_hysteresis.nodes.identification.protocol_runner import campaign
 from piezo_hysteresis.recording import read
 
 from .witness import Witness
@@ -68,7 +68,7 @@ def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, stage):
 
 
 def test_a_word_that_is_lost_is_not_waited_for_without_limit(lab, stage, monkeypatch):
-    monkeypatch.setattr("piezo_hysteresis.nodes.campaign.PATIENCE", 5.0)
+    monkeypatch.setattr("piezo_hysteresis.nodes.identification.protocol_runner.PATIENCE", 5.0)
 
     def unheard(link):
         if link.state == "done":

@@ -8,8 +8,8 @@ from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import PointCloud2
 
 from piezo_hysteresis.errors import RecordError
-from piezo_hysteresis.nodes.cloud import to_cloud
-from piezo_hysteresis.nodes.cloud_stream import CloudReader, CloudWriter, read_cloud
+from piezo_hysteresis.nodes.messages.cloud import to_cloud
+from piezo_hysteresis.nodes.messages.cloud_stream import CloudReader, CloudWriter, read_cloud
 
 LAYOUT = {"x": "f8", "n": "u4"}
 STORE = get_typestore(Stores.ROS2_KILTED)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from piezo_hysteresis.acquisition.command_check import CommandCheck
 from piezo_hysteresis.errors import PiezoError, StageError
-from piezo_hysteresis.nodes.command_check import CommandCheck
-from piezo_hysteresis.nodes.conversions import command_to_cloud, to_stamp
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, to_stamp
 from piezo_hysteresis.stage.stage import Description
 
 NOW = 1_700_000_000_000_000_000

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import PointCloud2
 
-from piezo_hysteresis.identification.protocol import Phase
-from piezo_hysteresis.nodes.command_sender import CommandSender
-from piezo_hysteresis.nodes.driver_link import DriverLink
+from piezo_hysteresis.identification.protocol.protocol import Phase
+from piezo_hysteresis.nodes.identification.command_sender import CommandSender
+from piezo_hysteresis.nodes.identification.driver_client import DriverLink
 
 pytestmark = pytest.mark.nodes
 

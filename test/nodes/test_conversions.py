@@ -9,8 +9,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2, PointField
 
 from piezo_hysteresis.errors import RecordError
-from piezo_hysteresis.nodes import conversions
-from piezo_hysteresis.nodes.phase_text import phase_from_text, phase_name
+from piezo_hysteresis.nodes.messages import conversions
+from piezo_hysteresis.nodes.messages.phase_text import phase_from_text, phase_name
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 

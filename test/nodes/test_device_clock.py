@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.nodes.device_clock import DeviceClock
-from piezo_hysteresis.nodes.time_base import TimeBase
+from piezo_hysteresis.acquisition.device_clock import DeviceClock
+from piezo_hysteresis.acquisition.time_base import TimeBase
 
 PERIOD, BLOCK = 2e-5, 500
 

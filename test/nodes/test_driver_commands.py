@@ -6,7 +6,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from piezo_hysteresis.nodes.phase_text import phase_from_text
+from piezo_hysteresis.nodes.messages.phase_text import phase_from_text
 
 pytestmark = pytest.mark.nodes
 

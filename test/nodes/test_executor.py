@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from piezo_hysteresis.nodes import executor as own
+from piezo_hysteresis.nodes.runtime import executor as own
 
 pytestmark = pytest.mark.nodes
 

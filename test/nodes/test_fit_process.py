@@ -11,10 +11,10 @@ import pytest
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.identification.identify import identify
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import loads
-from piezo_hysteresis.model_parameters import to_parameters
-from piezo_hysteresis.nodes.fit_process import FitProcess, identification
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import loads
+from piezo_hysteresis.model.model_parameters import to_parameters
+from piezo_hysteresis.nodes.identification.fit_process import FitProcess, identification
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import read, write
 

@@ -9,11 +9,11 @@ import pytest
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import parameter_value_to_python
 
-from piezo_hysteresis.model_file import load
-from piezo_hysteresis.stage.fault import Faults
-from piezo_hysteresis.stage.gcs2.emulator.controller import Controller
-from piezo_hysteresis.stage.gcs2.emulator.faults import FAULTS
-from piezo_hysteresis.stage.gcs2.emulator.server import Server
+from piezo_hysteresis.emulators.fault import Faults
+from piezo_hysteresis.emulators.gcs2.controller import Controller
+from piezo_hysteresis.emulators.gcs2.faults import FAULTS
+from piezo_hysteresis.emulators.gcs2.server import Server
+from piezo_hysteresis.model.model_file import load
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
@@ -115,9 +115,9 @@ def test_a_controller_with_memory(lab):
 def test_a_card_that_streams(lab):
     pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
     pytest.importorskip("grpc")
-    from piezo_hysteresis.stage.daqmx.emulator.card import Card
-    from piezo_hysteresis.stage.daqmx.emulator.faults import FAULTS as NI_FAULTS
-    from piezo_hysteresis.stage.daqmx.emulator.server import Server as NiServer
+    from piezo_hysteresis.emulators.daqmx.card import Card
+    from piezo_hysteresis.emulators.daqmx.faults import FAULTS as NI_FAULTS
+    from piezo_hysteresis.emulators.daqmx.server import Server as NiServer
 
     card = Card(SimulatedStage(seed=3, sample_period=PERIOD))
     with NiServer(card) as server:
@@ -154,8 +154,8 @@ def emulated_controller():
 @contextmanager
 def emulated_card():
     pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
-    from piezo_hysteresis.stage.daqmx.emulator.card import Card
-    from piezo_hysteresis.stage.daqmx.emulator.server import Server as NiServer
+    from piezo_hysteresis.emulators.daqmx.card import Card
+    from piezo_hysteresis.emulators.daqmx.server import Server as NiServer
 
     with NiServer(Card(SimulatedStage(seed=3, sample_period=PERIOD))) as server:
         wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1", "nidaqmx__lead": 1.5}

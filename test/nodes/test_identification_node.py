@@ -11,15 +11,15 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
-from piezo_hysteresis.identification.drive import DriveLimits
-from piezo_hysteresis.identification.protocol import short
-from piezo_hysteresis.model_file import dumps, load
-from piezo_hysteresis.model_parameters import from_parameters, hash_number
-from piezo_hysteresis.nodes.bag_recorder import BagRecorder
-from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import values_of
-from piezo_hysteresis.nodes.quality import LATCHED, SAMPLES
-from piezo_hysteresis.nodes.sample_block import PREDICTED_SAMPLES
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.protocol.protocol import short
+from piezo_hysteresis.model.model_file import dumps, load
+from piezo_hysteresis.model.model_parameters import from_parameters, hash_number
+from piezo_hysteresis.nodes.identification.bag_recorder import BagRecorder
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES
+from piezo_hysteresis.nodes.runtime.qos import LATCHED, SAMPLES
 from piezo_hysteresis.recording import read
 from piezo_hysteresis.report.json_file import read_json
 from piezo_hysteresis.stage.plant import PlantParameters

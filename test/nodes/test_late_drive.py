@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.nodes.drive import Drive, Event, Happening, Phase
-from piezo_hysteresis.nodes.late_drive import LateDrive
+from piezo_hysteresis.acquisition.drive import Drive, Event, Happening, Phase
+from piezo_hysteresis.acquisition.latency_buffer import LateDrive
 
 
 @given(

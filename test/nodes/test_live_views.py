@@ -17,14 +17,14 @@ from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
+from piezo_hysteresis.acquisition.streaming import Delivery
 from piezo_hysteresis.effects import Arx, BoucWen
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.nodes.acquisition import Delivery
-from piezo_hysteresis.nodes.bag_recorder import TOPICS
-from piezo_hysteresis.nodes.driver_topics import DriverTopics
-from piezo_hysteresis.nodes.model_topics import ModelTopics
-from piezo_hysteresis.nodes.sample_block import SampleBlock
-from piezo_hysteresis.predictor import Predictor
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.nodes.driver.publishers import DriverTopics
+from piezo_hysteresis.nodes.identification.bag_recorder import TOPICS
+from piezo_hysteresis.nodes.messages.samples import SampleBlock
+from piezo_hysteresis.nodes.model.publishers import ModelTopics
+from piezo_hysteresis.online.predictor import Predictor
 
 CONFIG = Path(__file__).parents[2] / "config"
 AXIS = "/stage_x/"

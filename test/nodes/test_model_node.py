@@ -13,14 +13,14 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from piezo_hysteresis.effects import Arx, BoucWen
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import dumps, save
-from piezo_hysteresis.model_parameters import hash_number, model_hash
-from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import values_of
-from piezo_hysteresis.nodes.quality import LATCHED, SAMPLES
-from piezo_hysteresis.nodes.sample_block import PREDICTED_SAMPLES, SampleBlock, samples_to_cloud
-from piezo_hysteresis.predictor import Predictor
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import dumps, save
+from piezo_hysteresis.model.model_parameters import hash_number, model_hash
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, SampleBlock, samples_to_cloud
+from piezo_hysteresis.nodes.runtime.qos import LATCHED, SAMPLES
+from piezo_hysteresis.online.predictor import Predictor
 
 pytestmark = pytest.mark.nodes
 

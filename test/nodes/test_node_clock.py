@@ -8,7 +8,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from rclpy.time import Time
 
-from piezo_hysteresis.nodes.node_clock import now
+from piezo_hysteresis.nodes.runtime.node_clock import now
 
 pytestmark = pytest.mark.nodes
 

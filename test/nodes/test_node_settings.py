@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from piezo_hysteresis.nodes.identification_node import IDENTIFICATION
-from piezo_hysteresis.nodes.model_node import MODEL
-from piezo_hysteresis.parameter_file import parameters
+from piezo_hysteresis.model.parameter_file import parameters
+from piezo_hysteresis.nodes.identification.identification_node import IDENTIFICATION
+from piezo_hysteresis.nodes.model.model_node import MODEL
 
 CONFIG = Path(__file__).parents[2] / "config"
 

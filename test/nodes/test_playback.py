@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from piezo_hysteresis.acquisition.drive import Happening
+from piezo_hysteresis.acquisition.playback import Playback
+from piezo_hysteresis.acquisition.recorded_playback import RecordedPlayback
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.nodes.drive import Happening
-from piezo_hysteresis.nodes.playback import Playback
-from piezo_hysteresis.nodes.recorded_playback import RecordedPlayback
 from piezo_hysteresis.record import Record
 
 PERIOD = 1e-3

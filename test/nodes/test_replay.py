@@ -16,13 +16,13 @@ from std_msgs.msg import Float64
 
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.identification.identify import identify
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import save
-from piezo_hysteresis.nodes.bag_recorder import BagRecorder
-from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.conversions import values_of
-from piezo_hysteresis.nodes.quality import COMMAND_STATUS, DEEP
-from piezo_hysteresis.nodes.sample_block import PREDICTED_SAMPLES
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import save
+from piezo_hysteresis.nodes.identification.bag_recorder import BagRecorder
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES
+from piezo_hysteresis.nodes.runtime.qos import COMMAND_STATUS, DEEP
 from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.recording import Bag, read, write
 

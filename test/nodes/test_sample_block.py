@@ -9,8 +9,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2, PointField
 
 from piezo_hysteresis.errors import PiezoError, RecordError
-from piezo_hysteresis.nodes.cloud import from_cloud
-from piezo_hysteresis.nodes.sample_block import (
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.samples import (
     PredictionWriter,
     SampleBlock,
     SampleReader,

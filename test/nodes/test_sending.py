@@ -4,7 +4,7 @@ import pytest
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from std_msgs.msg import Float64
 
-from piezo_hysteresis.nodes.sending import ATTEMPTS, send
+from piezo_hysteresis.nodes.runtime.sending import ATTEMPTS, send
 
 pytestmark = pytest.mark.nodes
 

@@ -7,11 +7,11 @@ from rclpy.parameter import Parameter
 
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
 from piezo_hysteresis.errors import ModelError
-from piezo_hysteresis.model import Model
-from piezo_hysteresis.model_file import dumps
-from piezo_hysteresis.model_parameters import from_parameters, to_parameters
-from piezo_hysteresis.nodes.identification_node import START
-from piezo_hysteresis.nodes.served_model import ServedModel
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import dumps
+from piezo_hysteresis.model.model_parameters import from_parameters, to_parameters
+from piezo_hysteresis.nodes.identification.identification_node import START
+from piezo_hysteresis.nodes.identification.served_model import ServedModel
 
 MODEL = Model((BoucWen(), Arx(a=[-0.5], b=[0.5])), 2e-5, provenance={"free_run_error": "1e-09", "source": "a test"})
 

@@ -5,12 +5,12 @@ import sys
 
 import pytest
 
+from piezo_hysteresis.acquisition.stage_lock import StageLock
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.nodes.stage_lock import StageLock
 
 HOLDER = """
 import sys
-from piezo_hysteresis.nodes.stage_lock import StageLock
+from piezo_hysteresis.acquisition.stage_lock import StageLock
 lock = StageLock(["device A"])
 print("held", flush=True)
 sys.stdin.read()

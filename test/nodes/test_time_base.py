@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.nodes.time_base import TimeBase, read_together
+from piezo_hysteresis.acquisition.time_base import TimeBase, read_together
 
 START = 1_700_000_000_000_000_000
 

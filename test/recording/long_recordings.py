@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from piezo_hysteresis.recording import BagWriter
-from piezo_hysteresis.recording.block import TYPE, Block
+from piezo_hysteresis.recording.bag.block_message import TYPE, Block
 
 PERIOD = 1e-4
 PIECE = 200_000
@@ -94,10 +94,11 @@ def _bag(path, pieces):
 _READER = """
 import json, resource, sys
 from piezo_hysteresis.errors import RecordingError
-from piezo_hysteresis.recording import intake, read
+from piezo_hysteresis.recording import read
+from piezo_hysteresis.recording.segmentation import decimating_buffer as intake
 path, average, enough, room = json.loads(sys.argv[1])
 intake.ENOUGH = enough or intake.ENOUGH
-from piezo_hysteresis.recording import column
+from piezo_hysteresis.recording.table import column
 column.ENOUGH = intake.ENOUGH
 layout = {"sample_period": 1e-4}
 read(sys.argv[2], **layout)  # whatever is imported and compiled only now

@@ -14,8 +14,8 @@ from rosbags.rosbag2 import Reader
 
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.recording import Bag, BagWriter
-from piezo_hysteresis.recording.bag import REORDERING_HORIZON
-from piezo_hysteresis.recording.phase_topic import STRING, PhaseNames
+from piezo_hysteresis.recording.bag.bag import REORDERING_HORIZON
+from piezo_hysteresis.recording.bag.phase_topic import STRING, PhaseNames
 
 ROOT = Path(__file__).parents[2]
 
@@ -76,7 +76,7 @@ def _written_by(tmp_path, body, expect):
     script = f"""
         import sys
         from piezo_hysteresis.recording import BagWriter
-        from piezo_hysteresis.recording.phase_topic import STRING, PhaseNames
+        from piezo_hysteresis.recording.bag.phase_topic import STRING, PhaseNames
         from piezo_hysteresis.errors import RecordingError
         bag = BagWriter({str(tmp_path / "bag")!r})
         bag.add_topic("/phase", STRING)

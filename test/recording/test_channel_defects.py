@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.record import Record
-from piezo_hysteresis.recording.channel_defects import channel_defects
+from piezo_hysteresis.recording.checks.channel_defects import channel_defects
 
 PERIOD = 1e-4
 

@@ -6,7 +6,7 @@ import pytest
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import read, write
-from piezo_hysteresis.recording.decimation import FILE, load_decimation, save_decimation
+from piezo_hysteresis.recording.segmentation.decimation import FILE, load_decimation, save_decimation
 
 
 def test_slow_phases_are_averaged_on_reading(tmp_path):

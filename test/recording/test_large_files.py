@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from scipy import io
 
 from piezo_hysteresis.errors import RecordingError
-from piezo_hysteresis.recording import column, intake, read
-from piezo_hysteresis.recording.intake import Intake, shared_averages
+from piezo_hysteresis.recording import read
+from piezo_hysteresis.recording.segmentation import decimating_buffer as intake
+from piezo_hysteresis.recording.segmentation.decimating_buffer import Intake, shared_averages
+from piezo_hysteresis.recording.table import column
 from test.recording import long_recordings
 
 PERIOD = 1e-4

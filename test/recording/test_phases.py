@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.record import Record
-from piezo_hysteresis.recording.phases import labelled, propose
-from piezo_hysteresis.recording.waveform import phase_name
+from piezo_hysteresis.recording.segmentation.phases import labelled, propose
+from piezo_hysteresis.recording.segmentation.waveform import phase_name
 
 PERIOD = 1e-4
 

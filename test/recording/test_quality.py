@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import inspect, read, write
-from piezo_hysteresis.recording.lag import lag_of
-from piezo_hysteresis.recording.onset import departures, is_within_its_loop
+from piezo_hysteresis.recording.checks.initial_condition_check import departures, is_within_its_loop
+from piezo_hysteresis.recording.checks.lag import lag_of
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
 PERIOD = 1e-4

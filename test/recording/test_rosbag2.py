@@ -10,8 +10,8 @@ from rosbags.typesys import Stores, get_typestore
 from piezo_hysteresis.errors import PiezoError, RecordingError
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import BagWriter, read, recorded_model, write
-from piezo_hysteresis.recording.block import TYPE, Block
-from piezo_hysteresis.recording.phase_topic import STRING, PhaseNames
+from piezo_hysteresis.recording.bag.block_message import TYPE, Block
+from piezo_hysteresis.recording.bag.phase_topic import STRING, PhaseNames
 
 PERIOD = 2e-5
 SIZE = 500

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
-from piezo_hysteresis.identification import excitation
-from piezo_hysteresis.identification.drive import DriveLimits
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.identification.protocol import excitation
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Notice
-from piezo_hysteresis.report.comparison import compare
+from piezo_hysteresis.report.figures.comparison import compare
 from piezo_hysteresis.report.page import page
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage

@@ -13,18 +13,18 @@ from hypothesis.extra.numpy import arrays
 from scipy.signal import lfilter
 
 from piezo_hysteresis.effects import Arx, BoucWen
-from piezo_hysteresis.model import Model
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
-from piezo_hysteresis.report.bode import bode
-from piezo_hysteresis.report.comparison import compare
-from piezo_hysteresis.report.creep import creep
-from piezo_hysteresis.report.loops import cycles, opening
+from piezo_hysteresis.report.figures.bode import bode
+from piezo_hysteresis.report.figures.comparison import compare
+from piezo_hysteresis.report.figures.creep import creep
+from piezo_hysteresis.report.figures.loops import cycles, opening
+from piezo_hysteresis.report.figures.residual_maps import residual_maps
+from piezo_hysteresis.report.figures.spectrum import residual_spectrum
+from piezo_hysteresis.report.figures.thinning import thinned
+from piezo_hysteresis.report.figures.time_series import window
+from piezo_hysteresis.report.figures.whiteness import whiteness
 from piezo_hysteresis.report.page import SECTIONS
-from piezo_hysteresis.report.residual_maps import residual_maps
-from piezo_hysteresis.report.spectrum import residual_spectrum
-from piezo_hysteresis.report.thinning import thinned
-from piezo_hysteresis.report.time_series import window
-from piezo_hysteresis.report.whiteness import whiteness
 
 FIGURES = [figure for figures in SECTIONS.values() for figure in figures]
 

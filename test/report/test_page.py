@@ -12,7 +12,7 @@ from html.parser import HTMLParser
 import pytest
 
 from piezo_hysteresis.errors import RecordingError
-from piezo_hysteresis.report.answer_tables import effect_table, gap_table, rejection_table, where_table
+from piezo_hysteresis.report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
 from piezo_hysteresis.report.verdict import verdict
 
 VOID = {"meta", "img", "br", "link", "hr"}

@@ -6,11 +6,11 @@ import dataclasses
 
 import numpy as np
 
-from piezo_hysteresis.identification.fit import Fit
+from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.record import Experiment, Notice
-from piezo_hysteresis.report.error_table import error_table, frequency_table
-from piezo_hysteresis.report.parameter_table import correlation_table, parameter_table
-from piezo_hysteresis.report.quality_table import notice_table, record_table
+from piezo_hysteresis.report.tables.error_table import error_table, frequency_table
+from piezo_hysteresis.report.tables.parameter_table import correlation_table, parameter_table
+from piezo_hysteresis.report.tables.quality_table import notice_table, record_table
 from piezo_hysteresis.report.words import duration, nanometre
 
 

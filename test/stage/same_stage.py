@@ -10,7 +10,8 @@ import numpy as np
 
 from piezo_hysteresis.discrepancy import Diagnosis, diagnose
 from piezo_hysteresis.effects import BY_NAME, CATALOGUE, Arx
-from piezo_hysteresis.identification import DriveLimits, Identification, excitation, identify
+from piezo_hysteresis.identification import DriveLimits, Identification, identify
+from piezo_hysteresis.identification.protocol import excitation
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy import Verdict
-from piezo_hysteresis.stage.gcs2.emulator.controller import Controller
-from piezo_hysteresis.stage.gcs2.emulator.server import Server as Gcs2Server
+from piezo_hysteresis.emulators.gcs2.controller import Controller
+from piezo_hysteresis.emulators.gcs2.server import Server as Gcs2Server
 from piezo_hysteresis.stage.gcs2.setup import Gcs2Setup
 from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
 from piezo_hysteresis.stage.simulated import SimulatedStage
@@ -63,8 +63,8 @@ def nidaqmx(plant):
     """One stream of blocks from the first phase to the last, over gRPC."""
     pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
     pytest.importorskip("grpc")
-    from piezo_hysteresis.stage.daqmx.emulator.card import Card
-    from piezo_hysteresis.stage.daqmx.emulator.server import Server
+    from piezo_hysteresis.emulators.daqmx.card import Card
+    from piezo_hysteresis.emulators.daqmx.server import Server
     from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
     from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
 

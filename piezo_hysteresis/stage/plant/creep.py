@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...blocks.kernel import kernel
 from ...errors import ParameterError
-from ...kernel import kernel
 from .clock import Clock
 from .quantity import Group, quantity
 

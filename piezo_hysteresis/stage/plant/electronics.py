@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel import kernel
+from ...blocks.kernel import kernel
 from .clock import Clock
 from .quantity import Group, quantity
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from ...blocks.kernel import kernel
 from ...errors import ParameterError
-from ...kernel import kernel
 from .clock import Clock
 from .quantity import Group, quantity
 

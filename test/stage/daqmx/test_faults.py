@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from piezo_hysteresis.emulators.daqmx.card import Card
+from piezo_hysteresis.emulators.daqmx.faults import FAULTS
+from piezo_hysteresis.emulators.daqmx.server import Server
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.stage.daqmx.emulator.card import Card
-from piezo_hysteresis.stage.daqmx.emulator.faults import FAULTS
-from piezo_hysteresis.stage.daqmx.emulator.server import Server
 from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
 from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
 from piezo_hysteresis.stage.simulated import SimulatedStage

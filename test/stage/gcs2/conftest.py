@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import pytest
 
+from piezo_hysteresis.emulators.gcs2.controller import Controller
+from piezo_hysteresis.emulators.gcs2.faults import FAULTS
+from piezo_hysteresis.emulators.gcs2.server import Server
 from piezo_hysteresis.stage.gcs2.client import Client
 from piezo_hysteresis.stage.gcs2.connection import Connection
-from piezo_hysteresis.stage.gcs2.emulator.controller import Controller
-from piezo_hysteresis.stage.gcs2.emulator.faults import FAULTS
-from piezo_hysteresis.stage.gcs2.emulator.server import Server
 from piezo_hysteresis.stage.gcs2.setup import Gcs2Setup
 from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
 from piezo_hysteresis.stage.simulated import SimulatedStage

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from piezo_hysteresis.emulators.gcs2 import answer
+from piezo_hysteresis.emulators.gcs2.controller import BYTES, Controller
+from piezo_hysteresis.emulators.gcs2.server import Server, cut
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.stage.gcs2.array import GcsArray
 from piezo_hysteresis.stage.gcs2.axis import NEEDED
 from piezo_hysteresis.stage.gcs2.client import Client
 from piezo_hysteresis.stage.gcs2.connection import Connection
-from piezo_hysteresis.stage.gcs2.emulator import answer
-from piezo_hysteresis.stage.gcs2.emulator.controller import BYTES, Controller
-from piezo_hysteresis.stage.gcs2.emulator.server import Server, cut
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
 many = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -5,9 +5,9 @@ import time
 import numpy as np
 import pytest
 
+from piezo_hysteresis.emulators.fault import Fault
+from piezo_hysteresis.emulators.gcs2.faults import FAULTS
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.stage.fault import Fault
-from piezo_hysteresis.stage.gcs2.emulator.faults import FAULTS
 from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
 
 WAVE = 4.0 - 4.0 * np.cos(2 * np.pi * np.arange(1200) / 600)

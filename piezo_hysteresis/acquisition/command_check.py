@@ -1,0 +1,71 @@
+"""`CommandCheck`: a command is played whole or refused whole. No node, only messages."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sensor_msgs.msg import PointCloud2
+
+from ..errors import StageError
+from ..nodes.messages.conversions import from_stamp, waveform_from_cloud
+from ..stage.stage import Description, Samples
+
+
+@dataclass(frozen=True, slots=True)
+class CommandCheck:
+    """What a driver accepts.
+
+    Parameters
+    ----------
+    limits : Description
+        Of the stage, narrowed to the limits of the driver.
+    sample_period : float
+        Time between samples [s].
+    max_age : float
+        Oldest command that is played, and furthest in the future [s].
+    """
+
+    limits: Description
+    sample_period: float
+    max_age: float
+
+    def waveform(self, cloud: PointCloud2, now: int) -> Samples:
+        """Waveform of a command [V], shape (n,), checked but for its first step.
+
+        Parameters
+        ----------
+        cloud : sensor_msgs.msg.PointCloud2
+            Message of `command`.
+        now : int
+            The driver's clock [ns].
+
+        Raises
+        ------
+        StageError, RecordError
+            With the reason for the refusal.
+        """
+        self._require_drivable()
+        stamp = from_stamp(cloud.header.stamp)
+        age = (now - stamp) / 1e9
+        if stamp and abs(age) > self.max_age:
+            when = f"{age:.3g} s old" if age > 0 else f"{-age:.3g} s in the future"
+            raise StageError(f"stamp is {when}, expected within {self.max_age:g} s; recorded commands move no stage")
+        voltage = waveform_from_cloud(cloud, self.sample_period)
+        return self.limits.check_voltage(voltage, float(voltage[0]), self.sample_period)
+
+    def first_step(self, waveform: Samples, present_voltage: float) -> None:
+        """Refuse a waveform that begins too far from the voltage in force [V]; StageError."""
+        self.limits.check_voltage(waveform[:1], present_voltage, self.sample_period)
+
+    def set_point(self, voltage: float) -> float:
+        """A voltage to ramp to [V]; StageError outside the limits or not finite."""
+        self._require_drivable()
+        low, high = self.limits.voltage_min, self.limits.voltage_max
+        if not (math.isfinite(voltage) and low <= voltage <= high):
+            raise StageError(f"got {voltage:g} V, expected {low:g} to {high:g} V; nothing moves")
+        return float(voltage)
+
+    def _require_drivable(self) -> None:
+        if self.limits.ignores_drive:
+            raise StageError(f"{self.limits.name} replays a recording and cannot be driven")

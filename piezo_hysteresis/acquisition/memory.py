@@ -1,0 +1,96 @@
+"""`MemoryAcquisition`: chains upload-run-read blocks of a stage with on-board memory. No ROS."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, cast
+
+import numpy as np
+
+from ..stage.stage import Acquired, MemoryStage
+from .playback import Playback
+from .streaming import Acquisition
+
+
+class MemoryAcquisition(Acquisition):
+    """As `Acquisition`, for a `MemoryStage`.
+
+    Waveforms and ramps are uploaded in blocks as long as the memory; while a voltage is held, single samples are read
+    on the slow path. The index follows the clock: time in which nothing was measured is a jump of the index, told by
+    `SampleBlock.follows_gap`.
+
+    Parameters
+    ----------
+    rest_period : float
+        Time between readings while a voltage is held [s].
+    """
+
+    _poll = 0.01
+
+    def __init__(self, *arguments: Any, rest_period: float, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self._rest_period = rest_period
+
+    def _step(self) -> None:
+        playback = cast(Playback, self.playback)
+        with self._access:
+            pending = playback.pending
+        if pending:
+            self._play(playback, min(pending, self.stage.description.longest_block or pending))
+        else:
+            self._rest(playback)
+
+    def _rest(self, playback: Playback) -> None:
+        due = time.monotonic() + self._rest_period
+        while time.monotonic() < due:
+            if not self._wait_until(min(due, time.monotonic() + self._poll)):
+                return
+            if playback.pending:
+                return
+        self._look(playback)
+
+    def _look(self, playback: Playback) -> None:
+        """One sample on the slow path."""
+        voltage, displacement = self.stage.read_voltage(), self.stage.read_displacement()
+        first = max(self._time_base.index_at(time.monotonic()), self.index)
+        with self._access:
+            if playback.pending:
+                return
+            playback.pass_unseen(first - self.index)
+            drive = playback.take(1)
+        self._tell(first, drive, Acquired(np.array([voltage]), np.array([displacement])))
+
+    def _play(self, playback: Playback, count: int) -> None:
+        stage = cast(MemoryStage, self.stage)
+        with self._access:
+            voltage, was_stopping = playback.preview(count).voltage, playback.is_stopping
+        stage.upload(voltage)
+        stage.arm()
+        first = max(self._time_base.index_at(time.monotonic()), self.index)
+        stage.start()
+        end = self._time_base.due(first + count)
+
+        def interrupted() -> bool:
+            return playback.is_stopping and not was_stopping
+
+        while (now := time.monotonic()) < end and not interrupted():
+            if not self._wait_until(min(end, now + self._poll)):
+                break
+        if time.monotonic() < end:
+            self._break_off(playback)
+            return
+        stage.wait(1.0 + end - self._time_base.due(first))
+        acquired = stage.read()
+        with self._access:
+            drive = None if interrupted() else playback.take(count)
+        if drive is None:
+            self._break_off(playback)
+        else:
+            self._tell(first, drive, acquired)
+
+    def _break_off(self, playback: Playback) -> None:
+        """The device goes to its safe voltage by itself; what it measured on the way is not known."""
+        self.stage.safe()
+        with self._access:
+            playback.jump(self.stage.voltage)
+        self._look(playback)

@@ -1,0 +1,138 @@
+"""`DriverSession`: an opened stage with its limits and its lock, what a driver holds while it is configured. No ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..errors import PiezoError, StageError
+from ..stage.replay import ReplayStage
+from ..stage.stage import Stage
+from .back_ends import BACK_ENDS, open_stage
+from .command_check import CommandCheck
+from .memory import MemoryAcquisition
+from .playback import Playback
+from .recorded_playback import RecordedPlayback
+from .settings import DriverSettings
+from .stage_lock import StageLock
+from .streaming import Acquisition, Delivery, Source
+from .time_base import TimeBase
+
+
+class DriverSession:
+    """Opens a stage, and streams it between `start` and `make_safe`, as often as wanted, until it is closed.
+
+    Parameters
+    ----------
+    settings : DriverSettings
+        Of the driver.
+    values : mapping
+        Of the rows of the back end, by name.
+    place : str
+        What no other driver may share, in words: topic and domain.
+
+    Raises
+    ------
+    PiezoError
+        If the stage cannot be opened, is driven already, or does not allow what the settings ask for.
+    """
+
+    def __init__(self, settings: DriverSettings, values: Mapping[str, Any], place: str) -> None:
+        self.settings, self._values = settings, values
+        self._lock = StageLock([place])
+        try:
+            self.stage = open_stage(settings.stage, values, settings.sample_period, settings.real_time_factor)
+        except BaseException:
+            self._lock.release()
+            raise
+        try:
+            self.limits = settings.limits(self.stage.description)
+            if BACK_ENDS[settings.stage].is_device:
+                self._lock.add(f"device {self.limits.name}")
+        except BaseException:
+            self.close()
+            raise
+        self.sample_period = self.stage.sample_period
+        self.check = CommandCheck(self.limits, self.sample_period, settings.command_max_age)
+        self._acquisition: Acquisition | None = None
+
+    @property
+    def streaming(self) -> Acquisition:
+        """The acquisition under way; StageError while nothing streams."""
+        if self._acquisition is None:
+            raise StageError("the driver is not active; activate it")
+        return self._acquisition
+
+    def start(
+        self,
+        node_clock: Callable[[], int],
+        deliver: Callable[[Delivery], None],
+        fail: Callable[[PiezoError], None],
+        subscribers: Callable[[], int],
+    ) -> Acquisition:
+        """Stream from the voltage in force on; see `Acquisition` for the parameters."""
+        settings = self.settings
+        wanted = self._values.get("subscribers", 0)
+        arguments = (
+            self.stage,
+            self._source(self.stage),
+            TimeBase(self.sample_period, settings.real_time_factor),
+            settings.block_size(self.sample_period),
+            node_clock,
+            deliver,
+            fail,
+            lambda: subscribers() >= wanted,
+        )
+        if self.limits.streaming:
+            acquisition = Acquisition(*arguments)
+        else:
+            acquisition = MemoryAcquisition(*arguments, rest_period=1 / settings.live_rate)
+        acquisition.start()
+        self._acquisition = acquisition
+        return acquisition
+
+    def in_force(self) -> dict[str, float | str]:
+        """What holds, by the names of `IN_FORCE`."""
+        limits, settings = self.limits, self.settings
+        return {
+            "stage": limits.name,
+            "sample_period": self.sample_period,
+            "voltage_min": limits.voltage_min,
+            "voltage_max": limits.voltage_max,
+            "safe_voltage": limits.safe_voltage,
+            "max_slew_rate": limits.max_slew_rate,
+            "ramp_rate": settings.ramp_rate,
+        }
+
+    def _source(self, stage: Stage) -> Source:
+        if isinstance(stage, ReplayStage):
+            return RecordedPlayback(stage, self._values["repeat"])
+        settings = self.settings
+        return Playback(
+            stage.voltage, self.limits.safe_voltage, self.sample_period, settings.ramp_rate, settings.hold_timeout
+        )
+
+    def make_safe(self) -> None:
+        """Ramp to the safe voltage and end the stream; harmless when nothing streams.
+
+        Raises
+        ------
+        StageError
+            If the ramp was not finished in time; the stage has then been told to go there by itself.
+        """
+        acquisition, self._acquisition = self._acquisition, None
+        if acquisition is None:
+            return
+        timeout = 2.0 + 2.0 * self.settings.longest_ramp(self.limits)
+        if not acquisition.make_safe(timeout):
+            self.stage.safe()
+            raise StageError(
+                f"{self.limits.name}: no ramp to the safe voltage within {timeout:g} s; it was set at once"
+            )
+
+    def close(self) -> None:
+        """Make safe, release stage and lock."""
+        try:
+            self.stage.close()
+        finally:
+            self._lock.release()

@@ -1,0 +1,109 @@
+"""`DriverSettings`: the parameters of the driver as a table, and as one frozen value that has been checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from ..errors import ParameterError
+from ..nodes.runtime.parameters import Row, Setting
+from ..parameter import Parameter
+from ..stage.stage import Description
+from .back_ends import BACK_ENDS
+
+_SOURCE = "driver"
+
+DRIVER: tuple[Row, ...] = (
+    Setting("stage", "simulated", "back end", tuple(BACK_ENDS)),
+    Setting("autostart", True, "configure and activate at start"),
+    Parameter("sample_period", "T_s", "s", 0.0, 0.0, 10.0, "time between samples; 0: the stage's own", _SOURCE),
+    Parameter("block_duration", "T_b", "s", 0.01, 1e-3, 1.0, "time covered by one message of samples", _SOURCE),
+    Parameter("live_rate", "f_l", "Hz", 50.0, 0.1, 1000.0, "rate of voltage, displacement and live", _SOURCE),
+    Parameter("voltage_min", "u_min", "V", 0.0, -1e4, 1e4, "lowest drive voltage; both 0: the stage's", _SOURCE),
+    Parameter("voltage_max", "u_max", "V", 0.0, -1e4, 1e4, "highest drive voltage; both 0: the stage's", _SOURCE),
+    Parameter("max_slew_rate", "S_max", "V/s", 0.0, 0.0, 1e12, "steepest drive; 0: what the stage allows", _SOURCE),
+    Parameter("ramp_rate", "S_r", "V/s", 50.0, 1e-3, 1e9, "rate of set-points and of the way to safety", _SOURCE),
+    Parameter(
+        "hold_timeout", "T_h", "s", 0.0, 0.0, 1e6, "a held voltage then gives way to the safe one; 0: never", _SOURCE
+    ),
+    Parameter("command_max_age", "T_c", "s", 2.0, 0.0, 1e6, "oldest command that is played", _SOURCE),
+    Parameter("real_time_factor", "κ", "1", 1.0, 0.01, 1000.0, "speed of a simulated stage; 1: real time", _SOURCE),
+    Parameter("discovery_time", "T_d", "s", 0.5, 0.0, 30.0, "wait for another driver of the same topics", _SOURCE),
+)
+"""Rows of the driver itself; those of the back ends follow under ``"<word>."``."""
+
+IN_FORCE: tuple[Row, ...] = (
+    Setting("stage", "", "name of the stage"),
+    Parameter("sample_period", "T_s", "s", 0.0, 0.0, math.inf, "time between samples", _SOURCE),
+    Parameter("voltage_min", "u_min", "V", 0.0, -math.inf, math.inf, "lowest drive voltage", _SOURCE),
+    Parameter("voltage_max", "u_max", "V", 0.0, -math.inf, math.inf, "highest drive voltage", _SOURCE),
+    Parameter("safe_voltage", "u_0", "V", 0.0, -math.inf, math.inf, "voltage of the stage at rest", _SOURCE),
+    Parameter("max_slew_rate", "S_max", "V/s", 0.0, 0.0, math.inf, "steepest drive", _SOURCE),
+    Parameter("ramp_rate", "S_r", "V/s", 0.0, 0.0, math.inf, "rate of set-points and of the way to safety", _SOURCE),
+)
+"""What holds while the driver is configured, under ``"in_force."``: planners read it."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriverSettings:
+    """Values of the rows of `DRIVER`, by name and in their units."""
+
+    stage: str
+    autostart: bool
+    sample_period: float
+    block_duration: float
+    live_rate: float
+    voltage_min: float
+    voltage_max: float
+    max_slew_rate: float
+    ramp_rate: float
+    hold_timeout: float
+    command_max_age: float
+    real_time_factor: float
+    discovery_time: float
+
+    @classmethod
+    def from_values(cls, values: Mapping[str, Any]) -> DriverSettings:
+        """Pick the fields out of `values`."""
+        return cls(**{field.name: values[field.name] for field in fields(cls)})
+
+    def limits(self, stage: Description) -> Description:
+        """The description of a stage, narrowed to what this driver lets pass; waveforms may be of any length.
+
+        Raises
+        ------
+        ParameterError
+            If the driver would allow what the stage does not.
+        """
+        if stage.ignores_drive:
+            return stage
+        low, high = self.voltage_min, self.voltage_max
+        if low == high == 0.0:
+            low, high = stage.voltage_min, stage.voltage_max
+        if not stage.voltage_min <= low <= stage.safe_voltage <= high <= stage.voltage_max:
+            raise ParameterError(
+                f"voltage_min, voltage_max: got {low:g} to {high:g} V, expected them inside {stage.voltage_min:g} to "
+                f"{stage.voltage_max:g} V of {stage.name} and around its safe voltage {stage.safe_voltage:g} V"
+            )
+        slew = self.max_slew_rate or stage.max_slew_rate
+        if slew > stage.max_slew_rate:
+            raise ParameterError(
+                f"max_slew_rate: got {slew:g} V/s, expected at most the {stage.max_slew_rate:g} V/s of {stage.name}"
+            )
+        if self.ramp_rate > slew:
+            raise ParameterError(
+                f"ramp_rate: got {self.ramp_rate:g} V/s, expected at most the slew rate {slew:g} V/s; "
+                "lower ramp_rate or raise max_slew_rate"
+            )
+        return replace(stage, voltage_min=low, voltage_max=high, max_slew_rate=slew, longest_block=None)
+
+    def block_size(self, sample_period: float) -> int:
+        """Samples per message, at least one."""
+        return max(1, round(self.block_duration / sample_period))
+
+    def longest_ramp(self, limits: Description) -> float:
+        """Time of the longest way to the safe voltage [s]."""
+        reach = max(limits.voltage_max - limits.safe_voltage, limits.safe_voltage - limits.voltage_min)
+        return math.ceil(reach / self.ramp_rate / self.real_time_factor)

@@ -1,0 +1,231 @@
+"""`Acquisition`: the thread that exchanges blocks with a streaming stage at the pace of the steady clock. No ROS."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from ..errors import PiezoError, StageError
+from ..nodes.messages.samples import SampleBlock
+from ..stage.stage import Acquired, Samples, Stage, StreamingStage
+from .device_clock import DeviceClock
+from .drive import Drive, Event, Phase
+from .latency_buffer import LateDrive
+from .playback import Playback
+from .recorded_playback import RecordedPlayback
+from .time_base import TimeBase, read_together
+
+Source = Playback | RecordedPlayback
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Delivery:
+    """One block and what happened in it.
+
+    Parameters
+    ----------
+    block : SampleBlock
+        The samples.
+    first : int
+        Number of the first sample, not wrapped.
+    events : tuple of Event
+        With offsets into the block.
+    """
+
+    block: SampleBlock
+    first: int
+    events: tuple[Event, ...]
+
+
+@dataclass(slots=True)
+class Tally:
+    """What an acquisition has done since it started; times in s."""
+
+    samples: int = 0
+    blocks: int = 0
+    never_measured: int = 0
+    latest: float = 0.0
+    postponed: float = 0.0
+    clock_jumps: float = 0.0
+    clock_drift: float = 0.0
+
+
+class Acquisition:
+    """Blocks to and from a stage, one after the other, in a thread of its own.
+
+    Parameters
+    ----------
+    stage : Stage
+        Configured; nobody else calls it while the thread runs.
+    playback : Playback or RecordedPlayback
+        What is applied.
+    time_base : TimeBase
+        Pace and stamps.
+    block_size : int
+        Samples per block.
+    node_clock : callable
+        The clock of the stamps [ns].
+    deliver : callable
+        Takes every `Delivery`, in the thread.
+    fail : callable
+        Takes the PiezoError that ended the thread; the stage has been made safe by itself where it could.
+    ready : callable, optional
+        The first block waits until it is true.
+    """
+
+    patience = 0.5
+    """Lag that is caught up with; beyond it the time base is postponed [s]."""
+
+    def __init__(
+        self,
+        stage: Stage,
+        playback: Source,
+        time_base: TimeBase,
+        block_size: int,
+        node_clock: Callable[[], int],
+        deliver: Callable[[Delivery], None],
+        fail: Callable[[PiezoError], None],
+        ready: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self.stage, self.playback, self.tally = stage, playback, Tally()
+        self.block_size, self.index = block_size, 0
+        self._time_base, self._node_clock = time_base, node_clock
+        self._deliver, self._fail, self._ready = deliver, fail, ready
+        self._late = LateDrive(round(stage.description.latency / time_base.sample_period), playback.phase.number)
+        self._device_clock = DeviceClock(time_base) if stage.description.latency else None
+        self._access = threading.Lock()
+        self._halting = threading.Event()
+        self._safe = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="acquisition", daemon=True)
+
+    def start(self) -> None:
+        """Begin with sample 0 now."""
+        self._thread.start()
+
+    def play(
+        self,
+        waveform: Samples,
+        name: str,
+        stamp: int,
+        check: Callable[[Samples, float], None],
+        accepted: Callable[[Phase, int], None],
+    ) -> Phase:
+        """Play a waveform next if `check` passes it at the voltage then in force; see `Playback.play`.
+
+        `accepted` is called with the phase and the number of samples before the first one is applied.
+        """
+        with self._access:
+            self.playback.require_free(name)
+            check(waveform, self.playback.voltage)
+            phase = self.playback.play(waveform, name, stamp)
+            accepted(phase, waveform.size)
+            return phase
+
+    def ramp_to(self, voltage: float) -> None:
+        """See `Playback.ramp_to`."""
+        with self._access:
+            self.playback.ramp_to(voltage)
+
+    def stop(self) -> tuple[Phase, bool]:
+        """See `Playback.stop`; the phase that ended, and whether it was being played."""
+        with self._access:
+            was_playing = self.playback.is_playing
+            return self.playback.stop(), was_playing
+
+    def make_safe(self, timeout: float) -> bool:
+        """Stop, wait until the stage rests at the safe voltage and has told so, and end the thread.
+
+        Returns
+        -------
+        bool
+            False where the stage was not there within `timeout` [s]. True also for a thread that had failed: it has
+            made the stage safe, or told that it could not.
+        """
+        if not self._thread.is_alive():
+            return True
+        self._safe.clear()
+        self.stop()
+        reached = self._safe.wait(timeout)
+        self._halting.set()
+        self._thread.join(timeout)
+        return reached
+
+    def _run(self) -> None:
+        try:
+            while not self._ready():
+                if self._halting.wait(0.01):
+                    return
+            self._time_base.anchor(0, *read_together(self._node_clock))
+            while not self._halting.is_set():
+                self._step()
+                if self.playback.is_safe and self._late.is_empty:
+                    self._safe.set()
+        except Exception as error:  # whatever it is, the stage must not stay energised
+            self._fail(self._abandon(error))
+            self._safe.set()
+
+    def _abandon(self, error: Exception) -> PiezoError:
+        try:
+            self.stage.safe()
+        except Exception as unsafe:
+            return StageError(f"{error}; the stage could not be brought to its safe voltage: {unsafe}")
+        return error if isinstance(error, PiezoError) else StageError(f"fault of the driver: {error!r}")
+
+    def _step(self) -> None:
+        stage = cast(StreamingStage, self.stage)
+        if self._device_clock is None and not self._keep_pace():
+            return
+        with self._access:
+            drive = self.playback.take(self.block_size)
+        acquired = stage.exchange(drive.voltage)
+        if self._device_clock is not None:
+            self._follow(self._device_clock)
+        self._tell(self.index, self._late.follow(drive), acquired)
+
+    def _keep_pace(self) -> bool:
+        """Wait until the next block is due; False where the thread has to end first."""
+        due = self._time_base.due(self.index + self.block_size)
+        if not self._wait_until(due):
+            return False
+        now = time.monotonic()
+        self.tally.latest = max(self.tally.latest, now - due)
+        if now - due > self.patience:
+            self.tally.postponed += self._time_base.postpone(self.index + self.block_size, now)
+        return True
+
+    def _follow(self, clock: DeviceClock) -> None:
+        """A device with a clock of its own has given a block when it was ready."""
+        end, now = self.index + self.block_size, time.monotonic()
+        if self.index == 0:  # opening its stream took as long as it took
+            self._time_base.postpone(end, now)
+        self.tally.latest = max(self.tally.latest, now - self._time_base.due(end))
+        self.tally.clock_drift += clock.follow(end, now)
+
+    def _wait_until(self, steady: float) -> bool:
+        """False where the thread has to end first."""
+        return not self._halting.wait(max(steady - time.monotonic(), 0.0))
+
+    def _tell(self, first: int, drive: Drive, acquired: Acquired) -> None:
+        """Deliver samples that begin at index `first`; what lies before them was never measured."""
+        self.tally.clock_jumps += abs(self._time_base.follow(first, *read_together(self._node_clock)))
+        count = acquired.voltage.size
+        block = SampleBlock(
+            stamp=self._time_base.stamp(first),
+            time=np.arange(count) * np.float64(self._time_base.sample_period),
+            voltage=acquired.voltage,
+            displacement=acquired.displacement,
+            index=np.arange(first, first + count).astype(np.uint32),  # modulo 2^32
+            phase=drive.phase,
+            stage=self.stage.description.name,
+            follows_gap=first > self.index,
+        )
+        self.tally.never_measured += first - self.index
+        self.tally.samples += count
+        self.tally.blocks += 1
+        self.index = first + count
+        self._deliver(Delivery(block, first, drive.events))

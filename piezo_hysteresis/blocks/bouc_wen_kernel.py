@@ -1,0 +1,118 @@
+"""Kernels of the Bouc-Wen loop, stepped exactly over a drive that is linear between samples.
+
+Along the path length ℓ = |Δv| with s = sgn Δv and g = sgn h the loop with all its terms obeys
+
+    dh/dℓ = s·A_eff − r·h,    r = |h/h_ref|^(n−1)·(β + γ s g) − φ1 s − φ2 g
+
+which for n = 1 has the closed solution h(ℓ) = h0 + (s·A_eff − r·h0)·(1 − e^(−rℓ))/r; where h crosses zero, g and with
+it r flip. For n ≠ 1 the power is frozen at the middle of sub-steps of at most `SUB_STEP`. Loop parameters are an array
+in the order of `LOOP`; a term at its off value leaves every bit of the plain loop as it is. The output is
+w = p1 v³ + p2 v + h.
+"""
+
+from __future__ import annotations
+
+from math import ceil, copysign, expm1, log, log1p
+
+from .kernel import kernel
+
+LOOP = ("A", "beta", "gamma", "phi1", "phi2", "n", "k", "a")
+A, BETA, GAMMA, PHI1, PHI2, EXPONENT, RATE, RATE_EXPONENT = range(8)
+H_REFERENCE = 0.2
+SUB_STEP = 0.01
+JUMP = 0.05
+"""Change of v in one sample beyond which a slow record holds a jump: how fast, the model's own period tells."""
+SLOWEST = 1e-4
+"""Rates below this (normalised units per second) count as this, so that the rate law stays finite."""
+
+
+@kernel
+def decay(r, length):
+    """(1 − e^(−r·length))/r, also for small r."""
+    x = r * length
+    if abs(x) < 0.02:
+        return length * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0))))))
+    return -expm1(-x) / r
+
+
+@kernel
+def crossing(h, drive, r):
+    """Path length at which h, driven through zero, gets there."""
+    return -h / drive if abs(r) < 1e-12 else log1p(-h * r / drive) / r
+
+
+@kernel
+def rate_factor(speed, a):
+    """((|v̇|/v0)^a − 1)/a with v0 = 1 per second; the logarithm for a → 0."""
+    x = log(max(speed, SLOWEST))
+    return x if abs(a) < 1e-9 else expm1(a * x) / a
+
+
+@kernel
+def advance(h, drive, length, r_same, r_flipped):
+    """h after `length` from h with loss rate r_same, and r_flipped once h has crossed zero."""
+    end = h + (drive - r_same * h) * decay(r_same, length)
+    if end * h < 0.0:
+        end = drive * decay(r_flipped, max(0.0, length - crossing(h, drive, r_same)))
+    return end
+
+
+@kernel
+def run_plain(v, p, p1, p2, state, w):
+    """The n = 1 loop without terms. state = [h, v_last], updated; w (n,) is filled.
+
+    Both losses are ready before h is known: each step waits for the last h only for a choice and two products.
+    """
+    a, beta, gamma = p[A], p[BETA], p[GAMMA]
+    h, last = state[0], state[1]
+    for i in range(v.size):
+        x = v[i]
+        dv = x - last
+        if dv != 0.0:
+            last = x
+            s, length = copysign(1.0, dv), abs(dv)
+            drive = s * a
+            r_above, r_below = beta + gamma * s, beta - gamma * s
+            above, below = decay(r_above, length), decay(r_below, length)
+            is_above = h > 0.0 or (h == 0.0 and drive > 0.0)
+            r_same = r_above if is_above else r_below
+            end = h + (drive - r_same * h) * (above if is_above else below)
+            if end * h < 0.0:
+                r_flipped = r_below if is_above else r_above
+                end = drive * decay(r_flipped, max(0.0, length - crossing(h, drive, r_same)))
+            h = end
+        w[i] = p1 * x * x * x + p2 * x + h
+    state[0], state[1] = h, last
+
+
+@kernel
+def run_general(v, p, p1, p2, sample_period, jump_period, state, w):
+    """The loop with all its terms; arguments as `run_plain`. A jump takes `jump_period`, all else `sample_period`."""
+    n, k = p[EXPONENT], p[RATE]
+    h, last = state[0], state[1]
+    for i in range(v.size):
+        x = v[i]
+        dv = x - last
+        if dv != 0.0:
+            last = x
+            s = copysign(1.0, dv)
+            drive = s * p[A]
+            if k != 0.0:
+                period = jump_period if abs(dv) > JUMP else sample_period
+                drive = drive * (1.0 + k * rate_factor(abs(dv) / period, p[RATE_EXPONENT]))
+            steps = 1
+            if n != 1.0:
+                steps = max(1, int(ceil(abs(dv) / SUB_STEP)))
+            length = abs(dv) / steps
+            for _ in range(steps):
+                g = copysign(1.0, drive if h == 0.0 else h)
+                bend, gm = p[PHI1] * s, p[PHI2] * g
+                same, flipped = p[BETA] + p[GAMMA] * s * g, p[BETA] - p[GAMMA] * s * g
+                if n != 1.0:
+                    power = abs(h / H_REFERENCE) ** (n - 1.0)
+                    middle = advance(h, drive, 0.5 * length, power * same - bend - gm, power * flipped - bend + gm)
+                    power = abs(middle / H_REFERENCE) ** (n - 1.0)
+                    same, flipped = power * same, power * flipped
+                h = advance(h, drive, length, same - bend - gm, flipped - bend + gm)
+        w[i] = p1 * x * x * x + p2 * x + h
+    state[0], state[1] = h, last

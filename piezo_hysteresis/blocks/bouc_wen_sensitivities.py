@@ -1,0 +1,230 @@
+"""Sensitivities of the Bouc-Wen loop: the kernels of `loop`, differentiated."""
+
+from __future__ import annotations
+
+from math import ceil, copysign, exp, log
+
+import numpy as np
+
+from .bouc_wen_kernel import (
+    BETA,
+    EXPONENT,
+    GAMMA,
+    H_REFERENCE,
+    JUMP,
+    LOOP,
+    PHI1,
+    PHI2,
+    RATE,
+    RATE_EXPONENT,
+    SLOWEST,
+    SUB_STEP,
+    A,
+    advance,
+    crossing,
+    decay,
+    rate_factor,
+)
+from .kernel import kernel
+
+START = len(LOOP)
+"""Index of the initial state among the own rows: it has no forcing."""
+
+
+@kernel
+def decay_slope(r, length):
+    """∂decay/∂r."""
+    x = r * length
+    if abs(x) < 0.02:
+        return -length * length * (0.5 - x * (1.0 / 3.0 - x * (1.0 / 8.0 - x * (1.0 / 30.0 - x * (1.0 / 144.0)))))
+    return (length * exp(-x) - decay(r, length)) / r
+
+
+@kernel
+def advance_slopes(h, drive, length, r_same, r_flipped, out):
+    """`advance`, with out = its derivatives by h, drive, length, r_same, r_flipped."""
+    phi = decay(r_same, length)
+    end = h + (drive - r_same * h) * phi
+    if end * h < 0.0:
+        reach = crossing(h, drive, r_same)
+        rest = max(0.0, length - reach)
+        left = exp(-r_flipped * rest)
+        pull = drive - h * r_same
+        out[0] = drive * left / pull
+        out[1] = decay(r_flipped, rest) - left * h / pull
+        out[2] = drive * left
+        if abs(r_same) < 1e-6:
+            out[3] = 0.5 * left * h * h / drive
+        else:
+            out[3] = drive * left * (reach + h / pull) / r_same
+        out[4] = drive * decay_slope(r_flipped, rest)
+        return drive * decay(r_flipped, rest)
+    left = 1.0 - r_same * phi
+    out[0] = left
+    out[1] = phi
+    out[2] = (drive - r_same * h) * left
+    out[3] = -h * phi + (drive - r_same * h) * decay_slope(r_same, length)
+    out[4] = 0.0
+    return end
+
+
+@kernel
+def slope_at(h, p, s):
+    """∂h/∂v at the beginning of a motion in direction s."""
+    g = copysign(1.0, s if h == 0.0 else h)
+    loss = p[BETA] + p[GAMMA] * s * g
+    if p[EXPONENT] != 1.0:
+        loss *= abs(h / H_REFERENCE) ** (p[EXPONENT] - 1.0)
+    drive = p[A]
+    if p[RATE] != 0.0:
+        drive *= 1.0 + p[RATE] * rate_factor(0.0, p[RATE_EXPONENT])
+    return drive - s * (loss - p[PHI1] * s - p[PHI2] * g) * h
+
+
+@kernel
+def linearise_plain(v, p, p1, p2, state, tangent, w, dw):
+    """`linearise_general` for n = 1 without terms and a drive that nothing is fitted of: rows A, β, γ, p1, p2."""
+    a, beta, gamma = p[A], p[BETA], p[GAMMA]
+    h, last = state[0], state[1]
+    by_a, by_beta, by_gamma = tangent[0], tangent[1], tangent[2]
+    row_a, row_beta, row_gamma, row_1, row_2 = dw[0], dw[1], dw[2], dw[3], dw[4]
+    full = np.zeros(5)
+    for i in range(v.size):
+        x = v[i]
+        dv = x - last
+        if dv != 0.0:
+            last = x
+            s = copysign(1.0, dv)
+            drive = s * a
+            turn = s * copysign(1.0, drive if h == 0.0 else h)
+            h = advance_slopes(h, drive, abs(dv), beta + gamma * turn, beta - gamma * turn, full)
+            by_a = full[0] * by_a + full[1] * s
+            by_beta = full[0] * by_beta + (full[3] + full[4])
+            by_gamma = full[0] * by_gamma + (full[3] * turn - full[4] * turn)
+        row_a[i], row_beta[i], row_gamma[i] = by_a, by_beta, by_gamma
+        w[i] = p1 * x * x * x + p2 * x + h
+    for i in range(v.size):
+        row_1[i], row_2[i] = v[i] * v[i] * v[i], v[i]
+    state[0], state[1] = h, last
+    tangent[0], tangent[1], tangent[2] = by_a, by_beta, by_gamma
+
+
+@kernel
+def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, state, tangent, last_in, w, dw):
+    """`run_general` with sensitivities.
+
+    dv_in (m, n) are incoming rows; own (q,) the indices into `LOOP` of the own rows, or `START`; tangent (m + q,) holds
+    ∂h, last_in (m,) the incoming slopes of v_last; dw (m + q + 2, n) is filled, p1 and p2 last. While v is held, a row
+    that moves counts as a motion in its own direction: the slope for a growing parameter.
+    """
+    m, q = dv_in.shape[0], own.size
+    n, k = p[EXPONENT], p[RATE]
+    h, last = state[0], state[1]
+    drive_by = np.zeros(START + 1)
+    same_by = np.zeros(START + 1)
+    flipped_by = np.zeros(START + 1)
+    half = np.zeros(5)
+    full = np.zeros(5)
+    rated, powered = k != 0.0, n != 1.0
+    for c in own:
+        rated = rated or c == RATE
+        powered = powered or c == EXPONENT
+    for i in range(v.size):
+        x = v[i]
+        dv = x - last
+        if dv != 0.0:
+            last = x
+            s = copysign(1.0, dv)
+            drive = s * p[A]
+            drive_by[A] = s
+            drive_by_speed = 0.0
+            period = jump_period if abs(dv) > JUMP else sample_period
+            if rated:
+                speed = abs(dv) / period
+                factor = rate_factor(speed, p[RATE_EXPONENT])
+                drive_by[RATE] = drive * factor
+                if k != 0.0:
+                    e, ln = p[RATE_EXPONENT], log(max(speed, SLOWEST))
+                    factor_by_a = 0.5 * ln * ln if abs(e) < 1e-6 else (ln * exp(e * ln) - factor) / e
+                    drive_by[RATE_EXPONENT] = drive * k * factor_by_a
+                    if speed > SLOWEST:
+                        drive_by_speed = drive * k * exp((e - 1.0) * ln)
+                    drive_by[A] = s * (1.0 + k * factor)
+                    drive = drive * (1.0 + k * factor)
+            steps = 1
+            whole_step = h
+            if powered:
+                steps = max(1, int(ceil(abs(dv) / SUB_STEP)))
+                g = copysign(1.0, drive if h == 0.0 else h)
+                bend, gm, turn = p[PHI1] * s, p[PHI2] * g, p[GAMMA] * s * g
+                whole_step = advance(h, drive, abs(dv), p[BETA] + turn - bend - gm, p[BETA] - turn - bend + gm)
+            length = abs(dv) / steps
+            for _ in range(steps):
+                g = copysign(1.0, drive if h == 0.0 else h)
+                bend, gm = p[PHI1] * s, p[PHI2] * g
+                loss, loss_flipped = p[BETA] + p[GAMMA] * s * g, p[BETA] - p[GAMMA] * s * g
+                power, power_by_h, power_by_n = 1.0, 0.0, 0.0
+                first, first_by_h, first_by_n = 1.0, 0.0, 0.0
+                if n != 1.0:
+                    first = abs(h / H_REFERENCE) ** (n - 1.0)
+                if powered:
+                    middle = advance_slopes(
+                        h, drive, 0.5 * length, first * loss - bend - gm, first * loss_flipped - bend + gm, half
+                    )
+                    if n != 1.0:
+                        power = abs(middle / H_REFERENCE) ** (n - 1.0)
+                    if h != 0.0:
+                        first_by_h = (n - 1.0) * first / h
+                        first_by_n = first * log(abs(h / H_REFERENCE))
+                    if middle != 0.0:
+                        power_by_h = (n - 1.0) * power / middle
+                        power_by_n = power * log(abs(middle / H_REFERENCE))
+                same_by[BETA], same_by[GAMMA], same_by[PHI1], same_by[PHI2] = power, power * s * g, -s, -g
+                flipped_by[BETA], flipped_by[GAMMA], flipped_by[PHI1], flipped_by[PHI2] = power, -power * s * g, -s, g
+                h_next = advance_slopes(
+                    h, drive, length, power * loss - bend - gm, power * loss_flipped - bend + gm, full
+                )
+                by_v = s * (full[1] * drive_by_speed / period + full[2] / steps)
+                for j in range(m):
+                    fresh = by_v * (dv_in[j, i] - last_in[j])
+                    if n != 1.0:
+                        move = s * (dv_in[j, i] - last_in[j])
+                        middle_by = half[0] * tangent[j] + half[1] * drive_by_speed * move / period
+                        middle_by += 0.5 * half[2] * move / steps
+                        middle_by += (half[3] * loss + half[4] * loss_flipped) * first_by_h * tangent[j]
+                        fresh += (full[3] * loss + full[4] * loss_flipped) * power_by_h * middle_by
+                    tangent[j] = full[0] * tangent[j] + fresh
+                for j in range(q):
+                    c = own[j]
+                    dh = tangent[m + j]
+                    fresh = full[1] * drive_by[c] + full[3] * same_by[c] + full[4] * flipped_by[c]
+                    if powered:
+                        d_n = 1.0 if c == EXPONENT else 0.0
+                        d_power = power_by_n * d_n
+                        if n != 1.0:
+                            scale = first / power if (c == BETA or c == GAMMA) and power != 0.0 else 1.0
+                            middle_by = half[0] * dh + half[1] * drive_by[c]
+                            middle_by += (half[3] * same_by[c] + half[4] * flipped_by[c]) * scale
+                            d_first = first_by_h * dh + first_by_n * d_n
+                            middle_by += (half[3] * loss + half[4] * loss_flipped) * d_first
+                            d_power += power_by_h * middle_by
+                        fresh += (full[3] * loss + full[4] * loss_flipped) * d_power
+                    tangent[m + j] = full[0] * dh + fresh
+                h = h_next
+            if powered and n == 1.0:
+                h = whole_step
+        else:
+            for j in range(m):
+                move = dv_in[j, i] - last_in[j]
+                if move != 0.0:
+                    tangent[j] += slope_at(h, p, copysign(1.0, move)) * move
+        by_v = 3.0 * p1 * x * x + p2
+        for j in range(m):
+            last_in[j] = dv_in[j, i]
+            dw[j, i] = tangent[j] + by_v * dv_in[j, i]
+        for j in range(m, m + q):
+            dw[j, i] = tangent[j]
+        dw[m + q, i] = x * x * x
+        dw[m + q + 1, i] = x
+        w[i] = p1 * x * x * x + p2 * x + h
+    state[0], state[1] = h, last

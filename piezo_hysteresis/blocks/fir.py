@@ -1,0 +1,51 @@
+"""`TapsBlock`: a delay as a few taps beside the direct path."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .block import Array, State
+from .linear import AddedBlock
+
+
+class TapsBlock(AddedBlock):
+    """y_i = Σ_k taps_k x_(i − first − k), with Σ taps = 1.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Parameters that the taps depend on.
+    first : int
+        Whole samples before the first tap.
+    taps : (k,) ndarray
+        Weights.
+    slopes : (p, k) ndarray
+        Their derivatives by the parameters.
+    """
+
+    def __init__(self, names: tuple[str, ...], first: int, taps: Array, slopes: Array) -> None:
+        self.names = names
+        self.added = np.concatenate((np.zeros(first), taps))
+        self.added[0] -= 1.0
+        self.slopes = np.pad(slopes, ((0, 0), (first, 0)))
+
+    def zeros(self, rows: int) -> Array:
+        return np.zeros((rows, self.added.size - 1))
+
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        return self._weigh(x, z, self.added, y)
+
+    def own_rest(self) -> State:
+        return None
+
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
+        for k, weights in enumerate(self.slopes):
+            self._weigh(x[None, :], z[None, :], weights, rows[k : k + 1])
+
+    def _weigh(self, x: Array, z: Array, weights: Array, y: Array) -> Array:
+        past, n = np.concatenate((z, x), axis=1), x.shape[1]
+        y[:] = 0.0
+        for k in np.flatnonzero(weights):
+            start = z.shape[1] - k
+            y += weights[k] * past[:, start : start + n]
+        return past[:, n:].copy()

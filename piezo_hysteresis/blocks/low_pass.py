@@ -1,0 +1,83 @@
+"""`PoleBlock`: equal poles in a row, exact for an input that is linear between samples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .block import Array, State
+from .kernel import kernel
+from .linear import AddedBlock
+from .relaxation import hold
+
+
+@kernel
+def run_poles(u, left, lead, back, z, y):
+    """Rows of u (r, n) through z.shape[1] − 1 equal poles; z (r, 1 + poles) = last input and outputs, updated."""
+    for r in range(u.shape[0]):
+        y[r] = u[r]
+        for k in range(1, z.shape[1]):
+            before, after = z[r, k - 1], z[r, k]
+            for i in range(u.shape[1]):
+                x = y[r, i]
+                after = left * after + lead * x + back * before
+                before = x
+                y[r, i] = after
+            z[r, k - 1] = before
+        z[r, z.shape[1] - 1] = y[r, u.shape[1] - 1]
+
+
+@kernel
+def poles_by_tau(u, left, lead, back, left_slope, lead_slope, back_slope, z, dz, dy):
+    """∂y/∂τ (n,) of one row u (n,); z and dz (1 + poles,) are updated, dz[0] is zero."""
+    for i in range(u.size):
+        before, x, dbefore, dx = z[0], u[i], 0.0, 0.0
+        z[0] = x
+        for k in range(1, z.size):
+            dafter = left * dz[k] + lead * dx + back * dbefore
+            dafter += left_slope * z[k] + lead_slope * x + back_slope * before
+            after = left * z[k] + lead * x + back * before
+            before, x, dbefore, dx = z[k], after, dz[k], dafter
+            z[k], dz[k] = after, dafter
+        dy[i] = dx
+
+
+class PoleBlock(AddedBlock):
+    """`count` poles with time constant τ; its lag near dc is count·τ at every sample period, and τ = 0 is no pole.
+
+    Parameters
+    ----------
+    name : str
+        Parameter that is τ.
+    tau : float
+        Time constant [s], zero or more.
+    count : int
+        Number of poles.
+    sample_period : float
+        [s]
+    """
+
+    keeps_state = True
+
+    def __init__(self, name: str, tau: float, count: int, sample_period: float) -> None:
+        self.names, self.count = (name,), count
+        step = hold(np.array([tau]), sample_period)
+        fade, lead, fade_slope, lead_slope = (float(c[0]) for c in step)
+        self.step = (1.0 - fade, lead, fade - lead)
+        self.slopes = (-fade_slope, lead_slope, fade_slope - lead_slope)
+
+    def zeros(self, rows: int) -> Array:
+        return np.zeros((rows, 1 + self.count))
+
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        z = z.copy()
+        run_poles(x, *self.step, z, y)
+        y -= x
+        return z
+
+    def own_rest(self) -> State:
+        return np.zeros(1 + self.count)
+
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
+        own = own.copy()
+        poles_by_tau(x, *self.step, *self.slopes, z.copy(), own, rows[0])
+        return own

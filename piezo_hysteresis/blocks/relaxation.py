@@ -1,0 +1,119 @@
+"""First-order relaxation τ ẋ + x = u, stepped exactly for an input that is linear between samples."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .block import Array
+from .kernel import kernel
+from .linear import AddedBlock
+
+LANES = 4
+
+
+class Hold(NamedTuple):
+    """Step x_i = x_(i−1) + fade·(u_(i−1) − x_(i−1)) + lead·(u_i − u_(i−1)), each shape (s,), and its slopes by τ."""
+
+    fade: Array
+    lead: Array
+    fade_slope: Array
+    lead_slope: Array
+
+
+def hold(tau: Array, sample_period: float) -> Hold:
+    """Coefficients for time constants `tau` [s], zero or more, shape (s,).
+
+    The lag near dc is τ at every sample period; τ = 0 gives x = u.
+
+    >>> [round(float(c[0]), 6) for c in hold(np.array([1.0]), 1.0)[:2]]
+    [0.632121, 0.367879]
+    >>> [float(c[0]) for c in hold(np.array([0.0]), 1.0)[:2]]
+    [1.0, 1.0]
+    """
+    x = sample_period / np.maximum(tau, sample_period / 1000.0)  # e^(−1000) is zero in double precision
+    left, fade = np.exp(-x), -np.expm1(-x)
+    fade_slope = -x * x * left / sample_period
+    return Hold(fade, 1.0 - fade * tau / sample_period, fade_slope, (x * left - fade) / sample_period)
+
+
+@kernel
+def relax(u, fade, lead, weights, z, y):
+    """Rows of u (r, n) to y (r, n) = Σ weights_j x_j; z (r, 1 + s) = last input and x_j, updated; s a multiple of 4.
+
+    Four relaxations go through the samples together: one alone would wait for its own last result.
+    """
+    n = u.shape[1]
+    for r in range(u.shape[0]):
+        y[r] = 0.0
+        for j in range(0, fade.size, LANES):
+            f0, f1, f2, f3 = fade[j], fade[j + 1], fade[j + 2], fade[j + 3]
+            l0, l1, l2, l3 = lead[j], lead[j + 1], lead[j + 2], lead[j + 3]
+            w0, w1, w2, w3 = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
+            x0, x1, x2, x3 = z[r, j + 1], z[r, j + 2], z[r, j + 3], z[r, j + 4]
+            last = z[r, 0]
+            for i in range(n):
+                du = u[r, i] - last
+                x0 += f0 * (last - x0) + l0 * du
+                x1 += f1 * (last - x1) + l1 * du
+                x2 += f2 * (last - x2) + l2 * du
+                x3 += f3 * (last - x3) + l3 * du
+                y[r, i] += (w0 * x0 + w1 * x1) + (w2 * x2 + w3 * x3)
+                last = u[r, i]
+            z[r, j + 1], z[r, j + 2], z[r, j + 3], z[r, j + 4] = x0, x1, x2, x3
+        z[r, 0] = u[r, n - 1]
+
+
+class RelaxationBlock(AddedBlock):
+    """y = x + direct·x + Σ weight_j x_j, with x_j the relaxation of x with τ_j.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Parameters that `direct` and the weights depend on.
+    tau : (s,) ndarray
+        Time constants [s].
+    sample_period : float
+        [s]
+    mix : (1 + s,) ndarray
+        `direct`, then the weights.
+    mix_slopes : (p, 1 + s) ndarray
+        Their derivatives by the parameters.
+    """
+
+    keeps_state = True
+
+    def __init__(self, names: tuple[str, ...], tau: Array, sample_period: float, mix: Array, mix_slopes: Array) -> None:
+        idle = -tau.size % LANES
+        self.names = names
+        self.mix = np.pad(mix, (0, idle))
+        self.mix_slopes = np.pad(mix_slopes, ((0, 0), (0, idle)))
+        self.hold = hold(np.pad(tau, (0, idle), mode="edge"), sample_period)
+        self.gain = float(mix.sum())
+
+    @property
+    def is_idle(self) -> bool:
+        return not self.mix.any()
+
+    def zeros(self, rows: int) -> Array:
+        return np.zeros((rows, self.mix.size))
+
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        return self._mix(x, z, self.mix, y)
+
+    def _mix(self, x: Array, z: Array, mix: Array, y: Array) -> Array:
+        z = z.copy()
+        relax(x, self.hold.fade, self.hold.lead, mix[1:].copy(), z, y)
+        y += mix[0] * x
+        return z
+
+    def gain_slopes(self) -> Array:
+        return self.mix_slopes.sum(axis=1)
+
+    def own_rest(self) -> None:
+        return None
+
+    def by_parameter(self, x: Array, y: Array, z: Array, own: None, rows: Array) -> None:
+        for k, mix in enumerate(self.mix_slopes):
+            self._mix(x[None, :], z[None, :], mix, rows[k : k + 1])

@@ -1,0 +1,38 @@
+"""Samples that a model is given: one dimension, at least one, all finite."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ModelError
+from ..record import are_finite
+
+Array = NDArray[np.float64]
+
+
+def row(values: ArrayLike, name: str) -> Array:
+    """As float64, shape (n,); not a copy where the values are that already.
+
+    Raises
+    ------
+    ModelError
+        On another shape, or no sample.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 1 or array.size == 0:
+        raise ModelError(f"{name}: got shape {array.shape}, expected one dimension with at least one sample")
+    return array
+
+
+def samples(values: ArrayLike, name: str) -> Array:
+    """`row`, finite; ModelError on a sample that is not, too."""
+    array = row(values, name)
+    if not are_finite(array):
+        raise not_finite(name, array)
+    return array
+
+
+def not_finite(name: str, values: Array, first: int = 0) -> ModelError:
+    """What to raise of samples that are not all finite; `first` is the number of the first one."""
+    return ModelError(f"{name}: sample {first + int((~np.isfinite(values)).argmax())} is not finite")

@@ -1,0 +1,48 @@
+"""Changes of unit in a chain, volts to v and position to metres, and what is checked on the way in and out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .block import Array, MemorylessBlock, State
+from .kernel import kernel
+
+
+@kernel
+def take_in(x: Array, factor: float, y: Array) -> bool:
+    """y (n,) = factor · x (n,); whether every x_i is finite."""
+    outside = 0
+    for i in range(x.size):
+        y[i] = factor * x[i]
+        outside |= not abs(x[i]) < np.inf
+    return outside == 0
+
+
+@kernel
+def hand_out(y: Array, factor: float, limit: float) -> bool:
+    """y (n,) times `factor` in place; whether every |y_i| is below `limit` then, which not a number is not."""
+    outside = 0
+    for i in range(y.size):
+        y[i] *= factor
+        outside |= not abs(y[i]) < limit
+    return outside == 0
+
+
+class ChangeOfUnit(MemorylessBlock):
+    """y = factor · x."""
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    def value(self, x: Array) -> Array:
+        return x * self.factor
+
+    def slope(self, x: Array) -> Array:
+        return np.full(x.size, self.factor)
+
+    def by_parameter(self, x: Array) -> Array:
+        return np.empty((0, x.size))
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        dx *= self.factor
+        return x * self.factor, dx, None, None

@@ -1,0 +1,221 @@
+"""The ARX with a dominant mode whose stiffness changes with deflection.
+
+G has a dominant mode M = g/(1 + m1 z⁻¹ + m2 z⁻²), g = 1 + m1 + m2. With the force N(x) = k2 |x| x + k3 x³ its modal
+coordinate obeys x_i = −m1 x_(i−1) − m2 x_(i−2) + g (w_i − N(x_(i−1))). Only its deviation ξ from the linear mode goes
+through R, beside the unchanged ARX: y = G w + R ξ. Off, ξ is exactly zero. R is what the mode passes on its way to the
+sensor: all the rest of G, R = G/M, or nothing but its own share of a sum of modes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arx import ArxBlock
+from .block import Array, Block, MemorylessBlock, SeriesBlock, State
+from .group_delay import LagBlock
+from .kernel import kernel
+from .mode_path import Path
+
+
+@kernel
+def force(x, k2, k3):
+    """N(x)."""
+    return (k2 * abs(x) + k3 * x * x) * x
+
+
+@kernel
+def force_slope(x, k2, k3):
+    """∂N/∂x."""
+    return 2.0 * k2 * abs(x) + 3.0 * k3 * x * x
+
+
+@kernel
+def settle(w, k2, k3, x):
+    """Static deflections x (n,) with x + N(x) = w; not a number where the stiffness vanishes on the way."""
+    for i in range(w.size):
+        x[i] = w[i]
+        for _ in range(50):
+            stiffness = 1.0 + force_slope(x[i], k2, k3)
+            if stiffness <= 0.0:
+                x[i] = np.nan
+                break
+            step = (w[i] - x[i] - force(x[i], k2, k3)) / stiffness
+            x[i] += step
+            if abs(step) <= 1e-15 * abs(x[i]):
+                break
+
+
+@kernel
+def run_mode_deviation(w, x0, p, z, xi):
+    """ξ (n,) for w (n,) relative to rest at x0; p = [m1, m2, k2, k3]; z = linear mode, ξ, two samples each."""
+    gain, held = 1.0 + p[0] + p[1], force(x0, p[2], p[3])
+    for i in range(w.size):
+        excess = force(x0 + (z[0] + z[2]), p[2], p[3]) - held
+        mode = gain * w[i] - p[0] * z[0] - p[1] * z[1]
+        xi[i] = -p[0] * z[2] - p[1] * z[3] - gain * excess
+        z[1], z[0], z[3], z[2] = z[0], mode, z[2], xi[i]
+
+
+@kernel
+def linearise_mode_deviation(w, dw, x0, dx0, p, z, dz, xi, dxi):
+    """`run_mode_deviation` with ∂ξ to dxi (m + 4, n): rows dw (m, n), then p.
+
+    dx0 (m + 4,) are slopes of x0; dz (m + 4, 4) is updated.
+    """
+    gain, m, n = 1.0 + p[0] + p[1], dw.shape[0], w.size
+    m1, m2 = p[0], p[1]
+    held, held_slope = force(x0, p[2], p[3]), force_slope(x0, p[2], p[3])
+    slope, forcing = np.empty(n), np.zeros((4, 2, n))
+    for i in range(n):
+        x = x0 + (z[0] + z[2])
+        excess = force(x, p[2], p[3]) - held
+        slope[i] = force_slope(x, p[2], p[3])
+        forcing[0, 0, i], forcing[0, 1, i] = w[i] - z[0], -z[2] - excess
+        forcing[1, 0, i], forcing[1, 1, i] = w[i] - z[1], -z[3] - excess
+        forcing[2, 1, i] = -gain * (abs(x) * x - abs(x0) * x0)
+        forcing[3, 1, i] = -gain * (x * x * x - x0 * x0 * x0)
+        xi[i] = -m1 * z[2] - m2 * z[3] - gain * excess
+        z[1], z[0], z[3], z[2] = z[0], gain * w[i] - m1 * z[0] - m2 * z[1], z[2], xi[i]
+    for r in range(m + 4):
+        mode, mode_before, moved, moved_before = dz[r, 0], dz[r, 1], dz[r, 2], dz[r, 3]
+        for i in range(n):
+            d_excess = slope[i] * (dx0[r] + mode + moved) - held_slope * dx0[r]
+            d_mode = -m1 * mode - m2 * mode_before
+            d_xi = -m1 * moved - m2 * moved_before - gain * d_excess
+            if r < m:
+                d_mode += gain * dw[r, i]
+            else:
+                d_mode += forcing[r - m, 0, i]
+                d_xi += forcing[r - m, 1, i]
+            mode, mode_before, moved, moved_before = d_mode, mode, d_xi, moved
+            dxi[r, i] = d_xi
+        dz[r, 0], dz[r, 1], dz[r, 2], dz[r, 3] = mode, mode_before, moved, moved_before
+
+
+@kernel
+def add_mixed(weights, rows, out):
+    """out (j, n) += Σ_k weights (k, j) · rows (k, n); a matrix product that does not depend on how n is cut."""
+    for j in range(out.shape[0]):
+        for k in range(rows.shape[0]):
+            for i in range(rows.shape[1]):
+                out[j, i] += weights[k, j] * rows[k, i]
+
+
+class StaticSoftening(MemorylessBlock):
+    """Deflection under a slow w, for records slower than the model."""
+
+    def __init__(self, name: str, k2: float, k3: float) -> None:
+        self.names = (f"{name}.k2", f"{name}.k3")
+        self.k2, self.k3 = k2, k3
+
+    def value(self, x: Array) -> Array:
+        settled = np.empty(x.shape)
+        settle(x, self.k2, self.k3, settled)
+        return settled
+
+    def slope(self, x: Array) -> Array:
+        at = self.value(x)
+        return np.asarray(1.0 / (1.0 + 2.0 * self.k2 * np.abs(at) + 3.0 * self.k3 * at * at))
+
+    def by_parameter(self, x: Array) -> Array:
+        at = self.value(x)
+        return -self.slope(x) * np.vstack((np.abs(at) * at, at * at * at))
+
+
+class SoftenedBlock(Block):
+    """State: of the ARX; w and x at rest; of mode and ξ; of the path."""
+
+    def __init__(self, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
+        self.arx, self.settled, self.path = arx, settled, path
+        self.loop = np.append(path.mode, (settled.k2, settled.k3))
+        self.names = (*settled.names, *arx.names)
+
+    def static(self, x0: float) -> float:
+        return self.arx.gain * x0 + self.path.share * (self.settled.static(x0) - x0)
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        slope, own = self.settled.static_slopes(x0)
+        by_arx = self.arx.gain_slopes() * x0 + self.path.share_slopes * (self.settled.static(x0) - x0)
+        return self.arx.gain + self.path.share * (slope - 1.0), np.concatenate((self.path.share * own, by_arx))
+
+    def rest(self, x0: float, time: float) -> State:
+        return self.arx.rest(x0, time), (x0, self.settled.static(x0)), np.zeros(4), self.path.filter.zeros(1)
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        arx, (w0, x0), z, filtered = state
+        y, arx = self.arx.run(x, arx)
+        xi, z = np.empty(x.shape), z.copy()
+        run_mode_deviation(x - w0, x0, self.loop, z, xi)
+        added = np.empty((1, x.size))
+        filtered = self.path.filter.filter(xi[None, :], filtered, added)
+        return y + (self.path.share * (x0 - w0) + added[0]), (arx, (w0, x0), z, filtered)
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        slope, own = self.settled.static_slopes(x0)
+        settled = np.concatenate((slope * dx0, np.zeros(2), own))
+        moved = np.zeros((len(settled), 4))
+        filtered = self.path.filter.zeros(len(settled))
+        return self.arx.rest_tangent(x0, dx0), np.array(dx0), settled, moved, filtered, self.path.filter.own_rest()
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        arx, (w0, x0), z, filtered = state
+        d_arx, dw0, dx0, dz, d_filtered, own = tangent
+        m, na, nb, k = len(dx), self.arx.a.size, self.arx.b.size, len(self.path.by_a)
+        dz, xi = dz.copy(), np.empty(x.shape)
+        d_xi = np.empty((m + 4, x.size))
+        z = z.copy()
+        linearise_mode_deviation(x - w0, dx - dw0[:, None], x0, dx0, self.loop, z, dz, xi, d_xi)
+        y, rows, arx, d_arx = self.arx.linearise(x, dx, arx, d_arx)
+        added, through, by_path = np.empty((1, x.size)), np.empty(d_xi.shape), np.empty((k + 1, x.size))
+        after = self.path.filter.filter(xi[None, :], filtered, added)
+        own = self.path.filter.by_parameter(xi, added[0], filtered[0], own, by_path)
+        d_filtered = self.path.filter.filter(d_xi, d_filtered, through)
+        rows[:m] += self.path.share * (dx0[:m] - dw0)[:, None] + through[:m]
+        rows[m:] += (self.path.share_slopes * (x0 - w0))[:, None]
+        by_mode = through[m : m + 2] - added / self.path.gain
+        add_mixed(self.path.mode_by_a, by_mode, rows[m : m + na])
+        add_mixed(self.path.by_a, by_path[:k], rows[m : m + na])
+        add_mixed(self.path.by_b, by_path[:k], rows[m + na : m + na + nb])
+        rows[m + na + nb] += by_path[k]
+        by_stiffness = self.path.share * dx0[m + 2 :, None] + through[m + 2 :]
+        y = y + (self.path.share * (x0 - w0) + added[0])
+        tangent = (d_arx, dw0, dx0, dz, d_filtered, own)
+        return y, np.vstack((rows[:m], by_stiffness, rows[m:])), (arx, (w0, x0), z, after), tangent
+
+
+class SlowSoftenedBlock(SeriesBlock):
+    """The static softening of one mode in a sum, and the lag of G behind it, for records slower than the model."""
+
+    def __init__(self, lag: LagBlock, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
+        ratio = path.share / arx.gain
+        super().__init__((_Shared(settled, ratio), lag))
+        self.ratio_slopes = (path.share_slopes - ratio * arx.gain_slopes()) / arx.gain
+        self.names = (*settled.names, *lag.names)
+
+    def _folded(self, own: Array) -> Array:
+        """Rows of the stiffness, the ratio and the ARX; the ratio is a function of the ARX."""
+        return np.concatenate((own[:2], own[3:] + np.multiply.outer(self.ratio_slopes, own[2])))
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        slope, own = super().static_slopes(x0)
+        return slope, self._folded(own)
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        y, rows, state, tangent = super().linearise(x, dx, state, tangent)
+        return y, np.concatenate((rows[: len(dx)], self._folded(rows[len(dx) :]))), state, tangent
+
+
+class _Shared(MemorylessBlock):
+    """w + ratio (x − w)."""
+
+    def __init__(self, settled: StaticSoftening, ratio: float) -> None:
+        self.settled, self.ratio, self.names = settled, ratio, (*settled.names, "ratio")
+
+    def value(self, x: Array) -> Array:
+        return x + self.ratio * (self.settled.value(x) - x)
+
+    def slope(self, x: Array) -> Array:
+        return 1.0 + self.ratio * (self.settled.slope(x) - 1.0)
+
+    def by_parameter(self, x: Array) -> Array:
+        return np.vstack((self.ratio * self.settled.by_parameter(x), self.settled.value(x) - x))

@@ -1,0 +1,71 @@
+"""What an experiment cannot show, whatever a search finds in it: kinds of drive that it does not hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..identification.records.excitation_content import SLOW, content_of
+from ..record import Notice, Record
+
+HOLD = 1.0
+"""Time for which a level must be held after it was changed, so that creep shows [s]."""
+MOVED = 0.02
+"""Share of the range of the drive by which a level must have changed."""
+DISTINCT = 0.8
+"""Ratio of two amplitudes below which they count as different."""
+
+
+def beyond_reach(records: Sequence[Record]) -> tuple[Notice, ...]:
+    """Kinds of effect that the drive of the records hardly shows, each with what is not there.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Those that take part.
+    """
+    span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
+    missing = []
+    if not any(_longest_hold(r, MOVED * span) >= HOLD for r in records):
+        missing.append(("creep", "no level is held for a second or more after it was changed"))
+    contents = [content_of(r) for r in records]
+    kinds = ["slow loops" if c.is_slow else r.phase.split("_")[0] for r, c in zip(records, contents, strict=True)]
+    if len(set(kinds)) == len(kinds):
+        missing.append(("thermal_drift and gain_drift", "no kind of phase is there twice"))
+    if not _has_smaller_loops(records):
+        missing.append(("hysteresis_memory and hysteresis_exponent", "all loops have one amplitude"))
+    if not any(c.is_broadband for c in contents):
+        missing.append(("extra_resonance and the lags", "no drive moves the dynamics: no noise, no multisine"))
+    return tuple(Notice("not_tested", f"{what} can hardly be seen: {why}") for what, why in missing)
+
+
+def _longest_hold(record: Record, least: float) -> float:
+    """Longest time at one level that differs from the one before [s]."""
+    u = np.append(record.settled_voltage, record.voltage)
+    ends = np.flatnonzero(np.append(np.diff(u) != 0.0, True))
+    starts = np.append(0, ends[:-1] + 1)
+    held = ends - starts > 1
+    starts, ends = starts[held], ends[held]
+    if starts.size == 0:
+        return 0.0
+    before = np.append(u[0], u[ends[:-1]])
+    changed = np.abs(u[ends] - before) > least
+    return float(np.max((ends - starts)[changed], initial=0)) * record.sample_period
+
+
+def _has_smaller_loops(records: Sequence[Record]) -> bool:
+    """Whether slow loops of two amplitudes are there, in one record or in two."""
+    sizes: list[float] = []
+    for record in records:
+        u = record.voltage
+        steps = np.sign(np.diff(u))
+        moves = np.flatnonzero(steps)
+        if moves.size == 0:
+            continue
+        turns = moves[np.flatnonzero(np.diff(steps[moves])) + 1]
+        if turns.size < 2:  # a single loop begins and ends where the record does
+            turns = np.concatenate((moves[:1], turns, moves[-1:] + 1))
+        slow = np.diff(turns) * record.sample_period > 0.5 / SLOW
+        sizes += np.abs(np.diff(u[turns]))[slow].tolist()
+    return bool(sizes) and min(sizes) < DISTINCT * max(sizes)

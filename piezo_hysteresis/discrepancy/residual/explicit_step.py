@@ -1,0 +1,104 @@
+"""Data of a simulation whose loop takes the explicit step of Eq. (7): what that step changes is no physics.
+
+A loop without memory of speed goes through a jump as through a slow ramp. The explicit step does not: from one sample
+to the next it moves straight on, by 1 % of the range too far in a jump of a tenth of it. What it changes has no number
+of its own; it is all in the data, or nothing of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects import BoucWen, PublishedBoucWen
+from ...errors import DivergenceError
+from ...model.model import Model
+from ...record import Experiment, Notice, Record
+from ..search.refit import joint
+from ..search.training_data import Evidence
+from .sampling import at_period, less
+
+Array = NDArray[np.float64]
+
+KIND = "explicit_step"
+"""Of the notice of an experiment from which the changes are taken."""
+SEEN = 0.5
+"""Change of a record in floors from which it can be told."""
+BETTER = 0.9
+"""Share of the cost that may be left once the changes are taken out."""
+OTHER_SHARES = (0.5, 1.5)
+"""Shares of the changes that must not do as well as the whole of them."""
+LINEARISATIONS, PRECISE = 9, 1e-3
+
+
+def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
+    """What the explicit step changes in the displacement [m] of records at the model's own sample period.
+
+    Parameters
+    ----------
+    model : Model
+        With the exact loop.
+    records : sequence of Record
+        In order.
+
+    Returns
+    -------
+    list of (n,) ndarray
+        By record; zero where the sample period is longer, so that many steps stand behind every sample.
+
+    Raises
+    ------
+    DivergenceError
+        Where the explicit step runs away.
+    """
+    for term in [e for e in model.effects if e.host == BoucWen.name]:
+        model = model.without(term.name)
+    explicit = model.without(BoucWen.name).with_effect(PublishedBoucWen(**model[BoucWen.name].values))
+    pairs = zip(records, model.simulate(records), explicit.simulate(records), strict=True)
+    own = 1.001 * model.sample_period
+    return [b - a if r.sample_period < own else np.zeros(r.size) for r, a, b in pairs]
+
+
+def is_stepped(model: Model, evidence: Evidence, leaves: float = np.inf) -> bool:
+    """Whether the loop behind the data takes the explicit step: they fit best with the whole of its changes taken out.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted to the evidence.
+    evidence : Evidence
+        Records and floors.
+    leaves : float
+        Cost at most without the changes: what else is missing may look alike.
+    """
+    if BoucWen.name not in model:
+        return False
+    with suppress(DivergenceError):
+        changes = step_changes(model, evidence.records)
+        sizes = [np.sqrt(np.mean(c**2)) / f for c, f in zip(changes, evidence.floors, strict=True)]
+        if max(sizes) < SEEN:
+            return False
+
+        def cost(share: float) -> float:
+            records = less(evidence.records, [share * c for c in changes])
+            return joint(model, replace(evidence, records=records), LINEARISATIONS, PRECISE).cost
+
+        whole = cost(1.0)
+        return whole < leaves and whole < BETTER * cost(0.0) and all(whole < cost(share) for share in OTHER_SHARES)
+    return False
+
+
+def without_steps(experiment: Experiment, model: Model) -> Experiment:
+    """The experiment as the exact loop would have answered, which its notices tell."""
+    records = tuple(at_period(r, model.sample_period) if _is_faster(r, model) else r for r in experiment.records)
+    freed = less(records, step_changes(model, records))
+    told = "jumps go by the explicit step of Eq. (7), as in a simulation and in no stage; what it changes is left out"
+    return replace(experiment, records=freed).noting(Notice(KIND, told))
+
+
+def _is_faster(record: Record, model: Model) -> bool:
+    return record.sample_period < 0.999 * model.sample_period

@@ -1,0 +1,150 @@
+"""What a slow record leaves open: a drive whose samples are averages may have jumped or turned between two of them.
+
+Straight lines between averages cut the peaks of a drive off, and a model that follows them is judged for what the
+recorder has lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.model import Model
+from ...record import Record
+
+Array = NDArray[np.float64]
+
+PARTS = 16
+"""Parts into which a sample is divided at most."""
+SMOOTHER = 0.97
+"""Share of the unevenness, or of the square, of a residual that a change leaves at most."""
+KINKED = 3.0
+"""How far a bend of the drive stands out of those three samples before and behind where it is a kink: curves go on."""
+TINY = 1e-12
+"""Share of the drive below which it stands still."""
+ITS_SIZE = (0.7, 1.3)
+"""Multiple of a change that the residual holds, where the change is what it lacks."""
+
+
+def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
+    """Change of the simulation where slow drives turn within their samples, and averages are compared [m].
+
+    Whether a drive ran or jumped to the next level is not in its averages: every record is taken as its displacement
+    tells, in which a wrong guess stands out in single samples. Nor does a slow record hold the ringing after a turn. A
+    change that stands out in no sample, and that the residual does not hold in its size, is left alone: it is one of
+    dynamics that are not known well.
+
+    Parameters
+    ----------
+    model : Model
+        Hysteresis and dynamics, as they are known.
+    records : sequence of Record
+        In order.
+
+    Returns
+    -------
+    list of (n,) ndarray
+        By record; zero where nothing is lost, or the record is not slow.
+    """
+    most = [min(PARTS, 2 * int(0.5005 * r.sample_period / model.sample_period)) for r in records]
+    parts = [n if n > 1 and _turns_sharply(r) else 1 for r, n in zip(records, most, strict=True)]
+    straight = model.simulate(records)
+    changes = []
+    for abrupt in (False, True):
+        sharp = [_sharpened(r, n, abrupt) if n > 1 else r for r, n in zip(records, parts, strict=True)]
+        pairs = zip(straight, model.simulate(sharp), strict=True)
+        changes.append([y.reshape(x.size, -1).mean(axis=1) - x for x, y in pairs])
+    off = [r.displacement - y for r, y in zip(records, straight, strict=True)]
+    return [_better(e, a, b) for e, a, b in zip(off, *changes, strict=True)]
+
+
+def _better(residual: Array, gradual: Array, abrupt: Array) -> Array:
+    """The change that leaves the residual more even, or none where neither does much."""
+    change = gradual if _unevenness(residual - gradual) <= _unevenness(residual - abrupt) else abrupt
+    smoother = _unevenness(residual - change) < SMOOTHER * _unevenness(residual)
+    return change if smoother or _holds(residual, change) else np.zeros_like(change)
+
+
+def _holds(residual: Array, change: Array) -> bool:
+    """Whether the residual holds the change in its size, and is much the smaller without it."""
+    residual, change = residual - residual.mean(), change - change.mean()
+    power, size = float(residual @ residual), float(change @ change)
+    if size == 0.0:
+        return False
+    left = residual - change
+    return bool(ITS_SIZE[0] < residual @ change / size < ITS_SIZE[1] and left @ left < SMOOTHER * power)
+
+
+def _turns_sharply(record: Record) -> bool:
+    """Whether the drive has kinks; what a model says otherwise of a curve at another rate, it owes to its dynamics."""
+    before = [float(record.voltage[0]) if record.continues else record.settled_voltage] * 5
+    bends = np.abs(np.diff(np.concatenate((before, record.voltage, record.voltage[-1:].repeat(3))), 2))
+    around = np.maximum(bends[:-6], bends[6:])
+    return bool(np.any((bends[3:-3] > KINKED * around) & (bends[3:-3] > 0.5 * bends.max())))
+
+
+def _unevenness(residual: Array) -> float:
+    return float(np.sum(np.diff(residual, 2) ** 2))
+
+
+def _sharpened(record: Record, parts: int, abrupt: bool) -> Record:
+    return record.with_channels(
+        lambda channel: np.repeat(channel, parts),
+        voltage=sharp_drive(record.voltage, record.settled_voltage, parts, abrupt=abrupt),
+        sample_period=record.sample_period / parts,
+        initial_voltage=None if record.continues else record.settled_voltage,
+    )
+
+
+def sharp_drive(averages: Array, before: float, parts: int, *, abrupt: bool = False) -> Array:
+    """A drive of the averages given that turns, runs or jumps within a sample.
+
+    Parameters
+    ----------
+    averages : (n,) ndarray
+        Of the drive over every sample [V].
+    before : float
+        Drive before the first sample [V].
+    parts : int
+        Values wanted per sample, an even number.
+    abrupt : bool
+        Whether it jumps wherever it goes on in one direction.
+
+    Returns
+    -------
+    (n parts,) ndarray
+        From one border of a sample to the next by way of its middle; by a jump where that would overshoot.
+
+    Examples
+    --------
+    >>> sharp_drive(np.array([0.0, 0.0, 0.0, 2.0, 4.0, 4.0, 4.0]), 0.0, 4)[12:16].tolist()  # a ramp
+    [0.5, 1.5, 2.5, 3.5]
+    >>> sharp_drive(np.array([0.0, 0.0, 0.0, 3.5, 4.0, 4.0, 4.0]), 0.0, 4)[12:16].tolist()  # a jump
+    [2.0, 4.0, 4.0, 4.0]
+    >>> sharp_drive(np.array([0.0, 1.0, 2.0, 2.75, 2.0, 1.0, 0.0]), 0.0, 4)[12:16].tolist()  # a turn at 3 V
+    [2.625, 2.875, 2.875, 2.625]
+    """
+    borders = _borders(np.concatenate(([before] * 3, averages, [averages[-1]] * 3)))
+    start, end = borders[:-1, None], borders[1:, None]
+    middle = averages[:, None]
+    peak = 2.0 * middle - 0.5 * (start + end)
+    part = np.arange(parts)
+    at = (part + 0.5) / parts
+    bent = np.where(at < 0.5, start + 2.0 * at * (peak - start), peak + (2.0 * at - 1.0) * (end - peak))
+    height = end - start
+    rises = np.abs(height) > TINY * np.abs(averages).max(initial=0.0)
+    early = np.divide(end - middle, height, out=np.full_like(height, 0.5), where=rises)
+    jumping = end - height * np.clip(early * parts - part, 0.0, 1.0)
+    overshoots = abrupt | ((peak - start) * (end - peak) < 0.0)
+    goes_on = (middle - start) * (end - middle) >= 0.0
+    return np.ravel(np.where(overshoots & goes_on, jumping, bent))
+
+
+def _borders(v: Array) -> Array:
+    """Drive between neighbours of padded averages: on the straightest of three lines, from either side or across."""
+    a, b, c, d, e, f = (v[k : v.size - 5 + k] for k in range(6))
+    lines = np.array([c + 0.5 * (c - b), 0.5 * (c + d), d - 0.5 * (e - d)])
+    bends = np.abs([a - 2.0 * b + c, b - c - d + e, d - 2.0 * e + f])
+    return np.asarray(np.take_along_axis(lines, np.argmin(bends, axis=0)[None], axis=0)[0])

@@ -1,0 +1,162 @@
+"""Where simulation and measurement disagree: shares of the residual along the axes that tell effects apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...record import Record
+
+Array = NDArray[np.float64]
+Bins = NDArray[np.intp]
+
+EDGES = {
+    "frequency": np.array([0.0, 0.5, 5.0, 25.0, 75.0, 150.0, 250.0, 350.0, 600.0, 1.2e3, 2.5e3, np.inf]),
+    "time_since_level_change": np.concatenate(([0.0], np.geomspace(1e-4, 100.0, 13), [np.inf])),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """How unevenly the residual lies along one axis.
+
+    Parameters
+    ----------
+    axis : str
+        ``phase``, ``frequency``, ``amplitude``, ``direction``, ``turning_point_distance``,
+        ``time_since_level_change`` or ``absolute_time``.
+    share : float
+        Share of the residual power beyond the floor that lies in the bins named in `detail`, 0 to 1.
+    detail : str
+        The bins that hold it, in plain words.
+    bins : tuple of (str, float)
+        Share of every bin; they add up to 1.
+    """
+
+    axis: str
+    share: float
+    detail: str
+    bins: tuple[tuple[str, float], ...]
+
+
+def localise(records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]) -> tuple[Place, ...]:
+    """Shares of the residual along every axis, the most telling axis first.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        In experiment order.
+    residuals : sequence of (n,) ndarray
+        Measured minus simulated displacement [m].
+    floors : sequence of float
+        Floor of every record [m]; power is counted in units of it, every record the same weight.
+
+    Returns
+    -------
+    tuple of Place
+        Ordered by how much more the residual concentrates than evenly spread power would.
+    """
+    power = [e * e / (f * f * e.size) for e, f in zip(residuals, floors, strict=True)]
+    total = sum(float(p.sum()) for p in power)
+    if total == 0.0:
+        return ()
+    span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
+    end = max(r.start_time + r.duration for r in records)
+    places = [_phases(records, power), _frequencies(records, residuals, floors)]
+    axes: dict[str, list[Bins]] = {
+        axis: [] for axis in ("amplitude", "direction", "turning_point_distance", "time_since_level_change")
+    }
+    for record in records:
+        for axis, index in _drive_bins(record, span).items():
+            axes[axis].append(index)
+    for axis, bins in axes.items():
+        places.append(_gather(axis, bins, power, _labels(axis)))
+    tenth = [np.minimum((10 * r.time / end).astype(int), 9) for r in records]
+    places.append(
+        _gather("absolute_time", tenth, power, [f"{k * end / 10:.3g} to {(k + 1) * end / 10:.3g} s" for k in range(10)])
+    )
+    concentrations = {place.axis: concentration for place, concentration in places}
+    return tuple(sorted((p for p, _ in places), key=lambda p: -concentrations[p.axis]))
+
+
+def _gather(axis: str, bins: Sequence[Bins], power: Sequence[Array], labels: Sequence[str]) -> tuple[Place, float]:
+    held = np.zeros(len(labels))
+    room = np.zeros(len(labels))
+    for index, p in zip(bins, power, strict=True):
+        known = index >= 0
+        held += np.bincount(index[known], p[known], len(labels))
+        room += np.bincount(index[known], minlength=len(labels)) / p.size
+    return _place(axis, held, room, labels)
+
+
+def _place(axis: str, held: Array, room: Array, labels: Sequence[str]) -> tuple[Place, float]:
+    shares = held / max(held.sum(), 1e-300)
+    even = room / max(room.sum(), 1e-300)
+    excess = shares - even
+    chosen = [k for k in np.argsort(-excess) if excess[k] > 0.25 * max(excess.max(), 1e-12)][:3]
+    share = float(shares[chosen].sum())
+    told = ", ".join(f"{labels[k]} ({100 * shares[k]:.0f} %)" for k in chosen)
+    # concentration: how far the shares are from where the samples are
+    concentration = float(np.abs(excess).sum() / 2.0)
+    return Place(axis, share, told, tuple((n, float(s)) for n, s in zip(labels, shares, strict=True))), concentration
+
+
+def _phases(records: Sequence[Record], power: Sequence[Array]) -> tuple[Place, float]:
+    names = list(dict.fromkeys(r.phase for r in records))
+    held, room = np.zeros(len(names)), np.zeros(len(names))
+    for record, p in zip(records, power, strict=True):
+        held[names.index(record.phase)] += p.sum()
+        room[names.index(record.phase)] += 1.0
+    return _place("phase", held, room, names)
+
+
+def _frequencies(records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]) -> tuple[Place, float]:
+    edges = EDGES["frequency"]
+    labels = [f"{a:g} to {b:g} Hz" for a, b in zip(edges, edges[1:], strict=False)]
+    held, room = np.zeros(len(labels)), np.zeros(len(labels))
+    for record, e, f in zip(records, residuals, floors, strict=True):
+        spectrum = np.abs(np.fft.rfft(e)) ** 2 / (f * f * e.size**2)
+        frequency = np.fft.rfftfreq(e.size, record.sample_period)
+        index = np.searchsorted(edges, frequency, side="right") - 1
+        held += np.bincount(index, spectrum, len(labels))
+        room += np.bincount(index, minlength=len(labels)) / spectrum.size
+    return _place("frequency", held, room, labels)
+
+
+def _labels(axis: str) -> list[str]:
+    if axis == "amplitude":
+        return [f"{10 * k} to {10 * k + 10} % of the drive range" for k in range(10)]
+    if axis == "direction":
+        return ["falling drive", "drive at rest", "rising drive"]
+    if axis == "turning_point_distance":
+        return [f"{10 * k} to {10 * k + 10} % of the drive range after a turning point" for k in range(10)]
+    edges = EDGES[axis]
+    return [f"{a:.2g} to {b:.2g} s after a change of level" for a, b in zip(edges, edges[1:], strict=False)]
+
+
+def _drive_bins(record: Record, span: float) -> dict[str, Bins]:
+    u = record.voltage
+    scale = max(span, 1e-300)
+    low = min(float(u.min()), 0.0)
+    steps = np.diff(u, prepend=record.settled_voltage)
+    moving = np.abs(steps) > 1e-6 * scale
+    sign = np.where(moving, np.sign(steps), 0.0)
+    # direction of the last move, carried through rests
+    last_move = np.maximum.accumulate(np.where(moving, np.arange(u.size), -1))
+    going = np.where(last_move >= 0, sign[np.maximum(last_move, 0)], 0.0)
+    turned = np.diff(going, prepend=going[0]) != 0
+    turn = np.maximum.accumulate(np.where(turned, np.arange(u.size), 0))
+    since = np.where(last_move >= 0, np.arange(u.size) - last_move, -1) * record.sample_period
+    idle = np.where(~moving & (last_move >= 0), since, -1.0)
+    times = np.searchsorted(EDGES["time_since_level_change"], np.maximum(idle, 0.0), side="right") - 1
+    return {
+        "amplitude": np.clip((10 * (u - low) / scale).astype(int), 0, 9),
+        "direction": (sign + 1).astype(int),
+        "turning_point_distance": np.clip((10 * np.abs(u - u[turn]) / scale).astype(int), 0, 9),
+        "time_since_level_change": np.where(
+            idle >= 0, np.minimum(times, EDGES["time_since_level_change"].size - 2), -1
+        ),
+    }

@@ -1,0 +1,163 @@
+"""The floor: below which residual no effect can be seen, for every record at its own sample period.
+
+Four parts: white noise from the top of the spectrum, where a stage no longer moves; the scatter between periods of a
+periodic record, which also holds jitter and 1/f noise; the steps of the converter, q/√12; and an adequacy floor of
+0.03 % of range, below which a model is as good as any lab needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import periodogram
+from scipy.signal.windows import hann
+
+from ...identification.records.excitation_content import noise_on_motion
+from ...record import Record
+
+Array = NDArray[np.float64]
+
+ADEQUACY = 3e-4
+"""Share of the range of the experiment that counts as perfect."""
+MAINS = (50.0, 60.0)
+"""Mains frequencies [Hz]."""
+ALIKE, UNLIKE = 1e-6, 0.1
+"""Share of the power of the drive by which it may differ from itself one period later, and differs in between."""
+FASTEST = 3
+"""Periodic records, the fastest, from which jitter is taken: the one in which least else differs between periods."""
+UNUSUAL = 2.0
+"""How far the scatter of a record may lie above what the others let expect before it counts as a stage not settled."""
+TOP_BAND = 0.7
+"""Share of the Nyquist frequency above which a record holds noise alone."""
+
+
+def stroke(records: Sequence[Record]) -> float:
+    """Range of displacement over all records [m]: the 100 % of every percentage."""
+    low = min(float(r.displacement.min()) for r in records)
+    return max(float(r.displacement.max()) for r in records) - low
+
+
+def white_noise(record: Record) -> float:
+    """RMS of the white noise of a record [m], from the median of its spectrum near the Nyquist frequency."""
+    if record.size < 32:
+        return float(np.std(np.diff(record.displacement)) / np.sqrt(2.0))
+    third = np.diff(record.displacement, 2)
+    _, density = periodogram(third, window=hann(third.size), detrend=False)
+    frequency = np.linspace(0.0, np.pi, density.size)
+    response = (2.0 * np.sin(frequency / 2.0)) ** 4
+    top = slice(int(TOP_BAND * density.size), -1)
+    # a periodogram is exponentially distributed: its median is ln 2 of its mean
+    at_top = float(np.sqrt(np.median(density[top] / response[top]) / np.log(2.0) / 2.0))
+    # jumps fill all of the spectrum, but few of the samples; fast motion is in all samples, but not at the top
+    return min(at_top, noise_on_motion(record.displacement, 3))
+
+
+def period_scatter(record: Record) -> float | None:
+    """RMS of what does not repeat from one drive period to the next [m]; None for fewer than three periods.
+
+    The first period settles and is left out; mains hum, which is an effect and no floor, is taken out, and so is what
+    stands out of its band of the spectrum: a resonance still ringing, a drift.
+    """
+    period = drive_period(record.voltage)
+    if period is None or record.size < 3 * period:
+        return None
+    first = period if record.size < 7 * period else period * ((record.size // period - 1) // 2)
+    return min(_scatter(record, period, period), _scatter(record, period, first))
+
+
+def _scatter(record: Record, period: int, first: int) -> float:
+    """Scatter from the sample `first` on: a stage may still ring when its drive has long been periodic."""
+    y = record.displacement[first:]
+    steps = y[period:] - y[:-period]
+    # a period that is no whole number of samples leaves a little of the drive; the other axis need not repeat
+    rest = record.voltage[first + period :] - record.voltage[first:-period]
+    other = record.other_displacement
+    seen = [] if other is None else [other[first + period :] - other[first:-period]]
+    t = record.sample_period * np.arange(steps.size)
+    lines = [f for base in MAINS for f in (base, 2 * base, 3 * base) if f * record.sample_period < 0.45]
+    hum = [wave(2 * np.pi * f * t) for f in lines for wave in (np.cos, np.sin)]
+    basis = np.array([np.ones(t.size), rest, np.gradient(rest), *seen, *hum])
+    steps = steps - np.linalg.lstsq(basis.T, steps, rcond=1e-6)[0] @ basis
+    window = hann(steps.size)
+    frequency, density = periodogram(steps, window=window, detrend=False)
+    # the difference of two periods is a comb: white noise has this mean spectrum, twice its variance in all
+    alike = window[period:] @ window[:-period] / (window @ window) if steps.size > period else 0.0
+    comb = 1.0 - alike * np.cos(2.0 * np.pi * frequency * period)
+    noise = np.where(comb > 0.2, density / np.maximum(comb, 0.2), np.nan)
+    return float(np.sqrt(_broad(noise) / steps.size / 2.0))
+
+
+def _broad(density: Array) -> float:
+    """Sum of a spectrum by the medians of its octaves, without dc: peaks of few bins do not count."""
+    edges = [1]
+    while edges[-1] < density.size:
+        edges.append(min(max(2 * edges[-1], edges[-1] + 8), density.size))
+    bands = [density[a:b] for a, b in zip(edges, edges[1:], strict=False)]
+    return float(sum(b.size * np.nanmedian(b) for b in bands if np.isfinite(b).any()) / np.log(2.0))
+
+
+def quantum(record: Record) -> float:
+    """Step of the converter [m]: the smallest difference of readings that repeat; 0 where they do not."""
+    levels = np.unique(record.displacement)
+    return float(np.diff(levels).min()) if 1 < levels.size <= record.size // 2 else 0.0
+
+
+def drive_period(voltage: Array) -> int | None:
+    """Samples of the shortest exact period of a drive that holds at least two; None where it has none.
+
+    Neighbouring samples of a slow drive are alike as well: a period comes after the drive has become unlike itself.
+    """
+    moving = voltage - voltage.mean()
+    power = float(moving @ moving)
+    if power == 0.0:
+        return None
+    size = 1 << (2 * voltage.size - 1).bit_length()
+    spectrum = np.fft.rfft(moving, size)
+    product = np.fft.irfft(spectrum * spectrum.conj(), size)[: voltage.size // 2 + 1]
+    energy = np.concatenate(([0.0], np.cumsum(moving * moving)))
+    lags = np.arange(product.size)
+    overlap = energy[voltage.size - lags] + (energy[-1] - energy[lags])
+    mismatch = (overlap - 2.0 * product) / np.maximum(overlap, 1e-300)
+    unlike = int(np.argmax(mismatch > UNLIKE))
+    (alike,) = np.nonzero(mismatch[unlike:] < ALIKE)
+    if not (unlike and alike.size):
+        return None
+    first = unlike + int(alike[0])
+    beyond = np.flatnonzero(mismatch[first:] >= ALIKE)
+    run = mismatch[first : first + int(beyond[0])] if beyond.size else mismatch[first:]
+    return first + int(np.argmin(run))
+
+
+def noise_floors(records: Sequence[Record]) -> Array:
+    """Noise of every record at its own sample period [m], shape (r,), without the adequacy floor.
+
+    Scatter between periods is white noise, slower noise in proportion to it, and jitter of the clock, which adds in
+    proportion to the speed. Records without periods take what the periodic ones show.
+    """
+    white = np.array([max(white_noise(r), quantum(r) / np.sqrt(12.0)) for r in records])
+    speed = np.array([_speed(r, w) for r, w in zip(records, white, strict=True)])
+    scatter = np.array([np.nan if (s := period_scatter(r)) is None else s for r in records])
+    (periodic,) = np.nonzero(np.isfinite(scatter) & (white > 0.0))
+    if not periodic.size:
+        return white
+    beyond = np.sqrt(np.maximum(scatter**2 - white**2, 0.0))
+    fastest = [i for i in periodic[np.argsort(-speed[periodic])][:FASTEST] if speed[i] > 0.0]
+    jitter = min((beyond[i] / speed[i] for i in fastest), default=0.0)
+    excess = [np.sqrt(max(1.0, (scatter[i] ** 2 - (jitter * speed[i]) ** 2) / white[i] ** 2)) for i in periodic]
+    expected = np.hypot(white * float(np.median(excess)), jitter * speed)
+    return np.where(np.isfinite(scatter), np.clip(scatter, white, UNUSUAL * expected), expected)
+
+
+def _speed(record: Record, noise: float) -> float:
+    """RMS speed of the stage [m/s], the sensor's noise taken out."""
+    if record.size < 3:
+        return 0.0
+    steps = np.diff(record.displacement)
+    return float(np.sqrt(max(0.0, float(np.mean(steps**2)) - 2.0 * noise**2))) / record.sample_period
+
+
+def floors(records: Sequence[Record], noise: Array | None = None) -> Array:
+    """Floor of every record [m], shape (r,): the larger of its noise, if known already, and the adequacy floor."""
+    return np.maximum(noise_floors(records) if noise is None else noise, ADEQUACY * stroke(records))

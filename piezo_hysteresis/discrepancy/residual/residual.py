@@ -1,0 +1,200 @@
+"""How wrong a model is in free run: the error measure that the whole package reports.
+
+The error of a phase is the RMS of measured minus simulated displacement, in per cent of the *range*: the peak-to-peak
+of the measured displacement over the whole experiment. The paper's Table 1 uses the same measure.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordError
+from ...identification.fit.normal_equations import Nuisance
+from ...identification.records.roles import CARRYING
+from ...model.model import Model
+from ...record import Experiment, Record
+from .noise_floor import stroke
+
+Array = NDArray[np.float64]
+
+SINE = re.compile(r"sine_([0-9.]+)hz")
+
+
+@dataclass(frozen=True, slots=True)
+class Error:
+    """Free-run error of one phase.
+
+    Parameters
+    ----------
+    phase : str
+        Phase name.
+    index : int
+        Number of the record in the experiment, from 0.
+    frequency : float or None
+        Drive frequency of a sine phase [Hz].
+    size : int
+        Number of samples.
+    rms : float
+        RMS of the residual [m].
+    percent : float
+        `rms` in % of the range of the experiment.
+    largest : float
+        Largest absolute residual [m].
+    fit : float
+        100·(1 − ‖e‖/‖y − mean y‖) [%]; NaN where the displacement is constant.
+    has_known_start : bool
+        False where the state of the stage at the first sample is not known: a conditioning phase, a truncated record.
+    """
+
+    phase: str
+    index: int
+    frequency: float | None
+    size: int
+    rms: float
+    percent: float
+    largest: float
+    fit: float
+    has_known_start: bool = True
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Errors:
+    """Free-run errors of a model on an experiment, record by record.
+
+    Parameters
+    ----------
+    range : float
+        Peak-to-peak of the measured displacement over the experiment [m].
+    zero : float
+        Constant added to the simulation before it was compared [m]; 0 where none was free for the whole experiment.
+    rows : tuple of Error
+        One per record, in order.
+    predicted, residuals : tuple of (n,) ndarray
+        Simulated displacement with its offset, and measured minus simulated [m], per record.
+    """
+
+    range: float
+    zero: float
+    rows: tuple[Error, ...]
+    predicted: tuple[Array, ...]
+    residuals: tuple[Array, ...]
+
+    @property
+    def judged(self) -> tuple[Error, ...]:
+        """Rows that count: those whose start is known, or all where none is."""
+        return tuple(row for row in self.rows if row.has_known_start) or self.rows
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean over the judged records of their mean square [m]: every phase counts the same."""
+        return float(np.sqrt(np.mean([row.rms**2 for row in self.judged])))
+
+    @property
+    def percent(self) -> float:
+        """`rms` in % of the range."""
+        return 100.0 * self.rms / self.range
+
+    @property
+    def largest(self) -> float:
+        """Largest absolute residual of the judged records [m]."""
+        return max(row.largest for row in self.judged)
+
+    @property
+    def by_frequency(self) -> dict[float, float]:
+        """Error in % of range at every frequency [Hz] of the sine phases, as in the paper's Table 1."""
+        found = sorted({row.frequency for row in self.rows if row.frequency is not None})
+        return {f: float(np.sqrt(np.mean([r.percent**2 for r in self.rows if r.frequency == f]))) for f in found}
+
+    @property
+    def by_phase(self) -> dict[str, float]:
+        """Error in % of range of every phase name; repetitions of a phase count the same."""
+        names = dict.fromkeys(row.phase for row in self.rows)
+        return {n: float(np.sqrt(np.mean([r.percent**2 for r in self.rows if r.phase == n]))) for n in names}
+
+
+def drive_frequency(record: Record) -> float | None:
+    """Frequency of a phase named ``sine_<f>hz`` [Hz], None for every other phase.
+
+    >>> drive_frequency(Record([0.0], [0.0], 1e-3, phase="sine_0.5hz"))
+    0.5
+    """
+    match = SINE.fullmatch(record.phase)
+    return float(match[1]) if match else None
+
+
+def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = None) -> Errors:
+    """Free-run error of `model` on every record of `experiment`.
+
+    Parameters
+    ----------
+    model : Model
+        Simulated from rest, state carried into records that continue.
+    experiment : Experiment
+        Records, each at its own sample period.
+    nuisance : Nuisance, optional
+        What is free per record. Default: one constant for the whole experiment, since the zero of a displacement sensor
+        means nothing.
+
+    Returns
+    -------
+    Errors
+        Table, simulation and residual.
+
+    Raises
+    ------
+    RecordError
+        If the displacement never changes.
+    ModelError
+        If a record is faster than the model.
+    DivergenceError
+        If the simulation runs away.
+    """
+    span = stroke(experiment.records)
+    if not span > 0.0:
+        raise RecordError(
+            f"displacement is {experiment[0].displacement[0]:g} m in every sample, expected a stage that moves; "
+            "check the sensor and its column"
+        )
+    free_run = model.simulate(experiment)
+    if nuisance is None:
+        means = np.array([np.mean(r.displacement - y) for r, y in zip(experiment, free_run, strict=True)])
+        known = np.array([_has_known_start(r) for r in experiment])
+        zero = float(means[known if known.any() else ~known].mean())
+        predicted = [y + zero for y in free_run]
+    else:
+        zero = 0.0
+        predicted = [_with_nuisance(r, y, nuisance) for r, y in zip(experiment, free_run, strict=True)]
+    residuals = [r.displacement - y for r, y in zip(experiment, predicted, strict=True)]
+    rows = [_row(i, r, e, span) for i, (r, e) in enumerate(zip(experiment, residuals, strict=True))]
+    return Errors(span, zero, tuple(rows), tuple(predicted), tuple(residuals))
+
+
+def _with_nuisance(record: Record, y: Array, nuisance: Nuisance) -> Array:
+    rows = nuisance.rows(record, slice(0, record.size))
+    if not len(rows):
+        return y
+    return np.asarray(y + np.linalg.lstsq(rows.T, record.displacement - y, rcond=None)[0] @ rows)
+
+
+def _has_known_start(record: Record) -> bool:
+    return record.phase not in CARRYING and not record.truncated
+
+
+def _row(index: int, record: Record, residual: Array, span: float) -> Error:
+    rms = float(np.sqrt(np.mean(residual**2)))
+    deviation = float(np.std(record.displacement))
+    return Error(
+        phase=record.phase,
+        index=index,
+        frequency=drive_frequency(record),
+        size=record.size,
+        rms=rms,
+        percent=100.0 * rms / span,
+        largest=float(np.max(np.abs(residual))),
+        fit=100.0 * (1.0 - rms / deviation) if deviation > 0.0 else float("nan"),
+        has_known_start=_has_known_start(record),
+    )

@@ -1,0 +1,182 @@
+"""Every record at the sample period and the length that the search needs.
+
+A slow phase at 50 kHz holds the same averages over and over; a minute of noise tells no more about the dynamics than a
+tenth of a second. A drive that moves the dynamics, stored at a longer period than theirs, is interpolated: gain and
+group delay alone would not describe what it does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+
+from ...effects.drive.backlash import run_play
+from ...identification.records.excitation_content import content_of, noise_on_motion
+from ...record import Record
+
+Array = NDArray[np.float64]
+
+FEWEST_BENDS = 50
+"""Second differences of a voltage that tell its noise."""
+WHITE = 0.65
+"""Share of second differences that have another sign than the next: 0.73 in white noise, 0.5 by chance, 0 in curves."""
+NOISE_WIDTH = 3.0
+"""Standard deviations of the noise of a voltage within which it is not followed."""
+ENOUGH = 10_000
+"""Samples of a record above which it is thinned out."""
+SLOWEST = 2e-3
+"""Sample period to which slow records are averaged at most [s]: mains hum stays visible."""
+FAITHFUL = 3e-4
+"""Share of its range by which the drive may differ from straight lines between its block averages, rms."""
+FAST = 1e-3
+"""Curvature of a fast drive, mean of its second differences over its standard deviation; slow loops have 1e-5."""
+SMOOTH = 2e-3
+"""Share of its range by which a spline through every second sample of a smooth drive may miss the others, rms."""
+MOST = 200_000
+"""Samples of an interpolated record at most."""
+ALIKE = 0.1
+"""Share by which the drive of a part may differ from that of the whole, in size and in speed."""
+
+
+def voltage_noise(records: Sequence[Record]) -> Array:
+    """Standard deviation of the noise on the voltage of every record that was measured [V]; 0 where it was commanded.
+
+    Noise makes second differences that change sign from one to the next; ramps, holds and rests that were commanded
+    have none at all. Block averages hold the less of it the longer they are.
+    """
+    least, density, is_white = np.inf, np.inf, False
+    for record in records:
+        bends = np.diff(record.voltage, 2)
+        if bends.size < FEWEST_BENDS:
+            continue
+        size = noise_on_motion(record.voltage, 2)
+        density = min(density, size * np.sqrt(record.sample_period))
+        if size < least:
+            least = size
+            is_white = bool(np.mean(bends[1:] * bends[:-1] < 0.0) > WHITE)
+    if not is_white:
+        return np.zeros(len(records))
+    return np.maximum(least, density / np.sqrt([r.sample_period for r in records]))
+
+
+def quieted(record: Record, noise: float) -> Record:
+    """The record with a voltage that does not follow noise of that size [V] back and forth.
+
+    A loop of hysteresis goes along with every small turn, and forgets on the way: the drive as it was measured is not
+    the drive that the stage has seen.
+    """
+    voltage = np.empty(record.size)
+    run_play(np.array(record.voltage), NOISE_WIDTH * noise, record.voltage[:1].copy(), voltage)
+    return replace(record, voltage=voltage)
+
+
+def less(records: Sequence[Record], changes: Sequence[Array]) -> tuple[Record, ...]:
+    """The records with changes, one each, taken out of their displacement [m]."""
+    return tuple(replace(r, displacement=r.displacement - c) for r, c in zip(records, changes, strict=True))
+
+
+def slowed(record: Record) -> Record:
+    """The record at a longer sample period where it is long and straight lines between block averages show its drive.
+
+    Parameters
+    ----------
+    record : Record
+        Of any length.
+
+    Examples
+    --------
+    >>> t = 2e-5 * np.arange(100_000)
+    >>> slowed(Record(np.sin(2 * np.pi * t), np.sin(2 * np.pi * t), 2e-5)).size
+    10000
+    """
+    return _averaged(record, min(record.size // ENOUGH, int(SLOWEST / record.sample_period * (1.0 + 1e-9))))
+
+
+def _averaged(record: Record, factor: int) -> Record:
+    return record.decimate(factor) if factor > 1 and not _differs(record, factor) else record
+
+
+def _differs(record: Record, factor: int) -> bool:
+    """Whether block averages lose what the drive does."""
+    u = record.voltage
+    blocks = u.size // factor
+    means = u[: blocks * factor].reshape(blocks, factor).mean(axis=1)
+    middles = factor * np.arange(blocks) + (factor - 1) / 2.0
+    lines = np.interp(np.arange(u.size), middles, means)
+    return bool(np.sqrt(np.mean((u - lines) ** 2)) > FAITHFUL * float(np.ptp(u)))
+
+
+def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
+    """Every record with about `most` samples: slow ones averaged, fast ones cut where the beginning stands for all.
+
+    A record that another one continues is not cut, and neither is one whose drive changes on its way. One that moves
+    the dynamics is not averaged: at a longer period the model knows them as a lag only.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        In order.
+    most : int
+        Samples.
+    """
+    followed = [*(r.continues for r in records[1:]), False]
+    return tuple(
+        r[:most] if r.size > most and not goes_on and _is_alike(r, most) else _thinned(r, most)
+        for r, goes_on in zip(records, followed, strict=True)
+    )
+
+
+def _thinned(record: Record, most: int) -> Record:
+    return _averaged(record, record.size // most) if content_of(record).is_slow else record
+
+
+def _is_alike(record: Record, most: int) -> bool:
+    part, whole = record.voltage[:most], record.voltage
+
+    def close(a: float, b: float) -> bool:
+        return abs(a - b) <= ALIKE * b
+
+    fast = float(np.mean(np.abs(np.diff(whole, 2)))) > FAST * float(whole.std())
+    return (
+        fast
+        and close(float(part.std()), float(whole.std()))
+        and close(float(np.diff(part).std()), float(np.diff(whole).std()))
+    )
+
+
+def common_period(records: Sequence[Record]) -> float:
+    """The sample period for the dynamics [s]: that of the fastest record that determines them, else of the fastest."""
+    broadband = [r.sample_period for r in records if r.size > 64 and content_of(r).is_broadband]
+    return min(broadband or [r.sample_period for r in records])
+
+
+def at_period(record: Record, period: float) -> Record:
+    """The record at `period` [s] where it is faster, or slower with a drive that moves the dynamics; else itself."""
+    if record.sample_period < 0.999 * period:
+        factor = round(period / record.sample_period)
+        whole = abs(factor * record.sample_period - period) < 1e-3 * period and record.size >= factor
+        return replace(record.decimate(factor), sample_period=period) if whole else _interpolated(record, period)
+    slower = record.sample_period > 1.001 * period and record.size > 64
+    if not slower or record.duration > MOST * period or content_of(record).is_slow or not _is_smooth(record.voltage):
+        return record
+    return _interpolated(record, period)
+
+
+def _is_smooth(u: Array) -> bool:
+    at = np.arange(u.size)
+    between = make_interp_spline(at[::2], u[::2])(at[1 : at.size - 1 : 2])
+    return bool(np.sqrt(np.mean((between - u[1 : u.size - 1 : 2]) ** 2)) < SMOOTH * float(np.ptp(u)))
+
+
+def _interpolated(record: Record, period: float) -> Record:
+    now = record.sample_period * np.arange(record.size)
+    then = period * np.arange(int(now[-1] / period * (1.0 + 1e-12)) + 1)
+
+    def spline(channel: Array) -> Array:
+        return np.asarray(make_interp_spline(now, channel)(then))
+
+    return record.with_channels(spline, sample_period=period, initial_voltage=record.settled_voltage)

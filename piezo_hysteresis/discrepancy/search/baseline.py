@@ -1,0 +1,153 @@
+"""The baseline: the published model with all its numbers fitted jointly, as well as its form allows.
+
+What is missing may only be judged from a baseline that misses nothing it could have had: with dynamics of too low an
+order any linear effect would be a gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
+
+from ...effects import Arx, BoucWen, Offset, PublishedBoucWen
+from ...errors import IdentificationError, ModelError
+from ...identification.identify import identify
+from ...identification.records.roles import Roles, roles_of
+from ...identification.steps.delay import identify_delay
+from ...identification.steps.dynamics import delay_of
+from ...identification.steps.hysteresis import fit_hysteresis
+from ...identification.steps.linear_start import (
+    FEW_ITERATIONS,
+    ITERATIONS,
+    dynamics_behind,
+    follower,
+    form_of,
+    hysteresis_signals,
+    with_dynamics,
+)
+from ...identification.steps.modes import identify_modes
+from ...model.model import Model
+from ...record import Experiment, Record
+
+ORDERS = (8, 8)
+"""na and nb, as in the paper; the joint fit leaves at zero what the data do not ask for."""
+
+
+def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:
+    """Hysteresis from the slow loops, delay from the steps, dynamics from the broadband records.
+
+    What is missing may lead the iterations of the dynamics astray: after the model from many there is one from few.
+    Noise may hide modes that larger motion shows: the last one is from all records that move.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The experiment, in order.
+    fitted : collection of int
+        Indices of the records that may be used.
+
+    Yields
+    ------
+    Model
+        Each to be fitted jointly.
+    """
+    experiment = Experiment(tuple(records))
+    roles, at_full_rate = roles_of(experiment), _at_full_rate(experiment, fitted)
+    loops = [i for i in roles.loops if i in fitted]
+    broadband, moving = _telling_dynamics(roles, fitted, at_full_rate)
+    if not loops or not broadband:
+        yield identify(Experiment(experiment.records[: max(fitted) + 1]), held_out=("validation",)).model
+        return
+    fast = [records[i] for i in at_full_rate]
+    try:
+        delay = max(1, identify_delay([r for r in fast if r.phase.startswith("step")] or fast).samples)
+    except IdentificationError:
+        delay = None
+    voltage = max(float(max(r.voltage.max(), -r.voltage.min())) for r in records)
+    reach = max(float(r.displacement.max() - r.displacement.min()) for r in records)
+    loop = (BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1))
+    frame = Model(loop, experiment.fastest_period, voltage, reach)
+    start = fit_hysteresis(frame, records, loops).model
+    delay = delay or _delay_without_steps(start, records, broadband)
+    for iterations in (ITERATIONS, FEW_ITERATIONS):
+        yield _with_dynamics(start, records, (broadband, moving), delay, iterations)
+    if moving != broadband:
+        yield _with_dynamics(start, records, (moving, broadband), delay, ITERATIONS)
+
+
+def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:
+    """The model with sums of modes for its dynamics: modes far below the sampling rate hide from iterations.
+
+    Parameters
+    ----------
+    model : Model
+        With a hysteresis that has been fitted.
+    records : sequence of Record
+        The experiment, in order.
+    fitted : collection of int
+        Indices of the records that may be used.
+
+    Yields
+    ------
+    Model
+        From broadband records, and from all that move; each to be fitted jointly.
+    """
+    experiment = Experiment(tuple(records))
+    broadband, moving = _telling_dynamics(roles_of(experiment), fitted, _at_full_rate(experiment, fitted))
+    for chosen in (broadband, moving) if moving != broadband else (broadband,):
+        with suppress(IdentificationError):
+            signals = hysteresis_signals(model, records, chosen)
+            yield with_dynamics(model, identify_modes(signals, *form_of(model), ITERATIONS).arx)
+
+
+def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:
+    return [i for i in fitted if experiment[i].sample_period < 1.001 * experiment.fastest_period]
+
+
+def _telling_dynamics(
+    roles: Roles, fitted: Collection[int], at_full_rate: Collection[int]
+) -> tuple[list[int], list[int]]:
+    """Broadband records, and all at the full rate that move; many sines tell the dynamics too."""
+    moving = [i for i in at_full_rate if not roles.contents[i].is_slow]
+    return [i for i in roles.broadband if i in fitted] or moving, moving
+
+
+def _with_dynamics(
+    start: Model, records: Sequence[Record], choices: Sequence[Collection[int]], delay: int, iterations: int
+) -> Model:
+    for chosen in choices:
+        with suppress(IdentificationError):  # noise without low frequencies, or behind plays, leaves the dc gain open
+            return with_dynamics(start, dynamics_behind(start, records, chosen, delay, ORDERS, iterations).arx)
+    return start.with_effect(follower(start, delay, ORDERS))
+
+
+def _delay_without_steps(model: Model, records: Sequence[Record], broadband: Collection[int]) -> int:
+    """The delay that noise shows, unless dynamics describe it better without one: hum hides the first response."""
+    found = delay_of(hysteresis_signals(model, records, broadband))
+    errors = {}
+    for delay in (found, 1):
+        with suppress(IdentificationError):  # dynamics that do not settle tell nothing about the delay
+            errors[delay] = dynamics_behind(model, records, broadband, delay, ORDERS).free_run_error
+    return min(errors, key=errors.__getitem__, default=found)
+
+
+def exact(model: Model) -> Model:
+    """The model with the exact loop, which the terms of the catalogue join, and with a sensor zero.
+
+    Raises
+    ------
+    ModelError
+        On a published loop of another exponent than n = 1, for which there is no exact step.
+    """
+    if PublishedBoucWen.name in model:
+        published = model[PublishedBoucWen.name]
+        if published["n"] != 1.0:
+            raise ModelError(f"diagnose: got published_bouc_wen.n = {published['n']:g}, expected 1")
+        values = {n: v for n, v in published.values.items() if n != "n"}
+        model = model.without(PublishedBoucWen.name).with_effect(BoucWen(**values))
+    return with_zero(model)
+
+
+def with_zero(model: Model) -> Model:
+    """The model with a sensor zero."""
+    return model if Offset.name in model else model.with_effect(Offset())

@@ -1,0 +1,167 @@
+"""The ground of a diagnosis: records with their floors, split and shortened, and the baseline fitted to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...identification.fit.fit import Fit, Progress
+from ...identification.fit.normal_equations import Nuisance
+from ...identification.records.conditioning import select as select_records
+from ...model.model import Model
+from ...record import Record
+from ..residual.intersample_error import coarseness
+from ..residual.noise_floor import floors, noise_floors, stroke
+from ..residual.sampling import at_period, common_period, less, shortened, slowed
+from .baseline import exact, modal_models, start_models
+from .candidates import score_baseline, score_model
+from .cross_validation import ADEQUATE, Score
+from .refit import FAILURES, LAST, PRECISE, clearly_better, joint, renewed
+from .selection_result import Selection
+from .test_records import reporting
+from .training_data import Evidence, extent_of
+
+Array = NDArray[np.float64]
+
+SEARCHED, FITTED = 6_000, 50_000
+"""Samples of a fast record that take part in the search, and in the last fit."""
+UNSURE = 0.3
+"""Share of what slow samples have lost that counts as floor: the rest is made good."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Ground:
+    """What a search for effects begins from.
+
+    Parameters
+    ----------
+    given, records : tuple of Record
+        In experiment order, at the period of the dynamics or slower; and with what slow samples have lost made good.
+    lost : list of (n,) ndarray
+        That, by record [m].
+    noise, least : (r,) ndarray
+        Noise and floor of every record [m].
+    span : float
+        Range of the displacement [m].
+    usable, fitted, spared : sequence of int
+        Records that tell something; of these those for fitting and choosing, and those set aside for the gap.
+    evidence : Evidence
+        The records that are fitted, shortened.
+    baseline : Fit
+        The model without further effects.
+    score : Score
+        Of the baseline.
+    """
+
+    given: tuple[Record, ...]
+    records: tuple[Record, ...]
+    lost: list[Array]
+    noise: Array
+    least: Array
+    span: float
+    usable: Sequence[int]
+    fitted: Sequence[int]
+    spared: Sequence[int]
+    evidence: Evidence
+    baseline: Fit
+    score: Score
+
+    @property
+    def null(self) -> float:
+        """V of a perfect model."""
+        return float(np.mean([(self.noise[i] / self.least[i]) ** 2 for i in self.fitted]))
+
+    @property
+    def whole(self) -> tuple[Record, ...]:
+        """The records that are fitted, long."""
+        return tuple(select_records(shortened(self.records, FITTED), self.least.tolist(), self.fitted)[0])
+
+    def is_coarse(self, model: Model) -> bool:
+        """Whether by this model slow samples have lost something else, by more than the floor of a record."""
+        again = coarseness(model, self.given)
+        return any(np.std(a - b) > f for a, b, f in zip(again, self.lost, self.least, strict=True))
+
+
+def lay_ground(
+    given: Sequence[Record],
+    usable: Sequence[int],
+    model: Model | None,
+    known: Selection | None,
+    sharpens: bool,
+    tell: Progress,
+) -> Ground:
+    """Floors, records to fit and to set aside, and the baseline.
+
+    Parameters
+    ----------
+    given : sequence of Record
+        The experiment, in order.
+    usable : sequence of int
+        Records that tell something.
+    model : Model or None
+        Where to begin.
+    known : Selection or None
+        A search whose model tells what slow samples have lost better than its baseline.
+    sharpens : bool
+        Whether what slow samples have lost is made good: averages of a noisy voltage would turn back and forth.
+    tell : callable
+        Called with a word and the fraction done.
+
+    Raises
+    ------
+    ModelError
+        If the records are faster than the model.
+    """
+    tell("baseline", 0.0)
+    records = tuple(slowed(r) for r in given)
+    spared = reporting(records, usable)
+    fitted = [i for i in usable if i not in spared]
+    noise, span = noise_floors(records), stroke(records)
+    least = floors(records, noise)
+    at_full_rate = [r for r, g in zip(records, given, strict=True) if r.sample_period == g.sample_period]
+    period = model.sample_period if model is not None else common_period(at_full_rate or records)
+    records = straight = tuple(at_period(r, period) for r in records)
+    first = known.baseline if known is not None else model
+    starts = iter((first,)) if first is not None else start_models(records, fitted)
+    start = exact(next(starts))
+    extent = extent_of([records[i] for i in usable], start)
+
+    def gathered(records: Sequence[Record], least: Array) -> Evidence:
+        kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
+        return Evidence(tuple(kept), np.array(sizes), Nuisance(), extent)
+
+    evidence = gathered(records, least)
+    tell("baseline, jointly", 0.2)
+    baseline = joint(start, evidence, LAST, PRECISE)
+    lost = [np.zeros(r.size) for r in records]
+    if sharpens:
+        lost = coarseness(known.model if known is not None else baseline.model, records)
+    if any(c.any() for c in lost):
+        records = less(records, lost)
+        least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
+        evidence = gathered(records, least)
+        tell("baseline, jointly", 0.3)
+        baseline = joint(baseline.model, evidence, LAST, PRECISE)
+    evidence, score = score_baseline(baseline.model, evidence)
+    if score.excess > ADEQUATE:
+        baseline, score = _best(baseline, score, starts, evidence)
+    if score.excess > ADEQUATE:
+        for modal in modal_models(baseline.model, records, fitted):
+            baseline, score = clearly_better(modal, baseline, score, evidence) or (baseline, score)
+        baseline, score = renewed(baseline, score, evidence)
+    return Ground(straight, records, lost, noise, least, span, usable, fitted, spared, evidence, baseline, score)
+
+
+def _best(found: Fit, score: Score, starts: Iterator[Model], evidence: Evidence) -> tuple[Fit, Score]:
+    """The fit and its score, or those from another start: one that records left out prefer, and that fits better."""
+    with suppress(*FAILURES):
+        for start in map(exact, starts):
+            if score_model(start, evidence).cost < score.cost:
+                other = joint(start, evidence, LAST, PRECISE)
+                if other.cost < found.cost:
+                    found, score = other, score_model(other.model, evidence)
+    return found, score

@@ -1,0 +1,139 @@
+"""`contest`: joint refits of candidates against one another, the longer the better they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ...effects.effect import Place
+from ...identification.fit.fit import Progress
+from ...model.model import Model
+from .candidates import Candidate
+from .cross_validation import ADEQUATE, Score
+from .refit import better, from_all_starts, proceed, refit, restart
+
+LEAST_GAIN = 0.15
+"""Least gain in mean ln max(1, R²) for which an effect is accepted."""
+CLOSE = 0.3
+"""Share of the best gain by which a rival may lie behind."""
+HOPELESS_BESIDE = 0.6
+"""Share of the gain of a best at the floor by which another one may lie behind it and still be refitted."""
+AGAIN = 3
+"""Refits that begin once more behind dynamics found anew."""
+RESTARTS = 4
+WORTHWHILE = 0.8
+"""Share of the cost above which beginning anew once more is not worth it."""
+FIRST, LATER = 3, 9
+"""Linearisations of a refit before the field is thinned out, and after."""
+FEWEST_STARTS = 3
+"""Starts of an effect from which all are tried where the likeliest led to no floor."""
+FINER = 0.05
+"""Gain from which the finer form of an effect is taken."""
+
+
+def contest(model: Model, candidates: Sequence[Candidate], before: Score, tell: Progress) -> list[Candidate]:
+    """Joint refits, best first: a few linearisations of all, dynamics anew for the leaders, the best to the end."""
+    refits: list[Candidate] = []
+    for k, candidate in enumerate(candidates):
+        if refits and _is_far_behind(candidate, refits[0], before):
+            continue
+        tell(f"refit with {candidate.name}", (k + 1) / (len(candidates) + 2))
+        result = refit(model, candidate, FIRST)
+        if result is not None:
+            refits = sorted([*refits, result], key=lambda c: c.score.cost)
+    if not refits:
+        return []
+    tell("dynamics anew", 0.8)
+    leader = _anew(refits[0])
+    field = [
+        leader,
+        *(c if k >= AGAIN or _is_far_behind(c, leader, before) else _anew(c) for k, c in enumerate(refits[1:], 1)),
+    ]
+    field.sort(key=lambda c: c.score.cost)
+    tell(f"refit with {field[0].name}", 0.9)
+    best = _from_elsewhere(settled(field[0], before), before)
+    reach = best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
+    rest = [settled(c, before) if c.score.cost < reach and k < AGAIN else c for k, c in enumerate(field[1:], 1)]
+    return sorted([best, *rest], key=lambda c: c.score.cost)
+
+
+def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
+    """Refits of effects of the drive: dynamics have taken them up, so that no score test sees them."""
+    return _settled_from_all_starts(model, [c for c in candidates if c.effect.place is Place.DRIVE], before)
+
+
+def refits_of_twins(model: Model, candidates: Sequence[Candidate], best: Candidate, before: Score) -> list[Candidate]:
+    """Refits of what slow drive cannot tell from the best: only other dynamics let it show."""
+    twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
+    return _settled_from_all_starts(model, twins, before)
+
+
+def _settled_from_all_starts(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
+    anew = (from_all_starts(model, c, FIRST) for c in candidates)
+    return [settled(c, before) for c in anew if c is not None]
+
+
+def _anew(candidate: Candidate) -> Candidate:
+    """The refit behind dynamics found anew; an effect of the drive, behind which all else stands, from every start."""
+    if candidate.score.cost <= LEAST_GAIN:  # less is left than counts as a gain
+        return candidate
+    anew = restart(candidate, FIRST)
+    if anew.effect.place is not Place.DRIVE or anew.score.excess <= ADEQUATE:
+        return anew
+    assert anew.fit is not None
+    return better(from_all_starts(anew.fit.model.without(anew.name), anew, FIRST), anew)
+
+
+def _from_elsewhere(best: Candidate, before: Score) -> Candidate:
+    """The best, begun once more at every start of its effect where it has come to no floor.
+
+    An effect of the drive has had all of its starts, and one with few has no valleys to choose from.
+    """
+    assert best.fit is not None
+    starts = type(best.effect).starts(best.evidence.extent)
+    in_vain = before.cost - best.score.cost < LEAST_GAIN
+    if best.score.excess <= ADEQUATE or in_vain or best.effect.place is Place.DRIVE or len(starts) < FEWEST_STARTS:
+        return best
+    anew = from_all_starts(best.fit.model.without(best.name), best, FIRST)
+    return best if anew is None else better(settled(anew, before), best)
+
+
+def _is_far_behind(candidate: Candidate, best: Candidate, before: Score) -> bool:
+    """Whether the best is at the floor and the other by so much short of it that it is no rival."""
+    most = 2.0 * LEAST_GAIN if best.score.cost <= LEAST_GAIN else HOPELESS_BESIDE * (before.cost - best.score.cost)
+    return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > most
+
+
+def settled(candidate: Candidate, before: Score) -> Candidate:
+    """The refit to its end, and begun anew while that closes much of what is left."""
+    for _ in range(RESTARTS):
+        assert candidate.fit is not None
+        cost = candidate.fit.cost
+        candidate = proceed(candidate, LATER)
+        if candidate.score.excess <= ADEQUATE or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:
+            break
+        candidate = restart(candidate, LATER)
+        assert candidate.fit is not None
+        if candidate.fit.cost > WORTHWHILE * cost:
+            break
+    return candidate
+
+
+def finest(candidate: Candidate, before: Score) -> Candidate:
+    """The candidate in its finer form where that is asked for, and better."""
+    finer = candidate.effect.refined()
+    gain = before.cost - candidate.score.cost
+    if finer is None or candidate.fit is None or candidate.score.excess <= ADEQUATE or gain < LEAST_GAIN:
+        return candidate
+    refined = refit(candidate.fit.model, replace(candidate, effect=finer), LATER)
+    if refined is None or refined.score.cost > candidate.score.cost - FINER:
+        return candidate
+    return settled(refined, before)
+
+
+def simplest(refits: list[Candidate]) -> Candidate:
+    """The refit with the fewest numbers among those that are as good as the best."""
+    best = refits[0]
+    assert best.fit is not None
+    ties = [c for c in refits if c is best or c.score.cost - best.score.cost < 0.02]
+    return min(ties, key=lambda c: (len(c.fit.names) if c.fit else 0, c.score.cost))

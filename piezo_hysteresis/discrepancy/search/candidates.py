@@ -1,0 +1,210 @@
+"""Candidates for the missing effect: a projected score test of the whole catalogue.
+
+A residual is not a signature: the signature of an effect counts only as far as nothing in the present model can imitate
+it. So residual and sensitivities are projected off everything the model can still adjust, which the inner products of
+`identification.normal_equations` do at once for all effects, and the score is taken on records left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects import BoucWen, Effect, MainsHum
+from ...errors import DivergenceError, ModelError, ParameterError
+from ...identification.fit.fit import Fit, gauge
+from ...identification.fit.normal_equations import Gram, grams
+from ...model.model import Model
+from .cross_validation import Score, held_out, indispensable
+from .training_data import Evidence
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Candidate:
+    """An effect, where the search for it begins, and how well it does on records left out.
+
+    Parameters
+    ----------
+    effect : Effect
+        At the start of the search; in the model at its end.
+    score : Score
+        Linearised at the start, or after the refit.
+    fit : Fit or None
+        The joint refit.
+    """
+
+    effect: Effect
+    evidence: Evidence
+    score: Score
+    fit: Fit | None = None
+
+    @property
+    def name(self) -> str:
+        """Identifier of the effect."""
+        return self.effect.name
+
+
+def free_numbers(model: Model, evidence: Evidence) -> list[str]:
+    """Numbers of a model that a joint fit adjusts: all but the chosen ones, the delay and what is free per record.
+
+    Settling where no two records begin at different levels is no number of the evidence.
+    """
+    names = []
+    for name in model.values():
+        row = model.row(name)
+        if not (row.fixed or row.per_record or name == "arx.delay"):
+            names.append(name)
+    skipped = {"offset.y0"} if evidence.nuisance.offset else set()
+    if evidence.nuisance.offset or not evidence.begins_at_levels:
+        skipped.add("offset.settling")
+    skipped |= {f"{MainsHum.name}.f"}
+    if loop_is_off(model):  # and stays so
+        skipped |= {f"{BoucWen.name}.{n}" for n in ("A", "beta", "gamma")}
+    return [n for n in names if n not in skipped]
+
+
+def loop_is_off(model: Model) -> bool:
+    """Whether the model has a loop that takes no part."""
+    return BoucWen.name in model and model[BoucWen.name]["A"] == 0.0
+
+
+def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
+    """Columns for `held_out`: free numbers with the gauge held, then `extra` rows, and nothing for the residual."""
+    free = gauge(model, names)
+    columns = np.zeros((len(names) + extra + 1, free.shape[1] + extra))
+    columns[: len(names), : free.shape[1]] = free
+    columns[len(names) : len(names) + extra, free.shape[1] :] = np.eye(extra)
+    return columns
+
+
+def score_model(model: Model, evidence: Evidence) -> Score:
+    """Score of a fitted model on records left out."""
+    return held_out(*_products(model, evidence), evidence.alone)
+
+
+def score_baseline(model: Model, evidence: Evidence) -> tuple[Evidence, Score]:
+    """The evidence, of which records that alone tell a number of the model are never left out, and the score."""
+    products = _products(model, evidence)
+    alone = indispensable(*products)
+    return replace(evidence, alone=alone), held_out(*products, alone)
+
+
+def _products(model: Model, evidence: Evidence) -> tuple[list[Gram], Array, Array]:
+    names = free_numbers(model, evidence)
+    return grams(model, evidence.records, names, evidence.nuisance), evidence.floors, directions(model, names)
+
+
+def screen(model: Model, evidence: Evidence, effects: Iterable[type[Effect]]) -> list[Candidate]:
+    """Score test of every effect of the catalogue at every start it proposes, best first.
+
+    Effects that are off at their start share one pass over the data; a finite start enters by the change it makes.
+    """
+    base = free_numbers(model, evidence)
+    starts = [(effect, effect.starts(evidence.extent)) for effect in effects if _fits(model, evidence, effect)]
+    found: list[Candidate] = []
+    for turn in range(max((len(s) for _, s in starts), default=0)):
+        members = [s[turn] for _, s in starts if turn < len(s) and s[turn].is_off and s[turn].name != MainsHum.name]
+        if members:
+            found += _screen_off(model, evidence, base, members)
+    moves = [s for _, many in starts for s in many if not s.is_off]
+    if moves:
+        found += _screen_moves(model, evidence, base, moves)
+    if any(effect is MainsHum for effect, _ in starts):
+        for hum in MainsHum.starts(evidence.extent):
+            with_hum = evidence.with_hum(hum["f"])
+            found.append(Candidate(hum, with_hum, score_model(model, with_hum)))
+    best: dict[str, Candidate] = {}
+    for candidate in found:
+        if candidate.name not in best or candidate.score.cost < best[candidate.name].score.cost:
+            best[candidate.name] = candidate
+    return sorted(best.values(), key=lambda c: c.score.cost)
+
+
+def _fits(model: Model, evidence: Evidence, effect: type[Effect]) -> bool:
+    has_channel = effect.channel is None or any(getattr(r, effect.channel) is not None for r in evidence.records)
+    return effect.name not in model and has_channel and (effect.host is None or effect.host in model)
+
+
+def _screen_off(model: Model, evidence: Evidence, base: list[str], members: list[Effect]) -> list[Candidate]:
+    extended = model
+    for effect in list(members):
+        try:
+            trial = extended.with_effect(effect)
+            trial.at(model.sample_period)
+            extended = trial
+        except ModelError:
+            members = [m for m in members if m is not effect]
+    own = {e.name: [n for n in free_numbers(extended, evidence) if n.startswith(f"{e.name}.")] for e in members}
+    names = base + [n for e in members for n in own[e.name]]
+    products = grams(extended, evidence.records, names, evidence.nuisance)
+    columns = directions(model, base, len(names) - len(base))
+    kept = columns.shape[1] - (len(names) - len(base))
+    found = []
+    for effect in members:
+        wanted = [kept + names.index(n) - len(base) for n in own[effect.name]]
+        part = columns[:, [*range(kept), *wanted]]
+        found.append(Candidate(effect, evidence, held_out(products, evidence.floors, part, evidence.alone)))
+    return found
+
+
+def _screen_moves(model: Model, evidence: Evidence, base: list[str], moves: list[Effect]) -> list[Candidate]:
+    now = model.simulate(evidence.records)
+    usable, rows = [], []
+    for effect in moves:
+        try:
+            then = model.with_effect(effect).simulate(evidence.records)
+        except (DivergenceError, ParameterError, ModelError):
+            continue
+        usable.append(effect)
+        rows.append([a - b for a, b in zip(then, now, strict=True)])
+    if not usable:
+        return []
+    extra = [np.array([row[i] for row in rows]) for i in range(len(evidence.records))]
+    products = grams(model, evidence.records, base, evidence.nuisance, extra)
+    columns = directions(model, base, len(usable))
+    kept = columns.shape[1] - len(usable)
+    found = []
+    for k, effect in enumerate(usable):
+        score = held_out(products, evidence.floors, columns[:, [*range(kept), kept + k]], evidence.alone)
+        if score.step[-1] > 0.0:  # else its opposite would help
+            found.append(Candidate(effect, evidence, score))
+    return found
+
+
+def alikeness(first: Candidate, second: Candidate, model: Model) -> float:
+    """|cos| between the signatures of two effects after projection off the model; 1 is indistinguishable.
+
+    For effects of several numbers the signature is the direction of the linearised step.
+    """
+    evidence = first.evidence
+    base = free_numbers(model, evidence)
+    now = model.simulate(evidence.records)
+    changes = []
+    for candidate in (first, second):
+        assert candidate.fit is not None
+        part = candidate.fit.model
+        changes.append([a - b for a, b in zip(part.simulate(evidence.records), now, strict=True)])
+    extra = [np.array([c[i] for c in changes]) for i in range(len(evidence.records))]
+    products = grams(model, evidence.records, base, evidence.nuisance, extra)
+    total = weighted_sum(products, evidence.floors)
+    q = len(base)
+    free = gauge(model, base)
+    inner = free.T @ total[:q, :q] @ free
+    cross = free.T @ total[:q, q : q + 2]
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
+    solved = scale[:, None] * (
+        np.linalg.pinv(inner * np.outer(scale, scale), rcond=1e-9, hermitian=True) @ (scale[:, None] * cross)
+    )
+    left = total[q : q + 2, q : q + 2] - cross.T @ solved
+    return float(abs(left[0, 1]) / np.sqrt(max(left[0, 0] * left[1, 1], 1e-300)))
+
+
+def weighted_sum(products: Sequence[Gram], floors: Array) -> Array:
+    """Sum of the inner products, every record by its size and floor."""
+    total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(products, floors, strict=True))
+    return total

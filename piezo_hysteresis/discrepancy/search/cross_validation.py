@@ -1,0 +1,138 @@
+"""Scores on data that were not fitted, by cross-validation over records from inner products alone.
+
+With the inner products of every record at hand, leaving one out is one small linear solution: the parameters take the
+step that the other records ask for, and the record left out is judged with it. No record needs to be simulated again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...identification.fit.normal_equations import Gram
+
+Array = NDArray[np.float64]
+
+ADEQUATE = 1.5
+"""Mean R² up to which nothing is missing beyond noise."""
+RIDGE = 1e-9
+"""Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
+TINY = 1e-200
+SPOILT = 0.2
+"""Error from noise alone, in R², beyond which a record says nothing when it is left out."""
+FARTHEST = 100.0
+"""How far leaving a record out may raise its R² over that of the fit to all: beyond, nothing is linear any more."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Score:
+    """How far records that were left out lie above their floor.
+
+    Parameters
+    ----------
+    ratios : (r,) ndarray
+        RMS residual over floor of every record, R.
+    step : (q,) ndarray
+        Linearised change of the parameters from all records.
+    """
+
+    ratios: Array
+    step: Array
+
+    @property
+    def excess(self) -> float:
+        """V: mean of R²; 1 is the floor."""
+        return float(np.mean(self.ratios**2))
+
+    @property
+    def logs(self) -> Array:
+        """ln max(1, R²) of every record: no bad record decides alone."""
+        return np.log(np.maximum(1.0, self.ratios**2))
+
+    @property
+    def cost(self) -> float:
+        """C: mean of `logs`."""
+        return float(self.logs.mean())
+
+    def better_than(self, other: Score) -> tuple[float, float]:
+        """Mean gain in C over `other`, and its standard error with records as units."""
+        gain = other.logs - self.logs
+        return float(gain.mean()), float(gain.std(ddof=1) / np.sqrt(gain.size)) if gain.size > 1 else np.inf
+
+
+def held_out(
+    grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array, alone: Collection[int] = ()
+) -> Score:
+    """Score of a model extended by `columns`, every record judged with parameters from the others.
+
+    Parameters
+    ----------
+    grams : sequence of Gram
+        Of the records, all over the same rows.
+    floors : (r,) array_like
+        Floor of every record [m]; those with an infinite one only carry the state of the stage and do not count.
+    columns : (rows, q) ndarray
+        Directions in which the parameters may move, as combinations of the rows of `grams`; the residual's row,
+        the last, is zero.
+    alone : collection of int
+        Indices of records whose kind has no other: they are judged with the parameters from all.
+    """
+    counted, products = _counted(grams, floors)
+    hessians = np.array([columns.T @ p @ columns for p in products])
+    slopes = np.array([columns.T @ p[:, -1] for p in products])
+    power = np.array([p[-1, -1] for p in products])
+    hessian, slope = hessians.sum(axis=0), slopes.sum(axis=0)
+    scale = _scale(hessian)
+    left = np.array([i not in alone for i in counted], dtype=float) * (len(counted) > 1)
+    steps = _solve(hessian - left[:, None, None] * hessians, slope - left[:, None] * slopes, scale)
+    changes = np.einsum("rj,rjk,rk->r", steps, hessians, steps) - 2.0 * np.sum(steps * slopes, axis=1)
+    squares = np.clip(np.array(power) + changes, 0.0, FARTHEST * np.maximum(1.0, power))
+    return Score(np.sqrt(squares), _solve(hessian[None], slope[None], scale)[0])
+
+
+def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array) -> tuple[int, ...]:
+    """Indices of records without which a direction is so little known that noise alone would spoil their judgement.
+
+    The one rest at a high level, say, tells alone how a stage settles there. With a share μ of what is known about a
+    direction, a record of n samples that is left out is off by μ/(1 − μ)/n in R² from the noise of the others.
+
+    Parameters
+    ----------
+    grams, floors, columns
+        As for `held_out`.
+    """
+    counted, products = _counted(grams, floors)
+    hessians = [columns.T @ product @ columns for product in products]
+    total = np.sum(hessians, axis=0)
+    scale = _scale(total)
+    values, vectors = np.linalg.eigh(total * np.outer(scale, scale))
+    known = values > RIDGE * values[-1]
+    if not known.any():
+        return ()
+    whitened = vectors[:, known] / np.sqrt(values[known]) * scale[:, None]
+    shares = [float(np.linalg.eigvalsh(whitened.T @ h @ whitened)[-1]) for h in hessians]
+    return tuple(i for i, share in zip(counted, shares, strict=True) if share > SPOILT * grams[i].size * (1.0 - share))
+
+
+def _counted(grams: Sequence[Gram], floors: Sequence[float] | Array) -> tuple[list[int], list[Array]]:
+    """Indices of the records that count, and their inner products in squares of the floor."""
+    counted = [i for i, floor in enumerate(floors) if np.isfinite(floor)]
+    return counted, [grams[i].matrix / (grams[i].size * floors[i] ** 2) for i in counted]
+
+
+def _scale(hessian: Array) -> Array:
+    """Unit of every direction; none for one without influence, of which rounding may leave less than nothing."""
+    power = np.diag(hessian)
+    return np.where(power > TINY, 1.0 / np.sqrt(np.maximum(power, TINY)), 0.0)
+
+
+def _solve(matrices: Array, rights: Array, scale: Array) -> Array:
+    """Solutions (r, q) of r normal equations; what is undetermined stays at zero."""
+    values, vectors = np.linalg.eigh(matrices * np.outer(scale, scale))
+    known = values > RIDGE * np.maximum(values[:, -1:], 1e-300)
+    along = np.einsum("rjk,rj->rk", vectors, scale * rights)
+    parts = np.divide(along, values, out=np.zeros_like(along), where=known)
+    return np.asarray(scale * np.einsum("rjk,rk->rj", vectors, parts))

@@ -1,0 +1,225 @@
+"""Joint refits of candidates: from their start, carried on, behind dynamics found anew, and without the effect again.
+
+Linearised scores rank effects; what an effect is worth only a refit of the whole model tells, and only beside a refit
+that had the same chances without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+from ...effects import Arx
+from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
+from ...identification.fit.fit import Fit, fit
+from ...identification.steps.dynamics import Dynamics, identify_arx
+from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, form_of, hysteresis_signals, with_dynamics
+from ...identification.steps.modes import identify_modes
+from ...model.model import Model
+from .candidates import Candidate, free_numbers, score_model
+from .cross_validation import Score
+from .training_data import Evidence
+
+LINEAR = ("lag", "dynamics")
+"""Families that dynamics of an order high enough can hold."""
+TOLERANCE = 1e-3
+"""Relative decrease of the cost at which a refit has converged."""
+LAST, PRECISE = 25, 1e-4
+"""Linearisations of a last fit, and relative decrease of the cost at which it has converged."""
+ANEW, CLEARLY = 3, 0.7
+"""Times that a baseline is begun anew at most, and share of V that it may leave: a little better is a fit also by
+another account of what is missing."""
+MODAL_GAIN = 0.1
+"""Gain from which a sum of modes is taken for the dynamics."""
+FAILURES = (DivergenceError, IdentificationError, ModelError, ParameterError)
+"""What a trial may end with."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fitted:
+    """A fitted model and its score."""
+
+    model: Model
+    score: Score
+
+
+def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
+    """All free numbers of a model fitted to the evidence at once.
+
+    Parameters
+    ----------
+    model : Model
+        Where to begin.
+    evidence : Evidence
+        Records, floors, and what is free in each record.
+    max_iterations : int
+        Linearisations.
+    tolerance : float
+        Relative decrease of the cost at which the fit has converged.
+
+    Raises
+    ------
+    DivergenceError, ParameterError, ModelError, IdentificationError
+        As `fit` does.
+    """
+    return fit(
+        model,
+        evidence.records,
+        free_numbers(model, evidence),
+        floors=evidence.floors.tolist(),
+        nuisance=evidence.nuisance,
+        max_iterations=max_iterations,
+        tolerance=tolerance,
+    )
+
+
+def clearly_better(start: Model, found: Fit, score: Score, evidence: Evidence) -> tuple[Fit, Score] | None:
+    """The fit from another start, and its score, where records left out prefer it clearly; None elsewhere.
+
+    They judge the start first, after one linear step: one that is no better then has not become clearly better.
+    """
+    with suppress(*FAILURES):
+        if score_model(start, evidence).excess >= score.excess:
+            return None
+        other = joint(start, evidence, LAST, PRECISE)
+        told = score_model(other.model, evidence)
+        if other.cost < found.cost and told.excess < CLEARLY * score.excess:
+            return other, told
+    return None
+
+
+def renewed(found: Fit, score: Score, evidence: Evidence) -> tuple[Fit, Score]:
+    """A baseline and its score, begun anew behind dynamics found anew, while that helps.
+
+    Dynamics are found behind the hysteresis of the model before, which was fitted without them.
+    """
+    for _ in range(ANEW):
+        anew = _behind_anew(found.model, evidence)
+        better_one = None if anew is None else clearly_better(anew.model, found, score, evidence)
+        if better_one is None:
+            break
+        found, score = better_one
+    return found, score
+
+
+def refit(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
+    """Fit the model with the candidate jointly, from its start; None where that diverges."""
+    return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
+
+
+def proceed(candidate: Candidate, max_iterations: int) -> Candidate:
+    """The refit carried on from where it stopped; itself where it had converged."""
+    assert candidate.fit is not None
+    if candidate.fit.converged:
+        return candidate
+    return _refitted(candidate.fit.model, candidate, max_iterations) or candidate
+
+
+def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
+    try:
+        result = joint(model, candidate.evidence, max_iterations)
+        score = score_model(result.model, candidate.evidence)
+    except FAILURES:
+        return None
+    return replace(candidate, effect=result.model[candidate.name], score=score, fit=result)
+
+
+def restart(candidate: Candidate, max_iterations: int) -> Candidate:
+    """The refit once more behind dynamics found anew; itself where that is no better.
+
+    The dynamics of the model before were bent by the effect it lacked; from there a joint fit has a long way to go.
+    """
+    assert candidate.fit is not None
+    anew = _behind_anew(candidate.fit.model, candidate.evidence)
+    return candidate if anew is None else better(_refitted(anew.model, candidate, max_iterations), candidate)
+
+
+def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
+    """Refit of the model with the candidate begun at the best start of its effect; None where all diverge.
+
+    Every start is judged behind dynamics found anew, by few iterations: noise that a limit cuts to pieces bends the
+    dynamics so much that every size has a valley of its own.
+    """
+    starts = type(candidate.effect).starts(candidate.evidence.extent)
+    found = [_behind_anew(model.with_effect(start), candidate.evidence, (FEW_ITERATIONS,)) for start in starts]
+    best = min((f for f in found if f is not None), key=lambda f: f.score.cost, default=None)
+    if best is None:
+        return None
+    more = _behind_anew(best.model, candidate.evidence, (ITERATIONS,))
+    best = best if more is None or more.score.cost > best.score.cost else more
+    return _refitted(best.model, candidate, max_iterations)
+
+
+def _behind_anew(
+    model: Model, evidence: Evidence, choices: Sequence[int] = (FEW_ITERATIONS, ITERATIONS)
+) -> Fitted | None:
+    """The model with dynamics found anew; None where the records do not tell them.
+
+    Iterations that describe the broadband records better, by a lack that is still there, may describe the others worse.
+    """
+    broadband = evidence.broadband()
+    if not broadband or not isinstance(model["arx"], Arx):
+        return None
+    found, best = list[Fitted](), None
+
+    def behind(dynamics: Dynamics) -> Fitted:
+        anew = with_dynamics(model, dynamics.arx)
+        return Fitted(anew, score_model(anew, evidence))
+
+    with suppress(*FAILURES):
+        signals = hysteresis_signals(model, evidence.records, broadband)
+        for iterations in choices:
+            with suppress(*FAILURES):
+                found.append(behind(identify_arx(signals, *form_of(model), iterations)))
+        best = min(found, key=lambda f: f.score.cost, default=None)
+        if ITERATIONS in choices:
+            modes = behind(identify_modes(signals, *form_of(model), ITERATIONS))
+            if best is None or modes.score.cost < best.score.cost - MODAL_GAIN:
+                best = modes
+    return best
+
+
+def better(anew: Candidate | None, candidate: Candidate) -> Candidate:
+    """The refit that fits better; the first may have failed."""
+    assert candidate.fit is not None
+    return candidate if anew is None or anew.fit is None or anew.fit.cost >= candidate.fit.cost else anew
+
+
+def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
+    """The candidate's model without its effect, all else fitted on; None where that diverges.
+
+    What this has gained over the model before belongs to dynamics and hysteresis, and to no effect.
+    """
+    assert candidate.fit is not None
+    model = candidate.fit.model.without(candidate.name)
+    evidence = candidate.evidence.without(candidate.name)
+    starts = [model]
+    if candidate.effect.family in LINEAR and (absorbed := _absorbed(model, candidate.fit.model, evidence)) is not None:
+        starts.append(absorbed)
+    found = []
+    for start in starts:
+        try:
+            fitted = joint(start, evidence, max_iterations)
+            found.append(Fitted(fitted.model, score_model(fitted.model, evidence)))
+        except FAILURES:
+            continue
+    return min(found, key=lambda f: f.score.cost, default=None)
+
+
+def _absorbed(model: Model, extended: Model, evidence: Evidence) -> Model | None:
+    """The model with dynamics that imitate those of `extended`, which has one more linear effect; None without records.
+
+    A joint fit may have stopped before its G held a mode that it has room for: what G can hold is no missing effect.
+    """
+    broadband = evidence.broadband()
+    if not broadband or not isinstance(model["arx"], Arx):
+        return None
+    inputs = hysteresis_signals(model, evidence.records, broadband)
+    outputs = extended.simulate(evidence.records)
+    signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
+    try:
+        found = identify_arx(signals, *form_of(model), ITERATIONS)
+        return with_dynamics(model, found.arx)
+    except (IdentificationError, ParameterError, DivergenceError):
+        return None

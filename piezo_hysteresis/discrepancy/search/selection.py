@@ -1,0 +1,243 @@
+"""Forward selection of missing effects: screen, refit the best, choose on records left out, add, repeat, stop.
+
+Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 2014 for why discrepancy needs structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+
+import numpy as np
+
+from ...effects import CATALOGUE, Effect, MainsHum
+from ...identification.fit.fit import Progress
+from ...identification.fit.normal_equations import residuals
+from ...model.model import Model
+from .acceptance_tests import bends_all_along, is_seen, is_steady, may_be_off
+from .candidate_refits import (
+    CLOSE,
+    FIRST,
+    LATER,
+    LEAST_GAIN,
+    contest,
+    finest,
+    refits_of_the_drive,
+    refits_of_twins,
+    settled,
+    simplest,
+)
+from .candidates import Candidate, alikeness, screen
+from .cross_validation import ADEQUATE, Score
+from .refit import Fitted, refit, restart, without
+from .selection_result import MANY, Rejection, Selection, Step, typical
+from .training_data import Evidence
+
+ALONE = 4.0
+"""Residual in floors up to which one record alone asks for no further effect."""
+DECISIVE = 0.5
+"""Gain over the model fitted anew without an effect from which it needs no other proof that it is not off."""
+KEEPS = (0.8, 0.5)
+"""Share of V beyond noise that may remain after the first accepted effect, and after further ones."""
+REFITS = 6
+"""Candidates that are refitted jointly."""
+HOPELESS = 0.02
+"""Linearised gain below which an effect that is not among the first two is not refitted."""
+MOST = 3
+"""Effects at most."""
+MOST_TURNS = 5
+"""Turns at most."""
+ALIKE = 0.97
+"""|cos| of two signatures from which they count as one."""
+
+
+def select(
+    model: Model,
+    evidence: Evidence,
+    score: Score,
+    null: float,
+    effects: Collection[type[Effect]] = CATALOGUE,
+    progress: Progress | None = None,
+    is_in_vain: Callable[[Model, Evidence], bool] = lambda model, evidence: False,
+) -> Selection:
+    """Add effects while records left out ask for them.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted baseline.
+    evidence : Evidence
+        Records that fit and choose.
+    score : Score
+        Of the baseline.
+    null : float
+        V of a perfect model.
+    effects : collection of Effect classes
+        The library to choose from.
+    progress : callable, optional
+        Called with a word and the fraction done.
+    is_in_vain : callable, optional
+        Asked after every effect that leaves a gap: whether to stop, for the data must be treated first.
+    """
+    tell = progress or (lambda word, fraction: None)
+    baseline, steps, accepted = model, list[Step](), 0
+    while not _is_enough(score, accepted) and len(steps) < MOST_TURNS and accepted < MOST:
+        step = _turn(model, evidence, score, null, effects, KEEPS[min(accepted, 1)], tell)
+        if step is None:
+            break
+        steps.append(step)
+        if step.accepted:
+            assert step.best.fit is not None
+            model, score, evidence = step.best.fit.model, step.best.score, step.best.evidence
+            accepted += 1
+            if score.excess > ADEQUATE and is_in_vain(model, evidence):
+                return Selection(baseline, model, score, tuple(steps), null)
+        elif step.renewed is not None:
+            model, score = step.renewed.model, step.renewed.score
+        else:
+            break
+    model, score = _pruned(model, score, steps)
+    return Selection(baseline, model, score, tuple(steps), null)
+
+
+def _is_enough(score: Score, accepted: int) -> bool:
+    """Whether nothing more is looked for: for one record that is a little off, no second name is forced."""
+    if score.excess <= ADEQUATE:
+        return True
+    worst = int(np.argmax(score.ratios))
+    others = np.delete(score.ratios, worst)
+    return bool(accepted and others.size >= MANY and np.mean(others**2) <= ADEQUATE and score.ratios[worst] <= ALONE)
+
+
+def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score]:
+    """Take back effects that a later one makes superfluous; `steps` is updated."""
+    accepted = [k for k, step in enumerate(steps) if step.accepted]
+    for k in accepted[:-1]:
+        name, last = steps[k].best.name, steps[accepted[-1]].best
+        without_it = replace(last, effect=model[last.name], evidence=last.evidence.without(name))
+        lean = refit(model.without(name), without_it, FIRST)
+        if lean is None:
+            continue
+        lean = min(lean, restart(lean, FIRST), key=lambda c: c.score.cost)
+        if lean.score.cost - score.cost < 2.0 * LEAST_GAIN + 0.5:
+            lean = settled(lean, steps[0].before)
+        if lean.score.cost - score.cost < LEAST_GAIN and lean.fit is not None:
+            told = Rejection(name, f"superfluous once {last.name} is there")
+            steps[k] = replace(steps[k], accepted=False, rejected=(told, *steps[k].rejected))
+            steps[accepted[-1]] = replace(steps[accepted[-1]], best=lean)
+            model, score = lean.fit.model, lean.score
+    return model, score
+
+
+def _turn(
+    model: Model,
+    evidence: Evidence,
+    before: Score,
+    null: float,
+    effects: Collection[type[Effect]],
+    keeps: float,
+    tell: Progress,
+) -> Step | None:
+    tell("score test of the catalogue", 0.0)
+    evidence = evidence.with_peaks(residuals(model, evidence.records, evidence.nuisance))
+    present = {e.public_name() for e in model.effects}
+    twins = {e.name: t.name for e in effects for t in model.effects if e.twin == t.name or t.twin == e.name}
+    absent = [e for e in effects if e.public_name() not in present and e.name not in twins]
+    screened = screen(model, evidence, absent)
+    likely = [
+        c
+        for k, c in enumerate(screened)
+        # forms of the same effect are told apart by their refits
+        if (k < REFITS or c.effect.public_name() == screened[0].effect.public_name())
+        and (k < 2 or before.cost - c.score.cost > HOPELESS)
+    ]
+    refits = contest(model, likely, before, tell)
+    if not refits:
+        return None
+    if refits[0].score.excess > ADEQUATE and (others := refits_of_twins(model, screened, refits[0], before)):
+        refits = _best_of_each([*refits, *others])
+    best, alone, objection = _judged(refits, before, null, keeps)
+    if objection is not None and (late := refits_of_the_drive(model, screened, before)):
+        refits = _best_of_each([*refits, *late])
+        best, alone, objection = _judged(refits, before, null, keeps)
+    objection = objection or _untried_twin(type(best.effect), effects)
+    accepted, rivals = objection is None, list[Candidate]()
+    rejected = [
+        Rejection(name, f"on slow drive one with {twin}, which is in the model") for name, twin in twins.items()
+    ]
+    rejected += [] if objection is None else [Rejection(best.name, objection)]
+    better = alone is not None and before.cost - alone.score.cost > 0.5 * LEAST_GAIN
+    renewed = alone if better and not accepted else None
+    for candidate in refits:
+        if candidate.name == best.name:
+            continue
+        lead, error = best.score.better_than(candidate.score)
+        close = lead < CLOSE * (before.cost - best.score.cost)
+        if accepted and close and (lead < 2.0 * error or alikeness(best, candidate, model) > ALIKE):
+            rivals.append(candidate)
+        else:
+            told = f"{lead:.2f} ± {error:.2f} behind {best.name} on records left out (mean ln R²)"
+            rejected.append(Rejection(candidate.name, told))
+    for candidate in _others(screened, refits):
+        most = max(0.0, before.cost - candidate.score.cost)
+        rejected.append(Rejection(candidate.name, f"improves records left out by {most:.2f} at most (mean ln R²)"))
+    return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
+
+
+def _best_of_each(refits: list[Candidate]) -> list[Candidate]:
+    """Of the refits of every effect the best one, best first."""
+    worst_first = sorted(refits, key=lambda c: -c.score.cost)
+    return sorted({c.name: c for c in worst_first}.values(), key=lambda c: c.score.cost)
+
+
+def _others(screened: list[Candidate], refits: list[Candidate]) -> list[Candidate]:
+    """Those that were not refitted."""
+    names = {r.name for r in refits}
+    return [c for c in screened if c.name not in names]
+
+
+def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> str | None:
+    """Objection to an effect whose twin is left out of the library: none of the two can be told from the other."""
+    twins = {e.public_name() for e in CATALOGUE if effect.twin == e.name or e.twin == effect.name}
+    untried = sorted(twins - {e.public_name() for e in effects})
+    return f"on slow drive one with {untried[0]}, which the library lacks" if untried else None
+
+
+def _judged(
+    refits: list[Candidate], before: Score, null: float, keeps: float
+) -> tuple[Candidate, Fitted | None, str | None]:
+    """The best refit, the model fitted anew without it where it comes to that, and what speaks against the effect."""
+    best = finest(simplest([c for c in refits if not bends_all_along(c)] or refits), before)
+    gain, left = before.cost - best.score.cost, _left(best.score, before, null)
+    if gain < LEAST_GAIN or left > keeps:
+        told = (
+            f"improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
+            f"{100 * left:.0f} % of V beyond noise stays, {100 * keeps:.0f} % at most"
+        )
+        return best, None, told
+    alone = without(best, LATER)
+    return best, alone, _objection(best, alone, null, keeps)
+
+
+def _objection(best: Candidate, alone: Fitted | None, null: float, keeps: float) -> str | None:
+    """Why a refit that gains enough is no effect, beside the model fitted anew without it; None where it is one."""
+    owed = 0.0
+    if alone is not None:
+        owed = alone.score.cost - best.score.cost
+        if owed < LEAST_GAIN or _left(best.score, alone.score, null) > keeps:
+            return f"gains {owed:.2f} over the model fitted anew without it"
+    if owed < DECISIVE and may_be_off(best):
+        return "all its numbers could as well be off"
+    if not is_seen(best):
+        return "changes no record by as much as half its floor"
+    if bends_all_along(best):
+        return "its bend is wider than the drive: a curve, and no limit"
+    if best.name == MainsHum.name and not is_steady(best):
+        return "its amplitude follows the drive from record to record"
+    return None
+
+
+def _left(after: Score, before: Score, null: float) -> float:
+    """Share of V beyond noise that is left; the worst record does not decide."""
+    first, second = typical(before, after)
+    return max(0.0, second - null) / max(first - null, 1e-12)

@@ -1,0 +1,113 @@
+"""`Step` and `Selection`: what the forward selection did, turn by turn, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model.model import Model
+from .candidates import Candidate
+from .cross_validation import Score
+from .refit import Fitted
+
+MANY = 8
+"""Records from which the worst one has no say in what an effect explains."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """An effect that was not added, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Step:
+    """One turn of the selection.
+
+    Parameters
+    ----------
+    before : Score
+        Of the model without the effect.
+    best : Candidate
+        The best refit.
+    accepted : bool
+        Whether it was added.
+    rivals : tuple of Candidate
+        Refits that records left out cannot tell from the best.
+    rejected : tuple of Rejection
+        All others.
+    renewed : Fitted or None
+        The model without the effect, better than before only by what the search found on its way.
+    """
+
+    before: Score
+    best: Candidate
+    accepted: bool
+    rivals: tuple[Candidate, ...]
+    rejected: tuple[Rejection, ...]
+    renewed: Fitted | None = None
+
+    @property
+    def confusable_with(self) -> tuple[str, ...]:
+        """Effects that would explain the same."""
+        names = dict.fromkeys(r.effect.public_name() for r in self.rivals)
+        return tuple(n for n in names if n != self.best.effect.public_name())
+
+    @property
+    def member_certain(self) -> bool:
+        """True where no other member of the same family is a rival."""
+        mine = self.best.effect
+        return all(r.effect.family != mine.family or r.effect.public_name() == mine.public_name() for r in self.rivals)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Selection:
+    """Outcome of the forward selection.
+
+    Parameters
+    ----------
+    baseline : Model
+        What the selection began with.
+    model : Model
+        With all accepted effects.
+    score : Score
+        Of `model`.
+    steps : tuple of Step
+        In order; the last may not be accepted.
+    null : float
+        V that a perfect model would have.
+    """
+
+    baseline: Model
+    model: Model
+    score: Score
+    steps: tuple[Step, ...]
+    null: float
+
+    @property
+    def accepted(self) -> tuple[Step, ...]:
+        """The turns that added an effect."""
+        return tuple(s for s in self.steps if s.accepted)
+
+    def explained(self, score: Score) -> float:
+        """Share X of the gap of the baseline that a score has closed, 0 to 1; the worst record does not decide."""
+        first = self.steps[0].before if self.steps else self.score
+        return explained(*typical(first, score), self.null)
+
+
+def typical(before: Score, after: Score) -> tuple[float, float]:
+    """V of two models without the record that the second describes worst, where there are many."""
+    kept = np.arange(after.ratios.size)
+    if kept.size >= MANY and before.ratios.size == kept.size:
+        kept = np.delete(kept, int(np.argmax(after.ratios)))
+    first, second = (float(np.mean(s.ratios[kept] ** 2)) for s in (before, after))
+    return first, second
+
+
+def explained(before: float, after: float, null: float) -> float:
+    """X = 1 − √((V_after − V_null)/(V_before − V_null)), between 0 and 1."""
+    gap = before - null
+    return float(1.0 - np.sqrt(np.clip((after - null) / gap, 0.0, 1.0))) if gap > 0 else 1.0

@@ -1,0 +1,120 @@
+"""`Evidence`: the records that fit and choose, and what they span."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects import MainsHum
+from ...effects.extent import ROOM, Extent
+from ...identification.fit.normal_equations import Nuisance
+from ...identification.records.excitation_content import content_of
+from ...model.model import Model
+from ...record import Record
+
+Array = NDArray[np.float64]
+
+LEVELS_APART = 0.05
+"""Share of the voltage range from which two levels at which records begin count as two."""
+MOVES = 30.0
+"""Power over noise from which the spectrum of the displacement counts as motion."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Evidence:
+    """Records that fit and choose, with their floors, and what is free in each of them.
+
+    Parameters
+    ----------
+    records : tuple of Record
+        In experiment order.
+    floors : (r,) ndarray
+        Floor of every record [m]; infinite where a record only carries the state of the stage.
+    nuisance : Nuisance
+        Free per record.
+    extent : Extent
+        What the records span.
+    alone : tuple of int
+        Records whose kind has no other, or that alone tell a number; they are never left out.
+    """
+
+    records: tuple[Record, ...]
+    floors: Array
+    nuisance: Nuisance
+    extent: Extent
+    alone: tuple[int, ...] = ()
+
+    @property
+    def begins_at_levels(self) -> bool:
+        """Whether the stage had settled at more than one level: what it does there beyond a constant can be told."""
+        levels = [r.settled_voltage for r in self.records if not r.continues]
+        return bool(levels) and max(levels) - min(levels) > LEVELS_APART * self.extent.span
+
+    def broadband(self) -> list[int]:
+        """Records whose drive determines linear dynamics."""
+        return [
+            i
+            for i, (r, f) in enumerate(zip(self.records, self.floors, strict=True))
+            if np.isfinite(f) and r.sample_period < 1.001 * self.extent.fastest_period and content_of(r).is_broadband
+        ]
+
+    def with_peaks(self, left: Sequence[Array]) -> Evidence:
+        """With the frequencies at which the residuals `left` of the records stand out."""
+        counted = [i for i, floor in enumerate(self.floors) if np.isfinite(floor)]
+        peaks = peaks_of([self.records[i] for i in counted], [left[i] for i in counted])
+        return replace(self, extent=replace(self.extent, peaks=peaks))
+
+    def with_hum(self, frequency: float) -> Evidence:
+        """With mains hum of its own amplitude and phase in every record."""
+        return replace(self, nuisance=replace(self.nuisance, hum_frequency=frequency))
+
+    def without(self, effect: str) -> Evidence:
+        """Where `effect` is no part of the model: hum, free in every record, is then not free either."""
+        return replace(self, nuisance=replace(self.nuisance, hum_frequency=None)) if effect == MainsHum.name else self
+
+
+def extent_of(records: Sequence[Record], model: Model) -> Extent:
+    """What the records span."""
+    known = [float(r.temperature.mean()) for r in records if r.temperature is not None]
+    return Extent(
+        voltage_min=min(float(r.voltage.min()) for r in records),
+        voltage_max=max(float(r.voltage.max()) for r in records),
+        max_slew=max(float(np.abs(np.diff(r.voltage)).max(initial=0.0)) / r.sample_period for r in records),
+        voltage_scale=model.voltage_scale,
+        displacement_scale=model.displacement_scale,
+        fastest_period=min(r.sample_period for r in records),
+        duration=max(r.start_time + r.duration for r in records) - min(r.start_time for r in records),
+        longest_record=max(r.duration for r in records),
+        temperature=round(float(np.mean(known)), 2) if known else ROOM,
+    )
+
+
+def peaks_of(records: Sequence[Record], left: Sequence[Array], most: int = 3) -> tuple[float, ...]:
+    """Frequencies at which the residual stands out of the displacement most [Hz]: seeds for a resonance.
+
+    Only where the stage moves well above the noise, which is read off the top of the band.
+    """
+    period = min(r.sample_period for r in records)
+    grid = np.geomspace(20.0, 0.45 / period, 200)
+    power, reach, lines = np.zeros(grid.size), np.zeros(grid.size), np.zeros(grid.size)
+    for record, e in zip(records, left, strict=True):
+        if record.sample_period > 1.001 * period or e.size < 256:
+            continue
+        window = np.hanning(e.size)
+        index = np.searchsorted(grid, np.fft.rfftfreq(e.size, record.sample_period))
+        inside = (index > 0) & (index < grid.size)
+        lines += np.bincount(index[inside], minlength=grid.size)
+        for total, signal in ((power, e), (reach, record.displacement)):
+            spectrum = np.abs(np.fft.rfft(window * (signal - signal.mean()))) ** 2 / e.size
+            total += np.bincount(index[inside], spectrum[inside], grid.size)
+    held = lines > 0
+    if held.sum() < 8:
+        return ()
+    frequency, power, reach = grid[held], power[held] / lines[held], reach[held] / lines[held]
+    noise = float(np.median(power[frequency > 0.3 / period]))
+    ratio = np.where(reach > MOVES * noise, np.maximum(power - noise, 0.0) / reach, 0.0)
+    tops = 1 + np.flatnonzero((ratio[1:-1] > ratio[:-2]) & (ratio[1:-1] >= ratio[2:]))
+    return tuple(float(frequency[k]) for k in tops[np.argsort(-ratio[tops])][:most])

@@ -1,0 +1,40 @@
+"""Bandwidth of the amplifier into the capacitance of the actuator."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from ...blocks.block import Block
+from ...blocks.low_pass import PoleBlock
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+FOUND_BY = (1e-5, 2e-5, 5e-5, 1.5e-4)
+"""Time constants at which a search begins [s]."""
+
+
+class AmplifierBandwidth(Effect):
+    """One pole before the hysteresis.
+
+    Parameters
+    ----------
+    tau : float
+        Time constant R·C of output resistance and actuator capacitance [s].
+    """
+
+    name = "amplifier_bandwidth"
+    family = "lag"
+    place = Place.DRIVE
+    equation = "τ ẏ + y = x"
+    signature = "lag growing with frequency at every amplitude; below one sample not separable from the other lags"
+    source = "R·C of amplifier and actuator, 15–60 µs"
+    parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-2, "time constant R·C", "R·C", 0.0, 2e-5),)
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Off, and of several sizes: what stands behind the pole is no linear system."""
+        return cls(), *(cls(tau=tau) for tau in FOUND_BY)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return PoleBlock("amplifier_bandwidth.tau", self["tau"], 1, setting.sample_period)

@@ -1,0 +1,87 @@
+"""End of the amplifier's output range."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from ...blocks.block import Array, Block, MemorylessBlock
+from ...errors import ParameterError
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+UNLIMITED = 1e9
+
+
+class AmplifierSaturation(Effect):
+    """Drive voltage that bends into its limits.
+
+    Parameters
+    ----------
+    lower, upper : float
+        Limits, as drive voltage before the amplifier [V]; ∓1e9 is no limit.
+    corner : float
+        Half width of the bend into each limit [V]; 0 clips hard.
+    """
+
+    name = "amplifier_saturation"
+    family = "amplifier"
+    place = Place.DRIVE
+    equation = "y = x − ramp(x − upper) + ramp(lower − x),  ramp(e) = (e + c)²/(4c) inside |e| < c, max(e, 0) outside"
+    signature = "one-sided flattening at the end of the range"
+    source = "output limits of high-voltage amplifiers"
+    parameters = (
+        Parameter("lower", "u_min", "V", -UNLIMITED, -UNLIMITED, 1e3, "lower limit", "data sheets", -UNLIMITED, 1.0),
+        Parameter("upper", "u_max", "V", UNLIMITED, -1e3, UNLIMITED, "upper limit", "data sheets", UNLIMITED, 1.0),
+        Parameter("corner", "c", "V", 0.1, 0.0, 1e2, "half width of the bend", "data sheets", scale=0.1),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        margins = [share * extent.span for share in (0.01, 0.03, 0.1)]
+        corner = 0.01 * extent.span
+        above = [cls(upper=extent.voltage_max - margin, corner=corner) for margin in margins]
+        return *above, *(cls(lower=extent.voltage_min + margin, corner=corner) for margin in margins)
+
+    def check(self) -> None:
+        if self["lower"] >= self["upper"]:
+            raise ParameterError(
+                f"amplifier_saturation: got lower = {self['lower']:g} V, upper = {self['upper']:g} V, "
+                "expected lower < upper"
+            )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return AmplifierSaturationBlock(self["lower"], self["upper"], self["corner"])
+
+
+class AmplifierSaturationBlock(MemorylessBlock):
+    """x − ramp(x − upper) + ramp(lower − x)."""
+
+    names = ("amplifier_saturation.lower", "amplifier_saturation.upper", "amplifier_saturation.corner")
+
+    def __init__(self, lower: float, upper: float, corner: float) -> None:
+        self.lower, self.upper, self.corner = lower, upper, corner
+
+    def _ramp(self, excess: Array) -> tuple[Array, Array, Array]:
+        """Ramp and its slopes by the excess and by the corner."""
+        c = self.corner
+        bent = np.abs(excess) < c
+        e = np.where(bent, excess, 0.0)
+        width = c if c > 0.0 else 1.0
+        ramp = np.where(bent, (e + c) ** 2 / (4.0 * width), np.maximum(excess, 0.0))
+        slope = np.where(bent, (e + c) / (2.0 * width), (excess > 0.0).astype(np.float64))
+        by_corner = np.where(bent, (c - e) * (c + e) / (4.0 * width**2), 0.0)
+        return ramp, slope, by_corner
+
+    def value(self, x: Array) -> Array:
+        return x - self._ramp(x - self.upper)[0] + self._ramp(self.lower - x)[0]
+
+    def slope(self, x: Array) -> Array:
+        return 1.0 - self._ramp(x - self.upper)[1] - self._ramp(self.lower - x)[1]
+
+    def by_parameter(self, x: Array) -> Array:
+        _, above, above_corner = self._ramp(x - self.upper)
+        _, below, below_corner = self._ramp(self.lower - x)
+        return np.vstack((below, above, below_corner - above_corner))

@@ -1,0 +1,97 @@
+"""Largest current of the amplifier into the capacitance of the actuator."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from ...blocks.block import Array, Block, State
+from ...blocks.held import HeldBlock
+from ...blocks.kernel import kernel
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+UNLIMITED = 1e9
+
+
+class AmplifierSlewLimit(Effect):
+    """Drive voltage that cannot change faster than the amplifier can charge the actuator.
+
+    Parameters
+    ----------
+    S : float
+        Largest slope I_max/(C·gain), as drive voltage before the amplifier [V/s]; 1e9 is no limit.
+    """
+
+    name = "amplifier_slew_limit"
+    family = "amplifier"
+    place = Place.DRIVE
+    equation = "|dy/dt| ≤ S = I_max/C"
+    signature = "triangles instead of fast large signals"
+    source = "0.5 A into 20 µF: 25 V/ms behind the amplifier"
+    parameters = (
+        Parameter("S", "S", "V/s", UNLIMITED, 1e-2, UNLIMITED, "largest slope of the drive", "I_max/C", UNLIMITED, 1e3),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        slopes = extent.max_slew / 2.0 ** np.arange(1.0, 12.0, 0.5)  # a noise has a valley for every half octave
+        return tuple(cls(S=float(slope)) for slope in slopes if slope > extent.span)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return AmplifierSlewLimitBlock(self["S"], setting.sample_period)
+
+
+@kernel
+def run_limit(x, reach, state, y):
+    """Steps of at most `reach` per sample to y (n,); state [y] is updated."""
+    held = state[0]
+    for i in range(x.size):
+        if x[i] > held + reach:
+            held += reach
+        elif x[i] < held - reach:
+            held -= reach
+        else:
+            held = x[i]
+        y[i] = held
+    state[0] = held
+
+
+@kernel
+def linearise_limit(x, dx, reach, period, state, tangent, y, dy):
+    """`run_limit` with rows dx (m, n) to dy (m + 1, n), the last by S; tangent (m + 1,) is updated."""
+    m, held = dx.shape[0], state[0]
+    for i in range(x.size):
+        if x[i] > held + reach:
+            held += reach
+            tangent[m] += period
+        elif x[i] < held - reach:
+            held -= reach
+            tangent[m] -= period
+        else:
+            held = x[i]
+            for j in range(m):
+                tangent[j] = dx[j, i]
+            tangent[m] = 0.0
+        y[i] = held
+        for j in range(m + 1):
+            dy[j, i] = tangent[j]
+    state[0] = held
+
+
+class AmplifierSlewLimitBlock(HeldBlock):
+    """y_i = max(y_(i−1) − S T, min(y_(i−1) + S T, x_i))."""
+
+    names = ("amplifier_slew_limit.S",)
+
+    def __init__(self, slope: float, sample_period: float) -> None:
+        self.reach = slope * sample_period if slope < UNLIMITED else np.inf
+        self.sample_period = sample_period
+
+    def follow(self, x: Array, state: State, y: Array) -> None:
+        run_limit(x, self.reach, state, y)
+
+    def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
+        linearise_limit(x, dx, self.reach, self.sample_period, state, tangent, y, dy)

@@ -1,0 +1,90 @@
+"""Mechanical play before the hysteresis."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from ...blocks.block import Array, Block, State
+from ...blocks.held import HeldBlock
+from ...blocks.kernel import kernel
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+FOUND_BY = (0.001, 0.002, 0.005, 0.01)
+"""Half widths at which a search begins, in ranges of the drive."""
+
+
+class Backlash(Effect):
+    """Play between drive and actuator, centred at rest.
+
+    Parameters
+    ----------
+    b : float
+        Half width of the play [V].
+    """
+
+    name = "backlash"
+    family = "hysteresis"
+    place = Place.DRIVE
+    equation = "y_i = max(x_i − b, min(x_i + b, y_(i−1)))"
+    signature = "a small-signal gain that drops below b; ARX fits at two noise amplitudes disagree"
+    source = "play operator; 0.1–1 % of range"
+    parameters = (Parameter("b", "b", "V", 0.0, 0.0, 1e3, "half width of the play", "play operator", 0.0, 0.02),)
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Off, and of several widths: a play wider than the steps of a noise does not act as its slope at 0 tells."""
+        return cls(), *(cls(b=share * extent.span) for share in FOUND_BY)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return BacklashBlock(self["b"])
+
+
+@kernel
+def run_play(x, b, state, y):
+    """Play of half width b to y (n,); state [y] is updated."""
+    held = state[0]
+    for i in range(x.size):
+        held = max(x[i] - b, min(x[i] + b, held))
+        y[i] = held
+    state[0] = held
+
+
+@kernel
+def linearise_play(x, dx, b, state, tangent, y, dy):
+    """`run_play` with rows dx (m, n) to dy (m + 1, n), the last by b; tangent (m + 1,) is updated.
+
+    Where an edge just touches, a row counts only if it pushes: the slope for a growing parameter.
+    """
+    m, held = dx.shape[0], state[0]
+    for i in range(x.size):
+        low, high = x[i] - b, x[i] + b
+        if held <= low:
+            for j in range(m + 1):
+                edge = dx[j, i] if j < m else -1.0
+                tangent[j] = edge if held < low else max(tangent[j], edge)
+        if held >= high:
+            for j in range(m + 1):
+                edge = dx[j, i] if j < m else 1.0
+                tangent[j] = edge if held > high else min(tangent[j], edge)
+        held = max(low, min(high, held))
+        y[i] = held
+        for j in range(m + 1):
+            dy[j, i] = tangent[j]
+    state[0] = held
+
+
+class BacklashBlock(HeldBlock):
+    """The play, centred at rest."""
+
+    names = ("backlash.b",)
+
+    def __init__(self, b: float) -> None:
+        self.b = b
+
+    def follow(self, x: Array, state: State, y: Array) -> None:
+        run_play(x, self.b, state, y)
+
+    def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
+        linearise_play(x, dx, self.b, state, tangent, y, dy)

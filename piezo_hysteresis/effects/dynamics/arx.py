@@ -1,0 +1,121 @@
+"""Linear dynamics of the stage: ARX with delay."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.arx import ArxBlock, dc_gain_slopes
+from ...blocks.block import Array, Block
+from ...blocks.group_delay import LagBlock
+from ...blocks.softened_arx import SlowSoftenedBlock, SoftenedBlock, StaticSoftening
+from ...errors import ModelError, ParameterError
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from .softening import Softening
+
+LONGEST_DELAY = 1e6
+"""Longest dead time, and longest group delay near dc [samples]."""
+
+
+class Arx(Effect):
+    """G(z) = B(z)/A(z)·z^(−d) from w to the position, Eq. (4) and (5).
+
+    Parameters
+    ----------
+    a : sequence of float
+        a1 … a_na of A(z) = 1 + a1 z⁻¹ + …, any length (also none); all poles inside the unit circle.
+    b : sequence of float
+        b1 … b_nb of B(z) = b1 + b2 z⁻¹ + …, at least one.
+    delay : float
+        d in samples, 1 or more; a fractional part is realised by third-order Lagrange interpolation.
+
+    Raises
+    ------
+    ParameterError
+        If a pole lies on or outside the unit circle, or `b` is empty.
+
+    Notes
+    -----
+    Single coefficients of a high-order ARX are not identifiable (poles and zeros nearly cancel): compare G(f).
+    In records slower than the model, G acts as its dc gain and its group delay at dc.
+
+    Examples
+    --------
+    >>> round(Arx(a=[-0.9], b=[0.1]).dc_gain, 12)
+    1.0
+    """
+
+    name = "arx"
+    family = "dynamics"
+    place = Place.DYNAMICS
+    equation = "G(z) = z^(−d) (b1 + b2 z⁻¹ + …)/(1 + a1 z⁻¹ + …)"
+    signature = "linear resonances and lag, the same at every amplitude"
+    source = "paper, Eq. (4), (5)"
+    parameters = (
+        Parameter("a", "a_i", "1", (), -1e3, 1e3, "denominator coefficients", "paper, Eq. (5)"),
+        Parameter("b", "b_i", "1", (1.0,), -1e6, 1e6, "numerator coefficients", "paper, Eq. (5)"),
+        Parameter("delay", "d", "samples", 1.0, 1.0, LONGEST_DELAY, "dead time of the stage", "paper, Eq. (4)"),
+    )
+
+    def check(self) -> None:
+        if self.array("b").size == 0:
+            raise ParameterError("arx.b: got no coefficient, expected at least one")
+        radius = self.pole_radius
+        if radius >= 1.0:
+            raise ParameterError(f"arx.a: unstable, got a pole of radius {radius:.6g}, expected all below 1")
+
+    @property
+    def pole_radius(self) -> float:
+        """Largest pole radius."""
+        a = self.array("a")
+        return float(np.abs(np.roots(np.concatenate(([1.0], a)))).max()) if a.size else 0.0
+
+    @property
+    def dc_gain(self) -> float:
+        """G(1)."""
+        return float(self.array("b").sum() / (1.0 + self.array("a").sum()))
+
+    @property
+    def group_delay(self) -> float:
+        """Group delay near dc in samples, delay included."""
+        a, b = self.array("a"), self.array("b")
+        lag_b = np.arange(b.size) @ b / b.sum() if b.sum() else 0.0
+        return float(self["delay"] + lag_b - np.arange(1, a.size + 1) @ a / (1.0 + a.sum()))
+
+    def response(self, frequency: Array, sample_period: float) -> NDArray[np.complex128]:
+        """G at `frequency` [Hz], shape (k,), complex."""
+        z = np.exp(-2j * np.pi * np.asarray(frequency) * sample_period)
+        numerator = np.polyval(self.array("b")[::-1], z)
+        denominator = np.polyval(np.concatenate(([1.0], self.array("a")))[::-1], z)
+        return np.asarray(numerator / denominator * z ** self["delay"])
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        names = tuple(f"{self.name}.{n}" for n in self.free_names())
+        softening = [t for t in terms if isinstance(t, Softening)]
+        if len(softening) > 1:
+            raise ModelError(f"arx: got {len(softening)} forms of softening, expected one")
+        slow = self._lag(names, setting) if setting.is_slow else None
+        if slow is not None and not softening:
+            return slow
+        fast = ArxBlock(names, self.array("a"), self.array("b"), self["delay"])
+        if not softening:
+            return fast
+        (term,) = softening
+        settled, path = StaticSoftening(term.name, term["k2"], term["k3"]), term.path(fast, self["delay"])
+        return SoftenedBlock(fast, settled, path) if slow is None else SlowSoftenedBlock(slow, fast, settled, path)
+
+    def _lag(self, names: tuple[str, ...], setting: Setting) -> LagBlock:
+        """G in records slower than the model."""
+        a, b, ratio = self.array("a"), self.array("b"), setting.model_period / setting.sample_period
+        at_a, at_b = 1.0 + a.sum(), b.sum()
+        power = np.arange(1, a.size + 1)
+        lag_a, lag_b = power @ a / at_a, np.arange(b.size) @ b / at_b
+        lag_slopes = ratio * np.concatenate((-(power - lag_a) / at_a, (np.arange(b.size) - lag_b) / at_b, [1.0]))
+        if not self.group_delay <= LONGEST_DELAY:
+            raise ParameterError(
+                f"arx: got a group delay of {self.group_delay:.3g} samples near dc, expected at most "
+                f"{LONGEST_DELAY:g}; B(1) or A(1) all but vanishes"
+            )
+        lag = max(0.0, ratio * self.group_delay)
+        return LagBlock(names, self.dc_gain, lag, dc_gain_slopes(a, b), lag_slopes)

@@ -1,0 +1,46 @@
+"""Dead time beyond the whole samples of the ARX: a fractional delay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...blocks.arx import lagrange
+from ...blocks.block import Block
+from ...blocks.fir import TapsBlock
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+
+
+class ExtraDelay(Effect):
+    """Delay by any time, between hysteresis and dynamics.
+
+    Parameters
+    ----------
+    tau : float
+        Dead time [s].
+
+    Notes
+    -----
+    A delay commutes with everything that does not depend on absolute time. It stands behind the hysteresis because the
+    loop must see the levels that the converter really holds, not levels interpolated between them. Third-order Lagrange
+    interpolation at the model's sample period, linear interpolation in slower records.
+    """
+
+    name = "extra_delay"
+    family = "lag"
+    place = Place.DYNAMICS
+    equation = "y(t) = x(t − τ)"
+    signature = "phase linear in frequency at every amplitude; below one sample not separable from the other lags"
+    source = "Lagrange interpolation; conversion and transport times"
+    parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-2, "dead time", "converters", 0.0, 2e-5),)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        samples = self["tau"] / setting.sample_period
+        if setting.is_slow:
+            first = int(samples)
+            part = samples - first
+            taps, slopes = np.array([1.0 - part, part]), np.array([-1.0, 1.0])
+        else:
+            first = max(0, int(samples) - 1)
+            taps, slopes = lagrange(samples - first - 1.0)
+        return TapsBlock(("extra_delay.tau",), first, taps, slopes[None, :] / setting.sample_period)

@@ -1,0 +1,153 @@
+"""A second mode of the structure beside the identified dynamics."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+from scipy.linalg import expm, expm_frechet
+
+from ...blocks.block import Array, Block, State
+from ...blocks.fir import TapsBlock
+from ...blocks.kernel import kernel
+from ...blocks.linear import AddedBlock
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+RESOLVED = 0.25
+"""Cycles per sample up to which the mode is simulated; faster ones act as their lag."""
+
+
+class ExtraResonance(Effect):
+    """Mode that takes part with a share r.
+
+    Parameters
+    ----------
+    r : float
+        Share of the mode in the static response [1].
+    f0 : float
+        Natural frequency [Hz].
+    zeta : float
+        Damping ratio [1].
+
+    Notes
+    -----
+    Exact for an input that is linear between samples. Seed f0 from the peak of |E(f)|/|Y(f)|.
+    """
+
+    name = "extra_resonance"
+    family = "dynamics"
+    place = Place.DYNAMICS
+    equation = "y = x + r (q − x),  q̈/ω0² + 2 ζ q̇/ω0 + q = x,  ω0 = 2π f0"
+    signature = "ringing at one frequency after steps, a peak in error over response"
+    source = "modes of the structure, ζ 0.005–0.03"
+    parameters = (
+        Parameter("r", "r", "1", 0.0, -2.0, 2.0, "share of the mode", "modal superposition", 0.0, 0.02),
+        Parameter("f0", "f0", "Hz", 500.0, 1.0, 1e5, "natural frequency", "modal superposition", scale=10.0),
+        Parameter("zeta", "ζ", "1", 0.01, 1e-4, 1.0, "damping ratio", "0.005–0.03 in structures", scale=0.005),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return tuple(cls(f0=peak, zeta=0.02) for peak in extent.peaks)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        if self["f0"] * setting.sample_period <= RESOLVED:
+            return ModeBlock(self["r"], self["f0"], self["zeta"], setting.sample_period)
+        unit = 1.0 / (np.pi * self["f0"] * setting.sample_period)
+        lag = self["r"] * self["zeta"] * unit
+        by = (self["zeta"] * unit, -lag / self["f0"], self["r"] * unit)
+        names = tuple(f"{self.name}.{p.name}" for p in self.parameters)
+        return TapsBlock(names, 0, np.array([1.0 - lag, lag]), np.outer(by, [-1.0, 1.0]))
+
+
+def oscillator(f0: float, zeta: float, sample_period: float) -> tuple[Array, Array]:
+    """Step of position and velocity/ω0 under an input that goes linearly from u to u + du.
+
+    Returns
+    -------
+    step : (2, 4) ndarray
+        Matrix on (position, velocity/ω0, u, du).
+    slopes : (2, 2, 4) ndarray
+        Its derivatives by f0 and by ζ.
+    """
+    angle = 2.0 * np.pi * f0 * sample_period
+    rate = np.zeros((4, 4))
+    rate[0, 1], rate[1, :3] = angle, [-angle, -2.0 * zeta * angle, angle]
+    by_zeta = np.zeros((4, 4))
+    by_zeta[1, 1] = -2.0 * angle
+    by_f0 = rate / f0
+    rate[2, 3] = 1.0
+    slopes = [expm_frechet(rate, direction, compute_expm=False)[:2] for direction in (by_f0, by_zeta)]
+    return np.ascontiguousarray(expm(rate)[:2]), np.ascontiguousarray(slopes)
+
+
+@kernel
+def run_mode(u, step, z, q):
+    """Rows of u (r, n) to positions q (r, n); z (r, 3) = last input, position, velocity/ω0, updated."""
+    p0, p1, p2, p3 = step[0, 0], step[0, 1], step[0, 2], step[0, 3]
+    v0, v1, v2, v3 = step[1, 0], step[1, 1], step[1, 2], step[1, 3]
+    for r in range(u.shape[0]):
+        last, position, velocity = z[r, 0], z[r, 1], z[r, 2]
+        for i in range(u.shape[1]):
+            x = u[r, i]
+            pushed, turned = p2 * last + p3 * (x - last), v2 * last + v3 * (x - last)
+            moved = p0 * position + p1 * velocity + pushed
+            velocity = v0 * position + v1 * velocity + turned
+            position, last = moved, x
+            q[r, i] = position
+        z[r, 0], z[r, 1], z[r, 2] = last, position, velocity
+
+
+@kernel
+def mode_slopes(u, step, slopes, z, dz, dq):
+    """∂q/∂(f0, ζ) to dq (2, n) for u (n,); z (3,) as in `run_mode` and dz (2, 2) are updated."""
+    for i in range(u.size):
+        du = u[i] - z[0]
+        for k in range(2):
+            s = slopes[k]
+            forced = s[0, 0] * z[1] + s[0, 1] * z[2] + s[0, 2] * z[0] + s[0, 3] * du
+            pushed = s[1, 0] * z[1] + s[1, 1] * z[2] + s[1, 2] * z[0] + s[1, 3] * du
+            moved = step[0, 0] * dz[k, 0] + step[0, 1] * dz[k, 1] + forced
+            dz[k, 1] = step[1, 0] * dz[k, 0] + step[1, 1] * dz[k, 1] + pushed
+            dz[k, 0] = moved
+            dq[k, i] = moved
+        moved = step[0, 0] * z[1] + step[0, 1] * z[2] + (step[0, 2] * z[0] + step[0, 3] * du)
+        z[2] = step[1, 0] * z[1] + step[1, 1] * z[2] + (step[1, 2] * z[0] + step[1, 3] * du)
+        z[1], z[0] = moved, u[i]
+
+
+class ModeBlock(AddedBlock):
+    """x + r (q − x); state: last input, position, velocity/ω0."""
+
+    names = ("extra_resonance.r", "extra_resonance.f0", "extra_resonance.zeta")
+
+    def __init__(self, r: float, f0: float, zeta: float, sample_period: float) -> None:
+        self.r = r
+        self.step, self.slopes = oscillator(f0, zeta, sample_period)
+
+    @property
+    def is_idle(self) -> bool:
+        return self.r == 0.0
+
+    def zeros(self, rows: int) -> Array:
+        return np.zeros((rows, 3))
+
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        z = z.copy()
+        run_mode(x, self.step, z, y)
+        y -= x
+        y *= self.r
+        return z
+
+    def own_rest(self) -> State:
+        return np.zeros((2, 2))
+
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
+        own = own.copy()
+        run_mode(x[None, :], self.step, z[None, :].copy(), rows[:1])
+        rows[0] -= x
+        mode_slopes(x, self.step, self.slopes, z.copy(), own, rows[1:])
+        rows[1:] *= self.r
+        return own

@@ -1,0 +1,50 @@
+"""Stiffness that changes with deflection: a term of the dominant mode of the ARX."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from ...blocks.mode_path import Path, WholePath
+from ...parameter import Parameter
+from ..effect import Place, Term
+from ..extent import Extent
+
+FOUND_BY = (0.01, 0.03, 0.1)
+"""Sizes of k3 at which a search begins: a sharp resonance that moves by its width is far from linear in it."""
+
+
+class Softening(Term):
+    """Restoring force of the dominant mode that is not proportional to its deflection.
+
+    Parameters
+    ----------
+    k2 : float
+        Relative change of stiffness with |x| [1]; negative softens.
+    k3 : float
+        Relative change of stiffness with x² [1].
+
+    Notes
+    -----
+    x is the coordinate of the dominant complex pole pair of G, in units of the static hysteresis output w. That mode
+    drives the rest of G; the delay of G stays outside the loop of the mode.
+    """
+
+    name = "softening"
+    family = "dynamics"
+    place = Place.DYNAMICS
+    host = "arx"
+    twin = "sensor_nonlinearity"
+    path: ClassVar[type[Path]] = WholePath
+    """What the mode passes on its way to the sensor."""
+    equation = "m ẍ + c ẋ + k x (1 + k2 |x| + k3 x²) = k w"
+    signature = "a resonance that moves with amplitude: large chirps across it; statically a sensor cubic"
+    source = "Duffing oscillator on the modal coordinate"
+    parameters = (
+        Parameter("k2", "k2", "1", 0.0, -0.5, 0.5, "change of stiffness with |x|", "Duffing", 0.0, 0.02),
+        Parameter("k3", "k3", "1", 0.0, -1.0, 1.0, "change of stiffness with x²", "Duffing", 0.0, 0.02),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Switched off, and of several sizes of either sign."""
+        return (cls(), *(cls(k3=sign * size) for size in FOUND_BY for sign in (-1.0, 1.0)))

@@ -1,0 +1,30 @@
+"""Stiffness that changes with deflection, of one mode in a sum of modes."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ...blocks.mode_path import OwnPath, Path
+from .softening import Softening
+
+
+class SofteningOfOneMode(Softening):
+    """Restoring force of the dominant mode that is not proportional to its deflection, beside modes that are linear.
+
+    Parameters
+    ----------
+    k2 : float
+        Relative change of stiffness with |x| [1]; negative softens.
+    k3 : float
+        Relative change of stiffness with x² [1].
+
+    Notes
+    -----
+    As `Softening`, but the displacement is a sum of modes: the others do not feel what the dominant one does.
+    """
+
+    name = "softening_of_one_mode"
+    entry = "softening"
+    signature = "as softening, on a stage of several modes"
+    source = "Duffing oscillator as one term of a modal expansion"
+    path: ClassVar[type[Path]] = OwnPath

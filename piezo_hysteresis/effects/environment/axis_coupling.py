@@ -1,0 +1,57 @@
+"""Motion of the other axis seen by this one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...blocks.block import Array, Block
+from ...blocks.channel import ChannelBlock
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+
+
+class AxisCoupling(Effect):
+    """Part of the other axis' displacement that this axis reads too.
+
+    Parameters
+    ----------
+    kappa0 : float
+        Coupling at the origin of the other axis [1].
+    kappa1 : float
+        Its change with the other axis' position [1/m].
+
+    Notes
+    -----
+    Needs the channel ``other_displacement`` q [m]; records without it get nothing added.
+    """
+
+    name = "axis_coupling"
+    family = "disturbance"
+    place = Place.ENVIRONMENT
+    channel = "other_displacement"
+    equation = "y = x + (κ0 + κ1 q) q"
+    signature = "coherent with the displacement of the other axis, whatever this axis is driven with"
+    source = "cross-coupling of XY stages; 0.5–1.2 % of the other axis' motion"
+    parameters = (
+        Parameter("kappa0", "κ0", "1", 0.0, -0.5, 0.5, "coupling at the origin", "XY stages", 0.0, 0.01),
+        Parameter("kappa1", "κ1", "1/m", 0.0, -1e5, 1e5, "change of coupling with position", "XY stages", 0.0, 100.0),
+    )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return AxisCouplingBlock(self["kappa0"], self["kappa1"])
+
+
+class AxisCouplingBlock(ChannelBlock):
+    """x + (κ0 + κ1 q) q."""
+
+    names = ("axis_coupling.kappa0", "axis_coupling.kappa1")
+    channel = "other_displacement"
+
+    def __init__(self, kappa0: float, kappa1: float) -> None:
+        self.kappa0, self.kappa1 = kappa0, kappa1
+
+    def addition(self, c: Array) -> Array:
+        return (self.kappa0 + self.kappa1 * c) * c
+
+    def by_parameter(self, c: Array) -> Array:
+        return np.vstack((c, c * c))

@@ -1,0 +1,113 @@
+"""Pick-up of the mains: a line at 50 or 60 Hz and its harmonics."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from ...blocks.block import Array, Block, State
+from ...blocks.time import TimeBlock
+from ...errors import ParameterError
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+
+class MainsHum(Effect):
+    """Sines at the mains frequency and its harmonics, with their own amplitude and phase in every record.
+
+    Parameters
+    ----------
+    f : float
+        Mains frequency [Hz].
+    cosine, sine : sequence of float
+        Amplitudes at f, 2f, 3f, … [m]; equally many.
+
+    Notes
+    -----
+    t counts from the start of the record, or of the first of those that continue one another, so that amplitude, phase
+    and frequency of short records can be told apart. In block-averaged records they are those after averaging.
+    """
+
+    name = "mains_hum"
+    family = "disturbance"
+    place = Place.ENVIRONMENT
+    equation = "y = x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)]"
+    signature = "a line that is unrelated to the drive and present at rest"
+    source = "pick-up of the mains, 50 or 60 Hz and harmonics"
+    parameters = (
+        Parameter("f", "f", "Hz", 50.0, 10.0, 100.0, "mains frequency", "mains", scale=0.01),
+        Parameter(
+            "cosine",
+            "c_k",
+            "m",
+            (0.0, 0.0, 0.0),
+            -1e-5,
+            1e-5,
+            "cosine amplitudes",
+            "Fourier",
+            0.0,
+            1e-9,
+            per_record=True,
+        ),
+        Parameter(
+            "sine", "s_k", "m", (0.0, 0.0, 0.0), -1e-5, 1e-5, "sine amplitudes", "Fourier", 0.0, 1e-9, per_record=True
+        ),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return cls(f=50.0), cls(f=60.0)
+
+    def check(self) -> None:
+        if self.array("cosine").size != self.array("sine").size:
+            raise ParameterError(
+                f"mains_hum: got {self.array('cosine').size} cosine and {self.array('sine').size} sine amplitudes, "
+                "expected equally many"
+            )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        names = tuple(f"mains_hum.{n}" for n in self.free_names())
+        return MainsHumBlock(names, self["f"], self.array("cosine"), self.array("sine"), setting.sample_period)
+
+
+def harmonics(frequency: float, count: int, t: Array) -> tuple[Array, Array]:
+    """Cosines and sines of harmonics of `frequency` [Hz] at times (n,) [s], both (count, n): addition theorem."""
+    cosines, sines = np.empty((count, t.size)), np.empty((count, t.size))
+    angle = 2.0 * np.pi * frequency * t
+    c, s = np.cos(angle), np.sin(angle)
+    for k in range(count):
+        cosines[k], sines[k] = c, s
+        c, s = c * cosines[0] - s * sines[0], s * cosines[0] + c * sines[0]
+    return cosines, sines
+
+
+class MainsHumBlock(TimeBlock):
+    """x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)], t from the start of the record."""
+
+    def __init__(
+        self, names: tuple[str, ...], frequency: float, cosine: Array, sine: Array, sample_period: float
+    ) -> None:
+        super().__init__(sample_period)
+        self.names, self.cosine, self.sine = names, cosine, sine
+        self.frequency = frequency
+
+    def rest(self, x0: float, time: float) -> State:
+        return 0.0, 0
+
+    def value(self, x: Array, t: Array) -> Array:
+        if not (self.cosine.any() or self.sine.any()):
+            return x
+        for c, s, cosine, sine in zip(
+            self.cosine, self.sine, *harmonics(self.frequency, self.cosine.size, t), strict=True
+        ):
+            x = x + (c * cosine + s * sine)
+        return x
+
+    def by_parameter(self, x: Array, t: Array) -> Array:
+        cosines, sines = harmonics(self.frequency, self.cosine.size, t)
+        by_frequency = np.zeros(t.size)
+        for k, (c, s) in enumerate(zip(self.cosine, self.sine, strict=True)):
+            by_frequency += 2.0 * np.pi * (k + 1) * t * (s * cosines[k] - c * sines[k])
+        return np.vstack((by_frequency, cosines, sines))

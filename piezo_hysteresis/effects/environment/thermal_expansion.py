@@ -1,0 +1,68 @@
+"""Thermal expansion of the stage, where its temperature was recorded."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from ...blocks.block import Array, Block
+from ...blocks.channel import ChannelBlock
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+
+class ThermalExpansion(Effect):
+    """Displacement proportional to the recorded temperature.
+
+    Parameters
+    ----------
+    kappa : float
+        Expansion between sensor and stage [m/K].
+    T0 : float
+        Temperature at which it counts as zero [K].
+
+    Notes
+    -----
+    Needs the channel ``temperature``; records without it get nothing added.
+    """
+
+    name = "thermal_expansion"
+    entry = "thermal_drift"
+    family = "drift"
+    place = Place.ENVIRONMENT
+    channel = "temperature"
+    equation = "y = x + κ (T − T0)"
+    signature = "follows the temperature, whatever the drive does"
+    source = "linear expansion; 0.1–1 µm/K"
+    parameters = (
+        Parameter("kappa", "κ", "m/K", 0.0, -1e-4, 1e-4, "expansion between sensor and stage", "expansion", 0.0, 1e-7),
+        Parameter(
+            "T0", "T0", "K", 293.15, 0.0, 1e3, "reference temperature", "convention, 20 °C", scale=10.0, fixed=True
+        ),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Switched off, about the mean temperature: far from it the expansion would be one with the sensor zero."""
+        return (cls(T0=extent.temperature),)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return ThermalExpansionBlock(self["kappa"], self["T0"])
+
+
+class ThermalExpansionBlock(ChannelBlock):
+    """x + κ (T − T0)."""
+
+    names = ("thermal_expansion.kappa",)
+    channel = "temperature"
+
+    def __init__(self, kappa: float, reference: float) -> None:
+        self.kappa, self.reference = kappa, reference
+
+    def addition(self, c: Array) -> Array:
+        return self.kappa * (c - self.reference)
+
+    def by_parameter(self, c: Array) -> Array:
+        return np.array([c - self.reference])

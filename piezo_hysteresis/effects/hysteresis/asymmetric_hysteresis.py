@@ -1,0 +1,38 @@
+"""Branches of different curvature: a term of the Bouc-Wen loop."""
+
+from __future__ import annotations
+
+from ...parameter import Parameter
+from ..effect import Place, Term
+
+
+class AsymmetricHysteresis(Term):
+    """Loss of the hysteresis state that differs between rising and falling drive, and with the sign of the state.
+
+    Parameters
+    ----------
+    phi1 : float
+        Part that changes sign with the direction of the drive [1].
+    phi2 : float
+        Part that changes sign with the state [1].
+
+    Notes
+    -----
+    The state stays bounded where β − |γ| > |φ1| + |φ2|.
+    """
+
+    name = "asymmetric_hysteresis"
+    family = "hysteresis"
+    place = Place.HYSTERESIS
+    host = "bouc_wen"
+    equation = "dh = (dh of bouc_wen) + φ1 dv·h + φ2 |dv|·|h|"
+    signature = "different curvature of the rising and the falling branch, at several turning levels"
+    source = "Zhu & Rui 2014, asymmetric Bouc-Wen"
+    parameters = (
+        Parameter(
+            "phi1", "φ1", "1", 0.0, -5.0, 5.0, "loss that changes sign with direction", "Zhu & Rui 2014", 0.0, 0.5
+        ),
+        Parameter(
+            "phi2", "φ2", "1", 0.0, -5.0, 5.0, "loss that changes sign with the state", "Zhu & Rui 2014", 0.0, 0.5
+        ),
+    )

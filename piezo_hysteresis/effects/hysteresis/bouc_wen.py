@@ -1,0 +1,129 @@
+"""The modified Bouc-Wen operator: hysteresis of the published model, stepped exactly, and its asymmetric cubic."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...blocks.block import Array, Block, State
+from ...blocks.bouc_wen_kernel import LOOP, run_general, run_plain
+from ...blocks.bouc_wen_sensitivities import START, linearise_general, linearise_plain
+from ...errors import ParameterError
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+
+LOOP_OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5])
+
+MODIFIED_BOUC_WEN = (
+    Parameter("A", "A", "1", -0.7691, -1e3, 1e3, "slope of the hysteresis state at a turning point", "paper, Eq. (2)"),
+    Parameter("beta", "β", "1", 4.6075, 0.0, 1e4, "loss rate of the hysteresis state", "paper, Eq. (2)", scale=5.0),
+    Parameter("gamma", "γ", "1", -0.8725, -1e4, 1e4, "asymmetry of the loss rate; |γ| ≤ β", "paper, Eq. (2)"),
+    Parameter("p1", "p1", "1", -0.1085, -1e3, 1e3, "cubic term; 0 gives CBW", "paper, Eq. (3)", scale=0.1),
+    Parameter("p2", "p2", "1", 2.1925, -1e3, 1e3, "proportional term of the output", "paper, Eq. (3)", scale=2.0),
+)
+
+
+def check_bounded(effect: Effect) -> None:
+    """Refuse β < |γ|, for which the state is unbounded (Ismail et al. 2009)."""
+    if abs(effect["gamma"]) > effect["beta"] * (1 + 1e-12):
+        raise ParameterError(
+            f"{effect.name}: got beta = {effect['beta']:g}, gamma = {effect['gamma']:g}, expected beta >= |gamma|"
+        )
+
+
+class BoucWen(Effect):
+    """Modified Bouc-Wen operator with the exact step for n = 1.
+
+    Parameters
+    ----------
+    A, beta, gamma : float
+        Loop of Eq. (2), dimensionless; beta >= |gamma|.
+    p1, p2 : float
+        Polynomial of Eq. (3), dimensionless.
+
+    Notes
+    -----
+    The drive is taken as linear between samples, so the result does not depend on the sample rate, unlike Eq. (7).
+    Asymmetry, exponent, rate dependence and initial state join this loop as terms.
+
+    Examples
+    --------
+    The loop opens: at the same voltage, up and down differ.
+
+    >>> import numpy as np
+    >>> block = BoucWen().block(Setting(1e-3, 1e-3))
+    >>> w, state = block.run(np.array([0.1, 0.2, 0.3, 0.2, 0.1]), block.rest(0.0, 0.0))
+    >>> bool(w[4] > w[0])
+    True
+    """
+
+    name = "bouc_wen"
+    family = "hysteresis"
+    place = Place.HYSTERESIS
+    equation = "w = p1 v³ + p2 v + h;  dh = A dv − β|dv|h − γ dv|h|"
+    signature = "rate-independent loops with one memory state, saturating at |A|/(β + γ sgn A)"
+    source = "paper, Eq. (2), (3), (6); exact step for n = 1"
+    parameters = MODIFIED_BOUC_WEN
+
+    def check(self) -> None:
+        check_bounded(self)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return BoucWenBlock(self, setting, terms)
+
+
+class BoucWenBlock(Block):
+    """The loop with its terms; state [h, v_last]."""
+
+    keeps_state = True
+
+    def __init__(self, effect: Effect, setting: Setting, terms: tuple[Effect, ...] = ()) -> None:
+        self.sample_period, self.jump_period = setting.sample_period, setting.model_period
+        self.p1, self.p2 = effect["p1"], effect["p2"]
+        self.loop = LOOP_OFF.copy()
+        self.start = 0.0
+        owners = dict.fromkeys(("A", "beta", "gamma"), effect.name)
+        for term in terms:
+            owners |= {name: term.name for name in term.values if name in LOOP or name == "h0"}
+        for member in (effect, *terms):
+            for name in member.values:
+                if name in LOOP:
+                    self.loop[LOOP.index(name)] = member[name]
+                elif name == "h0":
+                    self.start = member[name]
+                elif name == "jumps" and not member[name]:
+                    self.jump_period = setting.sample_period
+        self.own = np.array([LOOP.index(n) if n in LOOP else START for n in owners], dtype=np.int64)
+        self.names = (*(f"{owner}.{n}" for n, owner in owners.items()), f"{effect.name}.p1", f"{effect.name}.p2")
+        self.is_plain = bool(np.array_equal(self.loop[3:7], LOOP_OFF[3:7]))
+
+    def static(self, x0: float) -> float:
+        return self.p1 * x0 * x0 * x0 + self.p2 * x0 + self.start
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return 3.0 * self.p1 * x0 * x0 + self.p2, np.append(self.own == START, [x0**3, x0])
+
+    def rest(self, x0: float, time: float) -> State:
+        return np.array([self.start, x0])
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        w, state = np.empty_like(x), state.copy()
+        if self.is_plain:
+            run_plain(x, self.loop, self.p1, self.p2, state, w)
+        else:
+            run_general(x, self.loop, self.p1, self.p2, self.sample_period, self.jump_period, state, w)
+        return w, state
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return np.append(np.zeros(len(dx0)), self.own == START), np.array(dx0)
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        w, state = np.empty_like(x), state.copy()
+        slopes, last = tangent[0].copy(), tangent[1].copy()
+        rows = np.empty((len(slopes) + 2, x.size))
+        chosen = self.loop, self.p1, self.p2
+        if self.is_plain and self.own.size == 3 and not len(dx):
+            linearise_plain(x, *chosen, state, slopes, w, rows)
+        else:
+            periods = self.sample_period, self.jump_period
+            linearise_general(x, dx, *chosen, self.own, *periods, state, slopes, last, w, rows)
+        return w, rows, state, (slopes, last)

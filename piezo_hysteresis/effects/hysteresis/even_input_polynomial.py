@@ -1,0 +1,53 @@
+"""Even part of the static response, for drives of both signs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...blocks.block import Array, Block, MemorylessBlock
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+
+
+class EvenInputPolynomial(Effect):
+    """Square and fourth power of the normalised drive added to the hysteresis output.
+
+    Parameters
+    ----------
+    p_e : float
+        Square term [1].
+    p_4 : float
+        Fourth-power term [1].
+    """
+
+    name = "even_input_polynomial"
+    family = "static"
+    place = Place.HYSTERESIS
+    equation = "w + p_e v² + p_4 v⁴"
+    signature = "loops that differ between the two signs of a bipolar drive; invisible on unipolar drive"
+    source = "completes the odd polynomial of paper, Eq. (3), as its text asks for symmetric drives"
+    parameters = (
+        Parameter("p_e", "p_e", "1", 0.0, -1e2, 1e2, "square term", "paper, Sec. 2", 0.0, 0.05),
+        Parameter("p_4", "p_4", "1", 0.0, -1e2, 1e2, "fourth-power term", "paper, Sec. 2", 0.0, 0.05),
+    )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return EvenInputPolynomialBlock(self["p_e"], self["p_4"])
+
+
+class EvenInputPolynomialBlock(MemorylessBlock):
+    """p_e v² + p_4 v⁴, a summand of w."""
+
+    names = ("even_input_polynomial.p_e", "even_input_polynomial.p_4")
+
+    def __init__(self, p_e: float, p_4: float) -> None:
+        self.p_e, self.p_4 = p_e, p_4
+
+    def value(self, x: Array) -> Array:
+        return (self.p_e + self.p_4 * (x * x)) * (x * x)
+
+    def slope(self, x: Array) -> Array:
+        return (2.0 * self.p_e + 4.0 * self.p_4 * (x * x)) * x
+
+    def by_parameter(self, x: Array) -> Array:
+        return np.vstack((x * x, (x * x) * (x * x)))

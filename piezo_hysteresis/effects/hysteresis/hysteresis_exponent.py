@@ -1,0 +1,40 @@
+"""Loop shape that changes with amplitude: a term of the Bouc-Wen loop."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from ...parameter import Parameter
+from ..effect import Place, Term
+from ..extent import Extent
+
+FOUND_BY = (1.3, 1.7)
+"""Exponents at which a search begins."""
+
+
+class HysteresisExponent(Term):
+    """Loss of the hysteresis state that grows with a power of its size.
+
+    Parameters
+    ----------
+    n : float
+        Exponent [1]; 1 is the loop of piezo stages.
+
+    Notes
+    -----
+    With h_ref = 0.2 (normalised, dimensionless) β and γ keep their meaning at typical sizes of the state for every n.
+    """
+
+    name = "hysteresis_exponent"
+    family = "hysteresis"
+    place = Place.HYSTERESIS
+    host = "bouc_wen"
+    equation = "dh = A dv − (β |dv| h + γ dv |h|)·|h/h_ref|^(n−1),  h_ref = 0.2"
+    signature = "loop shape that changes with amplitude, at four amplitudes or more"
+    source = "paper, Eq. (2), general n; Ismail et al. 2009"
+    parameters = (Parameter("n", "n", "1", 1.0, 1.0, 4.0, "exponent of the loss", "paper, Eq. (2)", 1.0, 0.2),)
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Off, and of several sizes."""
+        return cls(), *(cls(n=n) for n in FOUND_BY)

@@ -1,0 +1,149 @@
+"""Memory of turning points that one Bouc-Wen state cannot hold: plays beside it."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from ...blocks.block import Array, Block, State
+from ...blocks.kernel import kernel
+from ...errors import ParameterError
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+SPAN = 32.0
+"""Largest radius over the smallest."""
+
+
+class HysteresisMemory(Effect):
+    """Plays of several half widths added to the hysteresis output: a Prandtl-Ishlinskii operator.
+
+    Parameters
+    ----------
+    c : sequence of float
+        Weights of the plays, from the narrowest to the widest, any number of at least 2 [1]; none is negative, a
+        passive actuator returns no more work than it was given.
+    reach : float
+        Half width of the widest play [normalised, 1]; half the range of the drive uses them all.
+    virgin : float
+        How a stage came to rest [1]: at 0 every play is centred, at 1 each is where the way from 0 V has left it.
+
+    Notes
+    -----
+    The half widths are a geometric grid from ``reach``/32 to ``reach``.
+    """
+
+    name = "hysteresis_memory"
+    family = "hysteresis"
+    place = Place.HYSTERESIS
+    equation = "w + Σ_j c_j p_j,  p_j = max(v − r_j, min(v + r_j, p_j before))"
+    signature = "errors in nested and decaying minor loops: return to the point where a loop was left"
+    source = "Prandtl-Ishlinskii operator; Gu et al. 2016"
+    parameters = (
+        Parameter("c", "c_j", "1", (0.0,) * 8, 0.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
+        Parameter("reach", "r_max", "1", 0.5, 1e-3, 10.0, "half width of the widest play", "Gu 2016", fixed=True),
+        Parameter("virgin", "f_0", "1", 0.0, 0.0, 1.0, "at rest: 0 relaxed, 1 as come from 0 V", "Gu 2016", fixed=True),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        half = extent.span / (2.0 * extent.voltage_scale)
+        farthest = max(abs(extent.voltage_min), abs(extent.voltage_max)) / extent.voltage_scale
+        return cls(reach=half), cls(reach=max(half, farthest), virgin=1.0)
+
+    def refined(self) -> Self:
+        """With a play between every two, of no weight yet."""
+        c = self.array("c")
+        finer = np.zeros(2 * c.size - 1)
+        finer[::2] = c
+        return self.with_values(c=tuple(finer.tolist()))
+
+    def check(self) -> None:
+        if self.array("c").size < 2:
+            raise ParameterError(f"hysteresis_memory.c: got {self.array('c').size} plays, expected at least 2")
+
+    @property
+    def radii(self) -> Array:
+        """Half widths of the plays [normalised], shape (any,)."""
+        return self["reach"] * SPAN ** np.linspace(-1.0, 0.0, self.array("c").size)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        names = tuple(f"hysteresis_memory.c[{j}]" for j in range(self.array("c").size))
+        return HysteresisMemoryBlock(names, self.array("c"), self.radii, self["virgin"])
+
+
+@kernel
+def run_plays(v, c, radii, plays, y):
+    """Σ c_j p_j to y (n,); plays (s,) is updated."""
+    for i in range(v.size):
+        total = 0.0
+        for j in range(radii.size):
+            plays[j] = max(v[i] - radii[j], min(v[i] + radii[j], plays[j]))
+            total += c[j] * plays[j]
+        y[i] = total
+
+
+@kernel
+def linearise_plays(v, dv, c, radii, plays, dplays, y, dy, own):
+    """`run_plays` with rows dv (m, n) to dy (m, n) and own (s, n) = p_j; plays (s,) and dplays (m, s) are updated."""
+    for i in range(v.size):
+        total = 0.0
+        for j in range(radii.size):
+            held, low, high = plays[j], v[i] - radii[j], v[i] + radii[j]
+            plays[j] = max(low, min(high, held))
+            if held <= low:
+                for r in range(dv.shape[0]):
+                    dplays[r, j] = dv[r, i] if held < low else max(dplays[r, j], dv[r, i])
+            elif held >= high:
+                for r in range(dv.shape[0]):
+                    dplays[r, j] = dv[r, i] if held > high else min(dplays[r, j], dv[r, i])
+            own[j, i] = plays[j]
+            total += c[j] * plays[j]
+        y[i] = total
+        for r in range(dv.shape[0]):
+            slope = 0.0
+            for j in range(radii.size):
+                slope += c[j] * dplays[r, j]
+            dy[r, i] = slope
+
+
+class HysteresisMemoryBlock(Block):
+    """Σ c_j play(v, r_j); state p (s,)."""
+
+    keeps_state = True
+
+    def __init__(self, names: tuple[str, ...], c: Array, radii: Array, virgin: float) -> None:
+        self.names, self.c, self.radii, self.virgin = names, c, radii, virgin
+
+    def static(self, x0: float) -> float:
+        return float(self.c @ self.rest(x0, 0.0))
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return float(self.c @ self._rest_slopes(x0)), self.rest(x0, 0.0)
+
+    def rest(self, x0: float, time: float) -> State:
+        return x0 - self.virgin * np.clip(x0, -self.radii, self.radii)
+
+    def _rest_slopes(self, x0: float) -> Array:
+        return np.asarray(1.0 - self.virgin * (abs(x0) < self.radii))
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        y, state = np.empty_like(x), state.copy()
+        run_plays(x, self.c, self.radii, state, y)
+        return y, state
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return np.outer(dx0, self._rest_slopes(x0))
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
+        rows = np.empty((len(dx) + self.c.size, x.size))
+        mapped, own = rows[: len(dx)], rows[len(dx) :]
+        if not self.c.any():  # plays without weight pass nothing on
+            linearise_plays(x, dx[:0].copy(), self.c, self.radii, state, tangent[:0].copy(), y, mapped[:0], own)
+            mapped[:] = 0.0
+        else:
+            linearise_plays(x, np.ascontiguousarray(dx), self.c, self.radii, state, tangent, y, mapped, own)
+        return y, rows, state, tangent

@@ -1,0 +1,25 @@
+"""A stage that settled with a remanent state: a term of the Bouc-Wen loop."""
+
+from __future__ import annotations
+
+from ...parameter import Parameter
+from ..effect import Place, Term
+
+
+class InitialState(Term):
+    """Hysteresis state at the start of every record that does not continue another, the stage settled with it.
+
+    Parameters
+    ----------
+    h0 : float
+        h at the start [normalised, 1]; at most |A|/(β + γ sgn A) in size.
+    """
+
+    name = "initial_state"
+    family = "hysteresis"
+    place = Place.HYSTERESIS
+    host = "bouc_wen"
+    equation = "h(0) = h0"
+    signature = "an error at the start of a record only, gone after the first large swing; demagnetise first"
+    source = "initial condition of paper, Eq. (2)"
+    parameters = (Parameter("h0", "h0", "1", 0.0, -1.0, 1.0, "remanent hysteresis state", "paper, Eq. (2)", 0.0, 0.05),)

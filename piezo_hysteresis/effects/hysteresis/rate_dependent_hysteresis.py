@@ -1,0 +1,56 @@
+"""Loops that open or close with the speed of the drive: a term of the Bouc-Wen loop."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from ...parameter import Parameter
+from ..effect import Place, Term
+from ..extent import Extent
+
+FOUND_BY = (-0.03, 0.03)
+"""Sizes k at which a search begins."""
+
+
+class RateDependentHysteresis(Term):
+    """Loop slope A that depends on the speed of the normalised drive.
+
+    Parameters
+    ----------
+    k : float
+        Relative change of A per e-fold of speed at v̇ = v0 [1].
+    a : float
+        Exponent of the rate law [1]; 0 is the logarithm, 1 is proportional to speed.
+    jumps : float
+        How fast a slow record jumps [1]: at 0 in its own sample period, at 1 in the model's.
+
+    Notes
+    -----
+    v̇ = Δv/Ts is the speed of the drive between two samples and v0 = 1 normalised unit per second. Speeds below
+    1e-4 per second count as that, so that the law stays finite at rest. A change of v by more than 0.05 in one sample
+    of a slow record may be a jump or part of a ramp, which that record cannot tell: `jumps` is for both.
+    """
+
+    name = "rate_dependent_hysteresis"
+    family = "hysteresis"
+    place = Place.HYSTERESIS
+    host = "bouc_wen"
+    equation = "A_eff = A [1 + k ((|v̇|/v0)^a − 1)/a]"
+    signature = "an error of the sign of h that grows with frequency and amplitude, and collapses on |v̇|"
+    source = "Al Janaideh et al. 2011, rate-dependent Prandtl-Ishlinskii; here on A of paper, Eq. (2)"
+    parameters = (
+        Parameter("k", "k", "1", 0.0, -0.5, 0.5, "change of loop slope with speed", "Al Janaideh 2011", 0.0, 0.05),
+        Parameter(
+            "a", "a", "1", 0.5, -0.5, 1.0, "exponent of the rate law; 0 is logarithmic", "Al Janaideh 2011", scale=0.3
+        ),
+        Parameter(
+            "jumps", "f_j", "1", 1.0, 0.0, 1.0, "change in one slow sample: 1 jump, 0 ramp", "sampling", fixed=True
+        ),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        """Off, and of a size of either sign: with it the exponent counts, which is nothing at k = 0."""
+        off = tuple(cls(a=a, jumps=jumps) for jumps in (0.0, 1.0) for a in (0.5, 0.1))
+        sizes = ((k, a) for k in FOUND_BY for a in (0.3, 0.1, -0.1))
+        return off + tuple(cls(k=k, a=a, jumps=jumps) for k, a in sizes for jumps in (0.0, 1.0))

@@ -1,0 +1,110 @@
+"""Logarithmic creep of the piezo ceramic."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+import numpy as np
+
+from ...blocks.block import Array, Block
+from ...blocks.relaxation import RelaxationBlock
+from ...errors import ParameterError
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+REFERENCE_TIME = 0.1
+"""Time after a step at which creep counts as zero [s]."""
+
+PER_DECADE = 2
+"""Relaxations per decade of time; two leave a ripple of 0.02 % of the creep per decade."""
+
+
+class Creep(Effect):
+    """Displacement that goes on growing with the logarithm of the time since every change of level.
+
+    Parameters
+    ----------
+    gamma : float
+        Creep per decade of time, relative to the response 0.1 s after a step [1/decade].
+    tau_min, tau_max : float
+        Range of the relaxation times [s]: from the fastest sample period to 10 times the longest record.
+
+    Notes
+    -----
+    As an operator on any input the law is a sum of relaxations, two per decade, exact for an input that is linear
+    between samples. Outside ``tau_min`` … ``tau_max`` creep ends: a stage at rest has crept completely.
+
+    Examples
+    --------
+    Ten times longer after a step, γ more:
+
+    >>> block = Creep(gamma=0.02).block(Setting(1e-2, 1e-2))
+    >>> y, _ = block.run(np.ones(1001), block.rest(0.0, 0.0))
+    >>> round(float(y[1000] - y[100]), 4)
+    0.02
+    """
+
+    name = "creep"
+    family = "creep"
+    place = Place.MATERIAL
+    equation = "y = w + γ Σ_j ½ (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w;  after a step: 1 + γ log10(t/0.1 s)"
+    signature = (
+        "grows with log t after each change of level; on sines a gain falling linearly in log f at constant phase"
+    )
+    source = "Croft, Shed, Devasia 2001; relaxation bank of the logarithmic law"
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter("gamma", "γ", "1/decade", 0.0, -0.2, 0.2, "creep per decade of time", "Croft 2001", 0.0, 0.01),
+        Parameter(
+            "tau_min",
+            "τ_min",
+            "s",
+            1e-4,
+            1e-7,
+            1e3,
+            "fastest relaxation: the smallest sample period",
+            "bank",
+            fixed=True,
+        ),
+        Parameter(
+            "tau_max",
+            "τ_max",
+            "s",
+            1e4,
+            1e-3,
+            1e8,
+            "slowest relaxation: 10 times the longest record",
+            "bank",
+            fixed=True,
+        ),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return (cls(tau_min=extent.fastest_period, tau_max=10.0 * extent.longest_record),)
+
+    def check(self) -> None:
+        if not self["tau_max"] >= 10.0 * self["tau_min"]:
+            raise ParameterError(
+                f"creep: got tau_min = {self['tau_min']:g} s, tau_max = {self['tau_max']:g} s, "
+                "expected tau_max of at least 10 tau_min"
+            )
+
+    @property
+    def tau(self) -> Array:
+        """Relaxation times of the bank [s]."""
+        decades = np.log10(self["tau_max"] / self["tau_min"])
+        return self["tau_min"] * 10.0 ** (np.arange(int(PER_DECADE * decades + 1e-9) + 1) / PER_DECADE)
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        tau = self.tau
+        weights = np.full(tau.size, 1.0 / PER_DECADE)
+        by_gamma = settled_mix(tau, weights)
+        return RelaxationBlock(
+            ("creep.gamma",), tau, setting.sample_period, self["gamma"] * by_gamma, by_gamma[None, :]
+        )
+
+
+def settled_mix(tau: Array, weights: Array) -> Array:
+    """Direct path and weights of relaxations whose sum is zero 0.1 s after a step, shape (1 + s,)."""
+    return np.append(weights @ np.expm1(-REFERENCE_TIME / tau), weights)

@@ -1,0 +1,101 @@
+"""Creep of a few definite time constants."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from ...blocks.block import Array, Block, State
+from ...blocks.linear import AddedBlock
+from ...blocks.low_pass import PoleBlock
+from ...errors import ParameterError
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+FASTEST = 5e-3
+"""Time constant below which a relaxation is no creep but dynamics [s]."""
+
+
+class CreepExponential(Effect):
+    """Relaxations added to the response: the classical creep model of spring and damper pairs.
+
+    Parameters
+    ----------
+    c : sequence of float
+        Final share of each relaxation [1].
+    tau : sequence of float
+        Time constant of each [s]; as many as `c`.
+    """
+
+    name = "creep_exponential"
+    entry = "creep"
+    family = "creep"
+    place = Place.MATERIAL
+    equation = "Y/W = 1 + Σ_k c_k/(1 + τ_k s)"
+    signature = "grows after each change of level and ends after some τ, unlike logarithmic creep"
+    source = "Croft, Shed, Devasia 2001, Kelvin-Voigt creep"
+    parameters = (
+        Parameter("c", "c_k", "1", (0.0, 0.0), 0.0, 0.2, "final share of each relaxation", "Croft 2001", 0.0, 0.01),
+        Parameter("tau", "τ_k", "s", (0.3, 10.0), FASTEST, 1e5, "time constants", "Croft 2001", scale=1.0),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        longest = extent.longest_record
+        begin = (max(FASTEST, share * longest) for share in (0.001, 0.01, 0.1))
+        return tuple(cls(tau=(tau, 20.0 * tau)) for tau in begin)
+
+    def check(self) -> None:
+        if self.array("c").size != self.array("tau").size:
+            raise ParameterError(
+                f"creep_exponential: got {self.array('c').size} shares c and {self.array('tau').size} time constants "
+                "tau, expected equally many"
+            )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        names = tuple(f"creep_exponential.{n}" for n in self.free_names())
+        return CreepExponentialBlock(names, self.array("c"), self.array("tau"), setting.sample_period)
+
+
+class CreepExponentialBlock(AddedBlock):
+    """x + Σ_k c_k x_k; the state holds last input and x_k for every k."""
+
+    keeps_state = True
+
+    def __init__(self, names: tuple[str, ...], c: Array, tau: Array, sample_period: float) -> None:
+        self.names, self.c = names, c
+        self.poles = tuple(PoleBlock("", float(t), 1, sample_period) for t in tau)
+        self.gain = float(c.sum())
+
+    @property
+    def is_idle(self) -> bool:
+        return not self.c.any()
+
+    def zeros(self, rows: int) -> Array:
+        return np.zeros((rows, 2 * self.c.size))
+
+    def filter(self, x: Array, z: Array, y: Array) -> Array:
+        parts = np.empty((self.c.size, *x.shape))
+        after = [pole.filter(x, z[:, 2 * k : 2 * k + 2], parts[k]) for k, pole in enumerate(self.poles)]
+        y[:] = 0.0
+        for c, part in zip(self.c, parts, strict=True):
+            y += c * (x + part)
+        return np.hstack(after) if after else z
+
+    def gain_slopes(self) -> Array:
+        return np.repeat([1.0, 0.0], self.c.size)
+
+    def own_rest(self) -> State:
+        return np.zeros((self.c.size, 2))
+
+    def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
+        states = []
+        for k, pole in enumerate(self.poles):
+            here, by_share, by_tau = z[2 * k : 2 * k + 2], rows[k], rows[self.c.size + k]
+            pole.filter(x[None, :], here[None, :], by_share[None, :])
+            by_share += x
+            states.append(pole.by_parameter(x, y, here, own[k], by_tau[None, :]))
+            by_tau *= self.c[k]
+        return np.array(states)

@@ -1,0 +1,72 @@
+"""Creep by a power of time, of which logarithmic creep is the limit: a law of its own, with one number more."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...blocks.block import Block
+from ...blocks.relaxation import RelaxationBlock
+from ...parameter import Parameter
+from ..effect import Effect, Setting
+from .creep import PER_DECADE, REFERENCE_TIME, Creep, settled_mix
+
+
+class CreepFractional(Creep):
+    """Creep whose rate per decade grows or shrinks with time, as a fractional (power-law) element creeps.
+
+    Parameters
+    ----------
+    gamma : float
+        Creep per decade around 0.1 s after a step, relative to the response there [1/decade].
+    exponent : float
+        λ of the power law [1]; 0 is logarithmic creep.
+    tau_min, tau_max : float
+        Range of the relaxation times [s], as in `Creep`.
+
+    Notes
+    -----
+    The relaxations of `Creep` with weights ∝ (τ/0.1 s)^λ.
+
+    Examples
+    --------
+    >>> from .creep import Creep
+    >>> u = np.ones(100)
+    >>> blocks = [e.block(Setting(1e-2, 1e-2)) for e in (Creep(gamma=0.02), CreepFractional(gamma=0.02))]
+    >>> log, power = (b.run(u, b.rest(0.0, 0.0))[0] for b in blocks)
+    >>> bool(np.array_equal(log, power))
+    True
+    """
+
+    name = "creep_fractional"
+    entry = "creep"
+    equation = (
+        "y = w + γ Σ_j g_j (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w,  g_j = ½ (τ_j/0.1)^λ;  "
+        "after a step: 1 + γ ((t/0.1 s)^λ − 1)/(λ ln 10)"
+    )
+    signature = "as logarithmic creep, but faster or slower than log t"
+    source = "fractional creep as a bank of relaxations; Croft, Shed, Devasia 2001 for λ = 0"
+    parameters = (
+        Creep.parameters[0],
+        Parameter(
+            "exponent",
+            "λ",
+            "1",
+            0.0,
+            -0.5,
+            0.5,
+            "exponent of the fractional law; 0 is logarithmic",
+            "fractional creep",
+            scale=0.1,
+        ),
+        *Creep.parameters[1:],
+    )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        tau = self.tau
+        ratio = tau / REFERENCE_TIME
+        weights = ratio ** self["exponent"] / PER_DECADE
+        by_gamma = settled_mix(tau, weights)
+        by_exponent = self["gamma"] * settled_mix(tau, weights * np.log(ratio))
+        names = ("creep_fractional.gamma", "creep_fractional.exponent")
+        mix = self["gamma"] * by_gamma
+        return RelaxationBlock(names, tau, setting.sample_period, mix, np.vstack((by_gamma, by_exponent)))

@@ -1,0 +1,66 @@
+"""Sensitivity of actuator and sensor that changes while they warm up."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from ...blocks.block import Array, Block
+from ...blocks.time import TimeBlock
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+from ..extent import Extent
+
+
+class GainDrift(Effect):
+    """Gain that approaches a new value exponentially with absolute time.
+
+    Parameters
+    ----------
+    g : float
+        Final relative change of gain [1].
+    tau : float
+        Time constant [s].
+
+    Notes
+    -----
+    t is the time since the start of the experiment. It multiplies the normalised position, before the sensor's zero.
+    """
+
+    name = "gain_drift"
+    family = "drift"
+    place = Place.SENSOR
+    equation = "y = x [1 + g (1 − e^(−t/τ))]"
+    signature = "an error proportional to the displacement that grows with time: repeat the first triangle at the end"
+    source = "first-order warm-up; 0.05–0.5 %/K"
+    parameters = (
+        Parameter("g", "g", "1", 0.0, -0.5, 0.5, "final relative change of gain", "first-order warm-up", 0.0, 0.01),
+        Parameter("tau", "τ", "s", 600.0, 1.0, 1e5, "time constant of the warm-up", "first-order warm-up", scale=300.0),
+    )
+
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return tuple(cls(tau=max(1.0, share * extent.duration)) for share in (0.1, 0.4, 1.5))
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return GainDriftBlock(self["g"], self["tau"], setting.sample_period)
+
+
+class GainDriftBlock(TimeBlock):
+    """x (1 + g (1 − e^(−t/τ)))."""
+
+    names = ("gain_drift.g", "gain_drift.tau")
+
+    def __init__(self, change: float, tau: float, sample_period: float) -> None:
+        super().__init__(sample_period)
+        self.change, self.tau = change, tau
+
+    def slope(self, x: Array, t: Array) -> Array:
+        return 1.0 - self.change * np.expm1(-t / self.tau)
+
+    def value(self, x: Array, t: Array) -> Array:
+        return x * self.slope(x, t)
+
+    def by_parameter(self, x: Array, t: Array) -> Array:
+        return x * np.vstack((-np.expm1(-t / self.tau), -self.change * t / self.tau**2 * np.exp(-t / self.tau)))

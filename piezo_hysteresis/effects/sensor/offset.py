@@ -1,0 +1,79 @@
+"""Zero of the displacement sensor, and where the stage settles: part of every comparison with a measurement."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...blocks.block import Array, Block, State
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+
+
+class Offset(Effect):
+    """y + y0 + r·y_rest: reading of the sensor where the model is at zero, and at rest.
+
+    Parameters
+    ----------
+    y0 : float
+        Sensor zero [m].
+    settling : float
+        r, by how much further a stage has settled at rest than its model says, relative to its position there [1].
+
+    Notes
+    -----
+    How far creep and hysteresis had settled before a record begins depends on what was done for minutes or days before,
+    which no record tells. The ratio r keeps that out of the effects that are sought: the same for all records.
+
+    Examples
+    --------
+    >>> block = Offset(y0=1e-6, settling=0.1).block(Setting(1e-3, 1e-3))
+    >>> y, _ = block.run(np.array([1e-5, 2e-5]), block.rest(1e-5, 0.0))
+    >>> [round(float(v), 12) for v in y]
+    [1.2e-05, 2.2e-05]
+    """
+
+    name = "offset"
+    family = "sensor"
+    place = Place.ENVIRONMENT
+    equation = "y = x + y0 + r x_rest"
+    signature = "a constant in every record"
+    source = "definition of the sensor's zero"
+    parameters = (
+        Parameter("y0", "y0", "m", 0.0, -1.0, 1.0, "reading at zero displacement", "definition", 0.0, 1e-6),
+        Parameter("settling", "r", "1", 0.0, -0.5, 0.5, "settling at rest beyond the model", "definition", 0.0, 0.01),
+    )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return OffsetBlock(self["y0"], self["settling"])
+
+
+class OffsetBlock(Block):
+    """x + y0 + r·x_rest; state x_rest, tangent state its slopes."""
+
+    names = ("offset.y0", "offset.settling")
+    keeps_state = True
+
+    def __init__(self, y0: float, settling: float) -> None:
+        self.y0, self.settling = y0, settling
+
+    def static(self, x0: float) -> float:
+        return x0 + (self.y0 + self.settling * x0)
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        return 1.0 + self.settling, np.array([1.0, x0])
+
+    def rest(self, x0: float, time: float) -> State:
+        return x0
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        return x + (self.y0 + self.settling * state), state
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return np.array(dx0)
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        rows = np.empty((len(dx) + 2, x.size))
+        rows[:-2] = dx + (self.settling * tangent)[:, None]
+        rows[-2] = 1.0
+        rows[-1] = state
+        return self.run(x, state)[0], rows, state, tangent

@@ -1,0 +1,39 @@
+"""Low-pass of the displacement sensor."""
+
+from __future__ import annotations
+
+from ...blocks.block import Block
+from ...blocks.low_pass import PoleBlock
+from ...errors import ParameterError
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+
+
+class SensorBandwidth(Effect):
+    """Equal poles after everything that moves.
+
+    Parameters
+    ----------
+    tau : float
+        Time constant of each pole, 1/(2π·cut-off frequency) [s].
+    poles : float
+        Their number, whole [1].
+    """
+
+    name = "sensor_bandwidth"
+    family = "lag"
+    place = Place.SENSOR
+    equation = "Y/X = 1/(1 + τ s)^n"
+    signature = "lag and roll-off of everything measured; below one sample not separable from the other lags"
+    source = "bandwidth settings of capacitive sensors: 50 Hz, 500 Hz, 5 kHz"
+    parameters = (
+        Parameter("tau", "τ", "s", 0.0, 0.0, 1e-1, "time constant of each pole", "sensor settings", 0.0, 2e-5),
+        Parameter("poles", "n", "1", 1.0, 1.0, 8.0, "number of poles", "sensor settings", fixed=True),
+    )
+
+    def check(self) -> None:
+        if self["poles"] != int(self["poles"]):
+            raise ParameterError(f"sensor_bandwidth.poles: got {self['poles']:g}, expected a whole number")
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return PoleBlock("sensor_bandwidth.tau", self["tau"], int(self["poles"]), setting.sample_period)

@@ -1,0 +1,58 @@
+"""Nonlinearity of the displacement sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...blocks.block import Array, Block, MemorylessBlock
+from ...parameter import Parameter
+from ..effect import Effect, Place, Setting
+
+
+class SensorNonlinearity(Effect):
+    """Square and cube of the position added to the reading.
+
+    Parameters
+    ----------
+    s2 : float
+        Square term [1].
+    s3 : float
+        Cubic term [1].
+
+    Notes
+    -----
+    They act on the normalised position: relative errors at full scale where the model's ``displacement_scale`` is the
+    stroke [m].
+    """
+
+    name = "sensor_nonlinearity"
+    family = "static"
+    place = Place.SENSOR
+    equation = "y = x + s2 x² + s3 x³"
+    signature = "harmonics of the position itself, also at the resonance; on unipolar drive absorbed by p1 and p2"
+    source = "capacitive sensors 0.02–0.1 %, strain gauges 0.1–1 %"
+    parameters = (
+        Parameter("s2", "s2", "1", 0.0, -1.0, 1.0, "square term", "sensor data sheets", 0.0, 0.01),
+        Parameter("s3", "s3", "1", 0.0, -1.0, 1.0, "cubic term", "sensor data sheets", 0.0, 0.01),
+    )
+
+    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+        return SensorNonlinearityBlock(self["s2"], self["s3"])
+
+
+class SensorNonlinearityBlock(MemorylessBlock):
+    """x + s2 x² + s3 x³."""
+
+    names = ("sensor_nonlinearity.s2", "sensor_nonlinearity.s3")
+
+    def __init__(self, s2: float, s3: float) -> None:
+        self.s2, self.s3 = s2, s3
+
+    def value(self, x: Array) -> Array:
+        return x + (self.s2 + self.s3 * x) * x * x
+
+    def slope(self, x: Array) -> Array:
+        return 1.0 + (2.0 * self.s2 + 3.0 * self.s3 * x) * x
+
+    def by_parameter(self, x: Array) -> Array:
+        return np.vstack((x * x, x * x * x))

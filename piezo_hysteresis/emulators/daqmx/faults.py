@@ -1,0 +1,30 @@
+"""`FAULTS`: what can be made to go wrong in an emulated card and its server."""
+
+from __future__ import annotations
+
+from ..fault import FaultCatalogue
+
+_IN_A_STREAM = "ReadAnalogF64:3"
+
+FAULTS = FaultCatalogue(
+    once={
+        "link_lost": (_IN_A_STREAM, "the server cannot be reached for one call"),
+        "gone": (_IN_A_STREAM, "the server cannot be reached from then on"),
+        "slow": (_IN_A_STREAM, "the answer comes late, by the number of seconds given after '=' (5)"),
+        "error": (_IN_A_STREAM, "refused with the NI-DAQmx error number given after '=' (-50103)"),
+        "device_lost": (_IN_A_STREAM, "the card is unplugged for one call"),
+        "underflow": (_IN_A_STREAM, "the output buffer runs empty"),
+        "late": (_IN_A_STREAM, "samples come later than the time-out of the read"),
+        "short_read": (_IN_A_STREAM, "fewer samples come than were asked for"),
+        "duplicated": (_IN_A_STREAM, "the samples of the read before come again"),
+        "garbled": (_IN_A_STREAM, "one sample is no number"),
+    },
+    lasting={
+        "wrong_clock": "samples at half the rate asked for, and tells so",
+        "saturated": "the amplifier ends at half of the voltage range",
+        "stale": "readings of the sensor stand still",
+        "swapped": "the inputs of sensor and monitor are exchanged",
+        "skewed": "the sensor is read one sample late",
+    },
+    values={"slow": 5.0, "error": -50103.0},
+)

@@ -1,0 +1,34 @@
+"""Answers in GCS 2.0 form: lines of one answer, to be joined by space and line feed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ...stage.description import Samples
+
+
+def number(value: float) -> str:
+    """A number as controllers write it: nine digits, so that single precision survives."""
+    return f"{value:.9g}"
+
+
+def items(values: Mapping[object, object]) -> list[str]:
+    """Lines ``item=value``."""
+    return [f"{item}={number(value) if isinstance(value, float) else value}" for item, value in values.items()]
+
+
+def array(values: Samples, sample_time: float, names: Sequence[str]) -> list[str]:
+    """A GCS array: header, then one line per row of `values`, shape (rows, columns)."""
+    header = [
+        "# REM emulated",
+        "# VERSION = 1",
+        "# TYPE = 1",
+        "# SEPARATOR = 32",
+        f"# DIM = {values.shape[1]}",
+        f"# SAMPLE_TIME = {number(sample_time)}",
+        f"# NDATA = {values.shape[0]}",
+        *(f"# NAME{i} = {name}" for i, name in enumerate(names)),
+        "#",
+        "# END_HEADER",
+    ]
+    return header + [" ".join(map(number, row)) for row in values.tolist()]

@@ -1,0 +1,60 @@
+"""Arguments of GCS 2.0 commands, as an emulated controller with one axis and one channel takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ...stage.gcs2.error_number import ILLEGAL_AXIS, NO_RECORDER_TABLE, OUT_OF_RANGE, WRONG_COUNT
+from .answer import items
+from .refusal import Refusal
+
+AXIS, CHANNEL = "1", 1
+
+Command = Callable[[list[str]], list[str] | None]
+"""Takes the arguments; returns the lines of the answer, None where there is none."""
+
+
+def groups(arguments: list[str], size: int) -> list[list[str]]:
+    """Arguments that belong together, `size` at a time."""
+    if not arguments or len(arguments) % size:
+        raise Refusal(WRONG_COUNT)
+    return [arguments[i : i + size] for i in range(0, len(arguments), size)]
+
+
+def axes(arguments: list[str]) -> list[str]:
+    """Axes asked for; all where none is named."""
+    if any(axis != AXIS for axis in arguments):
+        raise Refusal(ILLEGAL_AXIS)
+    return arguments or [AXIS]
+
+
+def channels(arguments: list[str]) -> list[int]:
+    """Output channels or generators asked for; all where none is named."""
+    if any(int(channel) != CHANNEL for channel in arguments):
+        raise Refusal(ILLEGAL_AXIS)
+    return [CHANNEL]
+
+
+def tables(arguments: list[str], known: range) -> list[int]:
+    """Recorder tables asked for; all that are known where none is named."""
+    chosen = [int(table) for table in arguments] or list(known)
+    if not set(chosen) <= set(known):
+        raise Refusal(NO_RECORDER_TABLE)
+    return chosen
+
+
+def positive(word: str) -> int:
+    """A whole number from 1 on."""
+    if int(word) < 1:
+        raise Refusal(OUT_OF_RANGE)
+    return int(word)
+
+
+def of_axis(value: Callable[[], float | str]) -> Command:
+    """The command that tells a value of the axis."""
+    return lambda arguments: items(dict.fromkeys(axes(arguments), value()))
+
+
+def of_channel(value: Callable[[], float | str]) -> Command:
+    """The command that tells a value of the output channel or generator."""
+    return lambda arguments: items(dict.fromkeys(channels(arguments), value()))

@@ -1,0 +1,27 @@
+"""`FAULTS`: what can be made to go wrong in an emulated controller."""
+
+from __future__ import annotations
+
+from ..fault import FaultCatalogue
+
+FAULTS = FaultCatalogue(
+    once={
+        "link_lost": ("DRR?", "half the answer, then the link is closed"),
+        "gone": ("DRR?", "half the answer, then the link is closed and no new one accepted"),
+        "partial_answer": ("DRR?", "half the answer, then silence"),
+        "slow": ("POS?", "the answer comes late, by the number of seconds given after '=' (5)"),
+        "error": ("WAV", "refused with the error number given after '=' (17)"),
+        "garbled": ("DRR?", "one value of the answer is no number"),
+    },
+    lasting={
+        "short_record": "the recorder stops at four fifths of its waveform",
+        "wrong_servo_time": "runs at twice the servo time that SPA? tells",
+        "saturated": "the amplifier ends at half of the voltage range",
+        "stale": "position readings stand still",
+        "duplicated": "a block of recorded samples comes twice",
+        "swapped": "the recorded channels are exchanged",
+        "skewed": "recorded positions are one sample late",
+        "servo_on": "the servo is on and cannot be switched off",
+    },
+    values={"slow": 5.0, "error": 17.0},
+)

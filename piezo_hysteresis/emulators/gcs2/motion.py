@@ -1,0 +1,106 @@
+"""`Motion`: a simulated stage that lives on while nobody asks, and plays a waveform meanwhile."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from ...stage.description import Samples
+from ...stage.simulated import SimulatedStage
+from ...stage.stage import Acquired
+from ..fault import Faults
+from .recorder import Recorder
+
+_LONGEST_REST = 0.2
+
+
+class Motion:
+    """The stage behind an emulated controller, advanced in servo cycles.
+
+    Time is that of the machine, times `speed`. Rest longer than 0.2 s between two commands is not simulated further:
+    creep stands still then.
+
+    Parameters
+    ----------
+    stage : SimulatedStage
+        Its sample period is the servo time.
+    recorder : Recorder
+        Gets every sample.
+    faults : Faults
+    speed : float
+        Seconds of the stage per second; infinite to play every waveform at once.
+    """
+
+    def __init__(self, stage: SimulatedStage, recorder: Recorder, faults: Faults, speed: float) -> None:
+        self.stage, self._recorder, self._faults, self._speed = stage, recorder, faults, speed
+        self.servo_time = stage.sample_period
+        if faults.lasts("wrong_servo_time"):
+            stage.configure(2 * self.servo_time)
+        self._waveform: Samples = np.empty(0)
+        self._told = time.monotonic()
+        self.command = stage.voltage
+        self._position = 0.0
+        self.advance()
+
+    @property
+    def cycle(self) -> float:
+        """Servo cycle that is really run [s]."""
+        return self.stage.sample_period
+
+    @property
+    def is_playing(self) -> bool:
+        """True while a waveform is being played."""
+        return bool(self._waveform.size)
+
+    @property
+    def voltage(self) -> float:
+        """Piezo voltage [V]."""
+        return self.stage.voltage * self.stage.description.amplifier_gain
+
+    @property
+    def position(self) -> float:
+        """Position [m] as the sensor tells it now."""
+        self._run(np.full(1, self.command))
+        return self._position
+
+    def advance(self) -> None:
+        """Live up to now."""
+        now = time.monotonic()
+        if math.isinf(self._speed):
+            cycles = self._waveform.size
+        else:
+            cycles = int((now - self._told) * self._speed / self.cycle)
+            now = self._told + cycles * self.cycle / self._speed
+        self._told = now
+        played, self._waveform = self._waveform[:cycles], self._waveform[cycles:]
+        if played.size:
+            self._run(played)
+        rest = min(cycles - played.size, int(_LONGEST_REST / self.cycle))
+        if rest > 0:
+            self._run(np.full(rest, self.command))
+
+    def set(self, drive: float) -> None:
+        """Apply one drive voltage [V] for a cycle and hold it."""
+        self._run(np.full(1, drive))
+
+    def play(self, waveform: Samples) -> None:
+        """Play drive voltages [V], one per servo cycle, from now on."""
+        self._told, self._waveform = time.monotonic(), waveform
+        self.advance()
+
+    def stop(self) -> None:
+        """Hold what is applied now."""
+        self._waveform = np.empty(0)
+
+    def _run(self, drive: Samples) -> None:
+        self.command = float(drive[-1])
+        d = self.stage.description
+        if self._faults.lasts("saturated"):
+            drive = np.minimum(drive, d.safe_voltage + 0.5 * (d.voltage_max - d.safe_voltage))
+        got = self.stage.exchange(drive)
+        if self._faults.lasts("stale"):
+            got = Acquired(got.voltage, np.full(drive.size, self._position))
+        self._position = float(got.displacement[-1])
+        self._recorder.take(drive, got.voltage * d.amplifier_gain, got.displacement)

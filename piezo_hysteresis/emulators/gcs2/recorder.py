@@ -1,0 +1,88 @@
+"""`Recorder`: the data recorder of an emulated controller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...stage.description import Samples
+from ...stage.gcs2.error_number import NO_RECORD_OPTION, NO_RECORDER_TABLE, OUT_OF_RANGE, TOO_FEW_RECORDED
+from ..fault import Faults
+from .refusal import Refusal
+
+OPTIONS = {0: "Nothing", 1: "Commanded Value", 2: "Actual Position of Axis", 7: "Voltage of Output Chan"}
+"""Record options that are there; position in µm, voltages in V at the piezo."""
+
+
+class Recorder:
+    """Tables that share one memory; all start together and end when they are full.
+
+    Parameters
+    ----------
+    tables : int
+        Number of tables.
+    points : int
+        Samples that all tables together hold.
+    command_gain : float
+        Open-loop command over drive voltage.
+    faults : Faults
+    """
+
+    def __init__(self, tables: int, points: int, command_gain: float, faults: Faults) -> None:
+        self.numbers, self.points, self.rate = range(1, tables + 1), points, 1
+        self._command_gain, self._faults = command_gain, faults
+        self._options = dict.fromkeys(self.numbers, 0) | {1: 1, 2: 2}
+        self._parts: list[Samples] = []
+        self._cycles, self._room = 0, 0
+
+    def configure(self, table: int, option: int) -> None:
+        """Record another quantity in a table from now on."""
+        self._require_table(table)
+        if option not in OPTIONS:
+            raise Refusal(NO_RECORD_OPTION)
+        self._options[table] = option
+
+    def option(self, table: int) -> int:
+        """Record option of a table."""
+        self._require_table(table)
+        return self._options[table]
+
+    def start(self, expected_cycles: int) -> None:
+        """Begin to record; `expected_cycles` servo cycles are going to be played."""
+        self._parts, self._cycles = [], 0
+        self._room = self.points // len(self.numbers) * self.rate
+        if self._faults.lasts("short_record"):
+            self._room = min(self._room, expected_cycles * 4 // 5)
+
+    def take(self, drive: Samples, voltage: Samples, displacement: Samples) -> None:
+        """Servo cycles as they pass: drive [V], piezo voltage [V], displacement [m], shape (n,)."""
+        count = min(drive.size, self._room - self._cycles)
+        if count > 0:
+            columns = (drive * self._command_gain, displacement * 1e6, voltage)
+            self._parts.append(np.stack([column[:count] for column in columns]))
+            self._cycles += count
+
+    @property
+    def recorded(self) -> int:
+        """Samples in every table since the last start."""
+        return -(-self._cycles // self.rate)
+
+    def read(self, first: int, count: int, tables: Sequence[int]) -> Samples:
+        """Samples `first` (from 1) on of some tables, shape (count, tables)."""
+        if first < 1 or count < 1:
+            raise Refusal(OUT_OF_RANGE)
+        if first + count - 1 > self.recorded:
+            raise Refusal(TOO_FEW_RECORDED)
+        if self._faults.lasts("duplicated"):
+            first = max(first - count, 1)
+        kept = np.concatenate(self._parts, axis=1)[:, :: self.rate]
+        if self._faults.lasts("skewed"):
+            kept[1] = np.r_[kept[1, :1], kept[1, :-1]]
+        rows = {0: np.zeros(kept.shape[1]), 1: kept[0], 2: kept[1], 7: kept[2]}
+        columns = [rows[self.option(table)][first - 1 : first - 1 + count] for table in tables]
+        return np.stack(columns[::-1] if self._faults.lasts("swapped") else columns, axis=1)
+
+    def _require_table(self, table: int) -> None:
+        if table not in self.numbers:
+            raise Refusal(NO_RECORDER_TABLE)

@@ -1,0 +1,137 @@
+"""`Server`: an emulated controller behind a TCP port."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from contextlib import suppress
+from typing import Self
+
+from ...errors import StageError
+from .controller import BYTES, Controller, Reply
+
+_CODE_PAGE = "cp1252"
+_LONGEST_LINE = 1 << 20
+
+
+class Server:
+    """Serves any number of links, one command at a time, from threads of its own.
+
+    Parameters
+    ----------
+    controller : Controller
+    host : str
+        Address to listen at; the loop-back device unless told otherwise.
+    port : int
+        TCP port; 0 for any free one.
+
+    Raises
+    ------
+    StageError
+        If the port cannot be had.
+
+    Examples
+    --------
+    >>> from piezo_hysteresis.stage.simulated import SimulatedStage
+    >>> with Server(Controller(SimulatedStage(sample_period=50e-6))) as server:
+    ...     server.port > 0
+    True
+    """
+
+    def __init__(self, controller: Controller, host: str = "127.0.0.1", port: int = 0) -> None:
+        self._controller, self._turn, self._ended = controller, threading.Lock(), threading.Event()
+        self._links: set[socket.socket] = set()
+        self._threads: list[threading.Thread] = []
+        if not 0 <= port <= 65535:
+            raise StageError(f"gcs2 emulator: got port {port}, expected 0 to 65535")
+        try:
+            self._listener = socket.create_server((host, port))
+        except OSError as error:
+            raise StageError(f"gcs2 emulator: cannot listen at {host}:{port} ({error}); name another port") from None
+        self.host, self.port = host, int(self._listener.getsockname()[1])
+
+    def __enter__(self) -> Self:
+        self._begin(self._accept)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the port and every link, and wait for the threads."""
+        self._ended.set()
+        self._close_port()
+        for link in list(self._links):
+            _shut(link)
+        for thread in list(self._threads):
+            thread.join()
+
+    def _begin(self, work: object, *arguments: object) -> None:
+        thread = threading.Thread(target=work, args=arguments, daemon=True)  # type: ignore[arg-type]
+        self._threads = [t for t in self._threads if t.is_alive()] + [thread]
+        thread.start()
+
+    def _close_port(self) -> None:
+        _shut(self._listener)
+        self._listener.close()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                link, _ = self._listener.accept()
+            except OSError:
+                return
+            link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._links.add(link)
+            self._begin(self._serve, link)
+
+    def _serve(self, link: socket.socket) -> None:
+        waiting = b""
+        try:
+            while part := link.recv(1 << 16):
+                commands, waiting = cut(waiting + part)
+                for command in commands:
+                    with self._turn:
+                        reply = self._controller.carry_out(command)
+                    self._send(link, reply)
+        except OSError:
+            pass
+        finally:
+            self._links.discard(link)
+            link.close()
+
+    def _send(self, link: socket.socket, reply: Reply) -> None:
+        struck, lines = reply.struck, list(reply.lines or ())
+        if "slow" in struck and self._ended.wait(struck["slow"]):
+            return
+        if "garbled" in struck and lines:
+            lines[-1 - len(lines) // 4] = "".join("nan" if c.isdigit() else c for c in lines[-1 - len(lines) // 4][:9])
+        text = " \n".join(lines).encode(_CODE_PAGE, errors="replace") + b"\n" if lines else b""
+        if struck.keys() & {"link_lost", "gone", "partial_answer"}:
+            text = text[: len(text) // 2]
+        link.sendall(text)
+        if "gone" in struck:
+            self._close_port()
+        if struck.keys() & {"link_lost", "gone"}:
+            raise OSError("the fault that was asked for")
+
+
+def cut(received: bytes) -> tuple[list[str], bytes]:
+    """Commands in what was received, and the beginning of the next one."""
+    commands: list[str] = []
+    while received:
+        if chr(received[0]) in BYTES:
+            commands.append(chr(received[0]))
+            received = received[1:]
+            continue
+        line, feed, rest = received.partition(b"\n")
+        if not feed:
+            return commands, received[:_LONGEST_LINE]
+        commands.append(line.decode(_CODE_PAGE, errors="replace").strip())
+        received = rest
+    return commands, b""
+
+
+def _shut(link: socket.socket) -> None:
+    with suppress(OSError):  # not connected
+        link.shutdown(socket.SHUT_RDWR)

@@ -1,0 +1,74 @@
+"""`WaveGenerator`: wave table and generator of an emulated controller."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...stage.description import Samples
+from ...stage.gcs2.error_number import NO_WAVE_SELECTED, OUT_OF_RANGE, SYNTAX, WAVE_TOO_LARGE, WRONG_COUNT
+from .refusal import Refusal
+
+_LONGEST_RUN = 10_000_000
+"""Servo cycles of one run: the output is made before it is played."""
+
+
+class WaveGenerator:
+    """Wave tables by number, and the settings of the one generator that plays them.
+
+    Parameters
+    ----------
+    tables : int
+        Number of tables.
+    longest : int
+        Points that a table holds.
+    lowest, highest : float
+        Limits of a point, in units of the open-loop command.
+    """
+
+    def __init__(self, tables: int, longest: int, lowest: float, highest: float) -> None:
+        self.longest = longest
+        self._limits = lowest, highest
+        self.numbers = range(1, tables + 1)
+        self._points: dict[int, list[float]] = {table: [] for table in self.numbers}
+        self.table, self.cycles, self.rate, self.offset, self.mode = 0, 0, 1, 0.0, 0
+
+    def clear(self, table: int) -> None:
+        """Empty a table."""
+        self.points(table).clear()
+
+    def points(self, table: int) -> list[float]:
+        """Points of a table."""
+        if table not in self._points:
+            raise Refusal(OUT_OF_RANGE)
+        return self._points[table]
+
+    def write(self, words: list[str]) -> None:
+        """Carry out ``WAV table X|& PNT first count values…``; the calculated curves are not there."""
+        if len(words) < 6:
+            raise Refusal(WRONG_COUNT)
+        table, mode, kind, first, count, *values = words
+        if kind.upper() != "PNT" or mode.upper() not in ("X", "&"):
+            raise Refusal(OUT_OF_RANGE)
+        try:
+            stored, numbers = self.points(int(table)), [float(value) for value in values]
+            if int(first) < 1 or int(count) != len(numbers):
+                raise Refusal(WRONG_COUNT)
+        except ValueError:
+            raise Refusal(SYNTAX) from None
+        low, high = self._limits
+        if not all(low <= number <= high for number in numbers):
+            raise Refusal(OUT_OF_RANGE)
+        if mode.upper() == "X":
+            stored.clear()
+        if len(stored) + len(numbers) > self.longest:
+            raise Refusal(WAVE_TOO_LARGE)
+        stored.extend(numbers)
+
+    def waveform(self) -> Samples:
+        """What the generator plays, one command per servo cycle; endless output is not there."""
+        points = self._points.get(self.table, [])
+        if not points:
+            raise Refusal(NO_WAVE_SELECTED)
+        if self.cycles < 1 or self.cycles * self.rate * len(points) > _LONGEST_RUN:
+            raise Refusal(OUT_OF_RANGE)
+        return np.tile(np.repeat(np.array(points) + self.offset, self.rate), self.cycles)

@@ -1,0 +1,80 @@
+"""`covariance`: how well a joint fit knows its numbers, where residuals are neither white nor alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.model import Model
+from ...record import Record
+from .normal_equations import Gram, Nuisance, residuals
+
+Array = NDArray[np.float64]
+
+UNKNOWN = 1e-10
+"""Relative size below which a direction of the numbers counts as undetermined and adds no variance."""
+
+
+def covariance(
+    model: Model,
+    records: Sequence[Record],
+    nuisance: Nuisance | None,
+    current: Sequence[Gram],
+    floors: Array,
+    directions: Array,
+) -> Array:
+    """Sandwich covariance (q, q): every record has its own residual variance and colour.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted.
+    records : sequence of Record
+        Those of the fit.
+    nuisance : Nuisance or None
+        Free per record.
+    current : sequence of Gram
+        Inner products at the fitted numbers.
+    floors : (r,) ndarray
+        Floor of every record [m].
+    directions : (q, p) ndarray
+        In which the q numbers may move.
+
+    Notes
+    -----
+    In the eigenvectors of the normal equations, brought to unit diagonal: nothing cancels, and no variance is negative.
+    A number of no influence has variance 0.
+    """
+    weights = [1.0 / (g.size * f * f) for g, f in zip(current, floors, strict=True)]
+    inner = [directions.T @ g.matrix[:-1, :-1] @ directions for g in current]
+    bread = sum(w * m for w, m in zip(weights, inner, strict=True))
+    meat = np.zeros_like(bread)
+    for w, m, e in zip(weights, inner, residuals(model, records, nuisance), strict=True):
+        variance = e @ e / max(1.0, e.size - directions.shape[1] / len(records))
+        meat += w * w * variance * colour(e) * m
+    diagonal = np.diag(bread)
+    scale = np.divide(
+        1.0, np.sqrt(np.abs(diagonal)), out=np.zeros(diagonal.size), where=diagonal > np.finfo(float).tiny
+    )
+    values, vectors = np.linalg.eigh(bread * np.outer(scale, scale))
+    known = values > UNKNOWN * values[-1]
+    vectors = scale[:, None] * vectors[:, known]
+    spread, axes = np.linalg.eigh(vectors.T @ meat @ vectors)
+    half = directions @ (vectors / values[known]) @ (axes * np.sqrt(np.clip(spread, 0.0, None)))
+    return np.asarray(half @ half.T)
+
+
+def colour(residual: Array, blocks: int = 64) -> float:
+    """How much more the slow part of a residual weighs than that of white noise of the same variance, at least 1.
+
+    Ratio of the variance of block means to its white value; up to 1.7 (three standard deviations for 64 blocks) counts
+    as white.
+    """
+    length = residual.size // blocks
+    if length < 2:
+        return 1.0
+    means = residual[: blocks * length].reshape(blocks, length).mean(axis=1)
+    ratio = float(means.var() * length / max(residual.var(), 1e-300))
+    return ratio if ratio > 1.7 else 1.0

@@ -1,0 +1,247 @@
+"""`fit`: all free parameters of a model jointly, in free run, by damped Gauss-Newton with analytic sensitivities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DivergenceError, IdentificationError, ParameterError
+from ...model.model import Model
+from ...record import Record
+from .bounded_step import bounded_step
+from .covariance import covariance
+from .normal_equations import Gram, Nuisance, grams, residuals
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+TRUSTED = 1.0
+"""Damping up to which a small decrease is a sign of the end."""
+MAX_DAMPING = 1e10
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Outcome of a joint fit.
+
+    Attributes
+    ----------
+    model : Model
+        With the fitted values.
+    names : tuple of str
+        Free numbers.
+    covariance : (q, q) ndarray
+        Of the free numbers, from residual variance and colour of every record.
+    cost : float
+        Mean over the records of (RMS residual / floor)².
+    rms : tuple of float
+        RMS residual of every record [m].
+    nuisances : tuple of ndarray
+        Per-record amplitudes [m].
+    at_bounds : tuple of str
+        Numbers that stopped at a bound of their table.
+    converged : bool
+        False where the iteration limit came first.
+    iterations : int
+        Linearisations used.
+    """
+
+    model: Model
+    names: tuple[str, ...]
+    covariance: Array
+    cost: float
+    rms: tuple[float, ...]
+    nuisances: tuple[Array, ...]
+    at_bounds: tuple[str, ...]
+    converged: bool
+    iterations: int
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted numbers by name."""
+        all_values = self.model.values()
+        return {n: all_values[n] for n in self.names}
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard error of every fitted number."""
+        return dict(zip(self.names, np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)).tolist(), strict=True))
+
+    def interval(self, name: str, sigmas: float = 1.96) -> tuple[float, float]:
+        """Interval of a fitted number, 95 % by default."""
+        value, error = self.values[name], self.standard_errors[name]
+        return value - sigmas * error, value + sigmas * error
+
+    def correlation(self, first: str, second: str) -> float:
+        """Correlation coefficient of two fitted numbers."""
+        i, j = self.names.index(first), self.names.index(second)
+        scale = np.sqrt(self.covariance[i, i] * self.covariance[j, j])
+        return float(self.covariance[i, j] / scale) if scale > 0.0 else 0.0
+
+
+def gauge(model: Model, names: Sequence[str]) -> Array:
+    """Directions (q, r) in which the free numbers may move with G(1) held.
+
+    Scaling w by c scales A, p1, p2 by c and b by 1/c: one direction is no information. With all of `b` free, b1 follows
+    from G(1) = B(1)/A(1).
+    """
+    directions = np.eye(len(names))
+    if "arx" not in model:
+        return directions
+    b = [i for i, n in enumerate(names) if n.startswith("arx.b[")]
+    if len(b) < len(model["arx"].array("b")) or not any(
+        n.startswith("bouc_wen.p2") or n.endswith("bouc_wen.p2") for n in names
+    ):
+        return directions
+    directions[b[0], b[1:]] = -1.0
+    for i, n in enumerate(names):
+        if n.startswith("arx.a["):
+            directions[b[0], i] = model["arx"].dc_gain  # type: ignore[attr-defined]
+    return np.delete(directions, b[0], axis=1)
+
+
+def weighted(grams_: Sequence[Gram], floors: Array) -> Array:
+    """Mean over the records of Gram/(size·floor²): every record counts the same."""
+    total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(grams_, floors, strict=True))
+    return total / len(grams_)
+
+
+def fit(
+    model: Model,
+    records: Sequence[Record],
+    free: Sequence[str],
+    *,
+    floors: Sequence[float] | None = None,
+    nuisance: Nuisance | None = None,
+    max_iterations: int = 40,
+    tolerance: float = 1e-6,
+    damping: float = 1e-3,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit the numbers `free` of `model` to the free-run displacement of `records`.
+
+    Minimises the mean over the records of (RMS residual / floor)², so that neither a long nor a noisy record decides.
+    Bounds of the parameter table and β ≥ |γ| are kept; G(1) is held where all of `arx.b` is free.
+
+    Parameters
+    ----------
+    model : Model
+        Start values.
+    records : sequence of Record
+        In experiment order.
+    free : sequence of str
+        Numbers to fit, e.g. ``"bouc_wen.beta"``, ``"arx.a[0]"``.
+    floors : sequence of float, optional
+        Floor of the residual of every record [m]; default 1 for all.
+    nuisance : Nuisance, optional
+        Free per record.
+    max_iterations : int
+        Linearisations at most.
+    tolerance : float
+        Relative decrease of the cost at which to stop.
+    damping : float
+        Of the first step, as a share of the diagonal; a start that is near needs little.
+    progress : callable, optional
+        Called with a word and the fraction done.
+
+    Raises
+    ------
+    IdentificationError
+        If nothing is free, or the start already diverges.
+    """
+    free = tuple(free)
+    if not free or not records:
+        raise IdentificationError(
+            f"fit: got {len(free)} free numbers and {len(records)} records, expected some of both"
+        )
+    sizes = np.ones(len(records)) if floors is None else np.asarray(floors, dtype=float)
+    lower = np.array([model.row(n).lower for n in free])
+    upper = np.array([model.row(n).upper for n in free])
+    values = model.values()
+    theta = np.array([values[n] for n in free])
+    directions = gauge(model, free)
+
+    try:
+        current = grams(model, records, free, nuisance)
+    except DivergenceError as error:
+        raise IdentificationError(f"fit: the start values diverge ({error})") from error
+    iterations, converged = 1, False
+    total = weighted(current, sizes)
+    while iterations < max_iterations and not converged:
+        hessian = directions.T @ total[:-1, :-1] @ directions
+        slope = directions.T @ total[:-1, -1]
+        # a number without influence: rounding may leave it below zero
+        idle = np.diag(hessian) <= np.finfo(float).tiny
+        hessian[idle, :] = hessian[:, idle] = 0.0
+        diagonal = np.where(idle, 1.0, np.diag(hessian))
+        low, high = _box(lower, theta, directions, -np.inf), _box(upper, theta, directions, np.inf)
+        while True:
+            step = directions @ bounded_step(hessian + np.diag(damping * diagonal), slope, low, high)
+            trial = _bounded(free, np.clip(theta + step, lower, upper))
+            better, cost = _try(model, records, free, trial, nuisance, sizes)
+            if better is not None and cost < total[-1, -1]:
+                break
+            damping = max(10.0 * damping, 1e-7)
+            if damping > MAX_DAMPING:
+                break
+        if damping > MAX_DAMPING or better is None:
+            converged = True
+            break
+        decrease = 1.0 - cost / total[-1, -1]
+        try:
+            current = grams(better, records, free, nuisance)
+        except DivergenceError:  # a bounded output of unbounded slopes is the edge of stability
+            break
+        model, theta = better, trial
+        damping = max(damping / 10.0, 1e-12)
+        total = weighted(current, sizes)
+        iterations += 1
+        converged = decrease < tolerance and damping < TRUSTED  # a step that was held back tells nothing
+        if progress is not None:
+            progress("joint fit", iterations / max_iterations)
+    return Fit(
+        model=model,
+        names=free,
+        covariance=covariance(model, records, nuisance, current, sizes, directions),
+        cost=float(total[-1, -1]),
+        rms=tuple(g.rms for g in current),
+        nuisances=tuple(g.nuisance for g in current),
+        at_bounds=tuple(n for n, v, a, b in zip(free, theta, lower, upper, strict=True) if v in (a, b)),
+        converged=converged,
+        iterations=iterations,
+    )
+
+
+def _box(limits: Array, theta: Array, directions: Array, open_end: float) -> Array:
+    """How far every direction may go; without end where it moves several numbers."""
+    room = np.full(directions.shape[1], open_end)
+    for j, column in enumerate(directions.T):
+        (moved,) = np.nonzero(column)
+        if moved.size == 1:
+            room[j] = limits[moved[0]] - theta[moved[0]]
+    return room
+
+
+def _bounded(names: Sequence[str], theta: Array) -> Array:
+    """|γ| ≤ β: an unbounded Bouc-Wen is no piezo (Ismail et al. 2009)."""
+    theta = theta.copy()
+    for i, name in enumerate(names):
+        owner, _, parameter = name.partition(".")
+        if parameter == "gamma" and f"{owner}.beta" in names:
+            beta = theta[names.index(f"{owner}.beta")]
+            theta[i] = np.clip(theta[i], -beta, beta)
+    return theta
+
+
+def _try(
+    model: Model, records: Sequence[Record], free: Sequence[str], trial: Array, nuisance: Nuisance | None, floors: Array
+) -> tuple[Model | None, float]:
+    try:
+        candidate = model.with_values(dict(zip(free, trial.tolist(), strict=True)))
+        left = residuals(candidate, records, nuisance)
+        return candidate, float(np.mean([e @ e / (e.size * f * f) for e, f in zip(left, floors, strict=True)]))
+    except (DivergenceError, ParameterError):
+        return None, np.inf

@@ -1,0 +1,176 @@
+"""The joint fit in free run: hysteresis and dynamics together, of the order that the data support."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from ...effects import Arx
+from ...errors import IdentificationError
+from ...model.model import Model
+from ...record import Notice, Record
+from ..records.conditioning import select
+from ..steps.dynamics import Dynamics
+from ..steps.hysteresis import LOOP, hysteresis_name
+from ..steps.linear_start import dynamics_behind, dynamics_of, follower, with_dynamics
+from .fit import Fit, Progress, fit
+from .normal_equations import Nuisance, residuals
+
+FINER = 100
+"""Sample periods of a pure lag per sample of the record."""
+SLOWEST_POLE = 0.1
+"""Longest time constant of G, as share of the longest record: slower ones are drift in disguise."""
+NEAR = 1e-7
+"""Damping of a fit that starts from a linear one: more of it only slows the directions that hardly matter."""
+
+
+def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Fit:
+    """Joint fit of the hysteresis and of a lag: dead time with one pole, or dead time alone, whichever fits better.
+
+    Parameters
+    ----------
+    model : Model
+        With a hysteresis that has been fitted; its dynamics are replaced.
+    records : sequence of Record
+        The experiment, in order.
+    floors : sequence of float
+        Floor of every record [m].
+    fitted : collection of int
+        Indices of the records to fit.
+    """
+    kept, sizes = select(records, floors, fitted)
+    name, gain = hysteresis_name(model), dynamics_of(model).dc_gain
+    loop = [f"{name}.{n}" for n in LOOP]
+    period = model.sample_period
+    starts = [
+        (Arx(a=(-pole,), b=(gain * (1.0 - pole),), delay=dead), period, ["arx.a[0]", "arx.b[0]", "arx.delay"])
+        for pole in (0.2, 0.8)
+        for dead in (1.0, 2.0)
+    ]
+    starts += [(Arx(a=(), b=(gain,), delay=lag * FINER), period / FINER, ["arx.delay"]) for lag in (0.2, 1.0, 3.0)]
+    fits = []
+    for arx, at, free in starts:
+        start = Model((model[name], arx), at, model.voltage_scale, model.displacement_scale)
+        fits.append(fit(start, kept, [*loop, *free], floors=sizes, nuisance=Nuisance(offset=True)))
+    simplest = min((f for f in fits if len(f.names) == len(loop) + 1), key=lambda f: f.cost)
+    best = min(fits, key=lambda f: f.cost)
+    return simplest if simplest.cost <= 1.01 * best.cost else best
+
+
+def fit_joint(
+    model: Model,
+    records: Sequence[Record],
+    floors: Sequence[float],
+    fitted: Collection[int],
+    progress: Progress | None = None,
+) -> Fit:
+    """Joint fit of hysteresis and ARX at a fixed delay, a free offset per record, G(1) held.
+
+    Parameters
+    ----------
+    model : Model
+        Start values.
+    records : sequence of Record
+        The experiment, in order.
+    floors : sequence of float
+        Floor of every record [m].
+    fitted : collection of int
+        Indices of the records to fit.
+    progress : callable, optional
+        Called with a word and the fraction done.
+    """
+    kept, sizes = select(records, floors, fitted)
+    free = [f"{hysteresis_name(model)}.{n}" for n in LOOP]
+    free += [f"arx.{n}" for n in dynamics_of(model).free_names() if n != "delay"]
+    return fit(model, kept, free, floors=sizes, nuisance=Nuisance(offset=True), damping=NEAR, progress=progress)
+
+
+def fit_dynamics(
+    model: Model,
+    records: Sequence[Record],
+    floors: Sequence[float],
+    fitted: Collection[int],
+    broadband: Collection[int],
+    delay: int,
+    orders: tuple[int, int],
+    progress: Progress | None = None,
+) -> tuple[Fit, Dynamics, tuple[Notice, ...]]:
+    """Start from ARX behind the hysteresis, then fit jointly; lower the order until the outcome is sound.
+
+    Parameters
+    ----------
+    model : Model
+        With its hysteresis fitted.
+    records : sequence of Record
+        The experiment, in order.
+    floors : sequence of float
+        Floor of every record [m].
+    fitted, broadband : collection of int
+        Indices of the records of the joint fit, and of those for its start.
+    delay : int
+        d, samples.
+    orders : (int, int)
+        Highest na and nb.
+    progress : callable, optional
+        Called with a word and the fraction done.
+
+    Returns
+    -------
+    joint : Fit
+        The first sound one, or else the closest.
+    dynamics : Dynamics
+        ARX from w that it started from.
+    notices : tuple of Notice
+        ``order_reduced`` where the orders asked for are not supported by the data.
+    """
+    longest = max(records[i].duration for i in fitted)
+    tried: list[tuple[Fit, Dynamics]] = []
+    for order in _ladder(orders):
+        start, dynamics = _start(model, records, floors, broadband, delay, order)
+        joint = fit_joint(start, records, floors, fitted, progress)
+        if joint.converged and _slowest(joint.model) < SLOWEST_POLE * longest:
+            break
+        tried.append((joint, dynamics))
+    else:
+        joint, dynamics = min(tried, key=lambda outcome: outcome[0].cost)
+    used = dynamics_of(joint.model)
+    reached = used.array("a").size, used.array("b").size
+    notices = dynamics.notices
+    if reached != orders:
+        told = f"na, nb = {orders[0]}, {orders[1]} are more than the data support; {reached[0]}, {reached[1]} were used"
+        notices += (Notice("order_reduced", told),)
+    return joint, dynamics, notices
+
+
+def _ladder(orders: tuple[int, int]) -> list[tuple[int, int]]:
+    return [orders, *((n, n) for n in (6, 4, 3, 2, 1) if n < min(orders))]
+
+
+def _slowest(model: Model) -> float:
+    """Longest time constant of the dynamics [s]."""
+    return -model.sample_period / float(np.log(max(dynamics_of(model).pole_radius, 1e-300)))
+
+
+def _start(
+    model: Model,
+    records: Sequence[Record],
+    floors: Sequence[float],
+    broadband: Collection[int],
+    delay: int,
+    orders: tuple[int, int],
+) -> tuple[Model, Dynamics]:
+    """Start of the joint fit, the better of ARX behind the hysteresis and one pole; and the ARX."""
+    dynamics = dynamics_behind(model, records, broadband, delay, orders)
+    candidates = [model.with_effect(follower(model, delay, orders))]
+    try:
+        candidates.append(with_dynamics(model, dynamics.arx))
+    except IdentificationError:
+        return candidates[0], dynamics
+    kept, sizes = select(records, floors, broadband)
+
+    def cost(candidate: Model) -> float:
+        errors = residuals(candidate, kept, Nuisance(offset=True))
+        return float(sum(np.mean(e**2) / f**2 for e, f in zip(errors, sizes, strict=True)))
+
+    return min(candidates, key=cost), dynamics

@@ -1,0 +1,146 @@
+"""Inner products of residual, sensitivities and nuisances of every record: all that fitting and score tests need.
+
+The matrices are small, so records of any length are summed up block by block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects.environment.mains_hum import harmonics
+from ...errors import DivergenceError
+from ...model.model import Model
+from ...record import Record
+
+Array = NDArray[np.float64]
+
+RUNAWAY = 1e100
+"""Inner products beyond this are those of a simulation that diverges."""
+
+
+@dataclass(frozen=True, slots=True)
+class Nuisance:
+    """What is free and linear in every record, and is eliminated exactly.
+
+    Parameters
+    ----------
+    offset : bool
+        A sensor zero of its own per record.
+    hum_frequency : float, optional
+        Mains frequency [Hz] whose amplitude and phase are free per record.
+    harmonics : int
+        Harmonics of the hum.
+    """
+
+    offset: bool = False
+    hum_frequency: float | None = None
+    harmonics: int = 3
+
+    def rows(self, record: Record, part: slice) -> Array:
+        """Basis functions, shape (k, n)."""
+        size = part.stop - part.start
+        rows = [np.ones(size)] if self.offset else []
+        if self.hum_frequency is not None:
+            t = record.sample_period * np.arange(part.start, part.stop)
+            waves = zip(*harmonics(self.hum_frequency, self.harmonics, t), strict=True)
+            for order, (cosine, sine) in enumerate(waves, 1):
+                line = order * self.hum_frequency * record.sample_period
+                # a line that the sample period folds onto dc is averaged away, and would free the offset
+                if abs(line - round(line)) * record.size > 1.0:
+                    rows += [cosine, sine]
+        return np.array(rows).reshape(len(rows), size)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Gram:
+    """Inner products of one record after elimination of its nuisances.
+
+    Parameters
+    ----------
+    size : int
+        Number of samples.
+    matrix : (q + k + 1, q + k + 1) ndarray
+        Of the q sensitivities in the order asked for, of k extra rows, and of the residual, which comes last.
+    nuisance : (k,) ndarray
+        Amplitudes of the nuisances at the present parameters.
+    """
+
+    size: int
+    matrix: Array
+    nuisance: Array
+
+    @property
+    def rms(self) -> float:
+        """RMS residual [m]."""
+        return float(np.sqrt(max(self.matrix[-1, -1], 0.0) / self.size))
+
+
+def grams(
+    model: Model,
+    records: Sequence[Record],
+    wanted: Sequence[str] = (),
+    nuisance: Nuisance | None = None,
+    extra: Sequence[Array] | None = None,
+) -> list[Gram]:
+    """Inner products for every record.
+
+    Parameters
+    ----------
+    model : Model
+        Simulated free-run.
+    records : sequence of Record
+        In experiment order, so that those that continue do.
+    wanted : sequence of str
+        Numbers of the model whose sensitivities enter, e.g. ``"creep.gamma"``.
+    nuisance : Nuisance, optional
+        Eliminated per record.
+    extra : sequence of (k, n) ndarray, optional
+        Further rows of every record, e.g. finite changes of the simulation.
+
+    Raises
+    ------
+    DivergenceError
+        If the output or a sensitivity leaves every range.
+    """
+    nuisance = nuisance or Nuisance()
+    q = len(wanted) + (len(extra[0]) if extra else 0)
+    sums: list[Array] = []
+    for index, part, y, names, slopes in model.linearise(records, wanted):
+        record = records[index]
+        beside = [(record.displacement[part] - y)[None, :], nuisance.rows(record, part)]
+        others: Array = np.concatenate([extra[index][:, part], *beside] if extra else beside)
+        order = [names.index(name) for name in wanted]
+        product = np.empty((len(wanted) + len(others),) * 2)
+        own, rest = slice(len(wanted)), slice(len(wanted), None)
+        product[own, own] = (slopes @ slopes.T)[np.ix_(order, order)]
+        product[own, rest] = np.array([slopes @ row for row in others]).T[order]
+        product[rest, own], product[rest, rest] = product[own, rest].T, others @ others.T
+        if not np.abs(product).max() < RUNAWAY:
+            raise DivergenceError(model.effects[-1].name, part.start, part.start * record.sample_period)
+        if index == len(sums):
+            sums.append(product)
+        else:
+            sums[index] += product
+    result = []
+    for record, total in zip(records, sums, strict=True):
+        inner, cross, free = total[: q + 1, : q + 1], total[q + 1 :, : q + 1], total[q + 1 :, q + 1 :]
+        amplitudes: Array = np.linalg.lstsq(free, cross, rcond=None)[0].astype(np.float64) if len(free) else cross
+        result.append(Gram(record.size, inner - cross.T @ amplitudes, amplitudes[:, -1].copy()))
+    return result
+
+
+def residuals(model: Model, records: Sequence[Record], nuisance: Nuisance | None = None) -> list[Array]:
+    """Measured minus free-run displacement of every record [m], nuisances removed."""
+    nuisance = nuisance or Nuisance()
+    result = []
+    for record, y in zip(records, model.simulate(records), strict=True):
+        residual = record.displacement - y
+        rows = nuisance.rows(record, slice(0, record.size))
+        if len(rows):
+            residual = residual - np.linalg.lstsq(rows @ rows.T, rows @ residual, rcond=None)[0] @ rows
+        result.append(residual)
+    return result

@@ -1,0 +1,59 @@
+"""The way into the first full loop of a record that begins in an unknown state.
+
+Hysteresis forgets what came before once the drive has been at both ends of its range: the samples up to there carry
+the state and are not fitted, those behind it are as good as any.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...record import Experiment, Notice, Record
+from .roles import CARRYING
+
+AT_THE_END = 0.02
+"""Distance from an end of the range of the drive, as share of the range, that counts as having been there."""
+LONGEST = 0.5
+"""Share of a record that may be given up for it."""
+
+
+def lead_in(record: Record) -> int:
+    """Samples until the drive has been at both ends of its range; 0 where too few would be left.
+
+    Examples
+    --------
+    >>> drive = np.sin(2 * np.pi * np.arange(1000) / 200)
+    >>> 140 < lead_in(Record(drive, drive, 1e-3)) < 150
+    True
+    """
+    u = record.voltage
+    near = AT_THE_END * float(np.ptp(u))
+    if near == 0.0:
+        return 0
+    samples = 1 + max(int(np.argmax(u <= u.min() + near)), int(np.argmax(u >= u.max() - near)))
+    return samples if samples <= LONGEST * record.size else 0
+
+
+def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice, ...]]:
+    """Every truncated record cut in two: a conditioning phase up to the first full loop, and the rest, which continues.
+
+    Returns
+    -------
+    experiment : Experiment
+        The same samples.
+    notices : tuple of Notice
+        ``lead_in`` where a record was cut.
+    """
+    records: list[Record] = []
+    notices: list[Notice] = []
+    for record in experiment:
+        samples = lead_in(record) if record.truncated and record.phase not in CARRYING else 0
+        if samples:
+            records.append(replace(record[:samples], phase=CARRYING[0]))
+            record = replace(record[samples:], truncated=False, initial_voltage=None)
+            told = f"begins in an unknown state: its first {samples} samples, up to a full loop, only carry the state"
+            notices.append(Notice("lead_in", told, record.phase))
+        records.append(record)
+    return replace(experiment, records=tuple(records)), tuple(notices)

@@ -1,0 +1,142 @@
+"""`Content`: what a record can teach, judged from its drive: loops, dynamics, noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...record import Record, Samples
+
+SLOW = 30.0
+"""Drives below this [Hz] show the dynamics of a stage as a lag only."""
+MANY_LINES = 48
+"""Spectral lines that a drive must hold to determine orders of dynamics."""
+MANY_MOMENTS = 12.0
+"""Samples over which its changes must be spread: one step is not enough."""
+MARKED = 0.95
+"""Share of the power of dv/dt by which bandwidth and lines are counted."""
+UNMEASURED = 5e-4
+"""Share of the range below which the highest frequencies of a drive are noise of its recorder, no excitation."""
+GAUSSIAN = 1.4826
+"""Standard deviation over median absolute value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What the drive of a record excites, and how quiet its sensor is.
+
+    Parameters
+    ----------
+    span : float
+        Range of the drive, the settled voltage before it included [V].
+    bandwidth : float
+        Frequency below which 95 % of the power of dv/dt lies [Hz].
+    lines : int
+        Number of spectral lines that hold 95 % of it.
+    moments : float
+        Over how many samples its changes are spread, (Σ x²)²/Σ x⁴ of dv or d²v, whichever is less: a jump in a slow
+        drive holds little of dv, but all of d²v.
+    noise : float
+        Standard deviation of the sensor noise [m].
+    """
+
+    span: float
+    bandwidth: float
+    lines: int
+    moments: float
+    noise: float
+
+    @property
+    def is_broadband(self) -> bool:
+        """True where the drive determines linear dynamics."""
+        return self.bandwidth > SLOW and self.lines >= MANY_LINES and self.moments >= MANY_MOMENTS
+
+    @property
+    def is_slow(self) -> bool:
+        """True where the stage follows the drive but for a lag."""
+        return self.bandwidth <= SLOW
+
+
+def content_of(record: Record) -> Content:
+    """Judge a record by the spectrum of its dv/dt and the noise of its displacement."""
+    span = float(np.ptp(np.append(record.voltage, record.settled_voltage)))
+    spectrum = _excitation(np.diff(record.voltage), span)
+    power = np.abs(spectrum) ** 2
+    total = float(power.sum())
+    if total == 0.0:
+        return Content(span, 0.0, 0, 0.0, noise_of(record))
+    speed = np.fft.irfft(spectrum, record.size - 1)
+    frequency = np.arange(power.size) / (speed.size * record.sample_period)
+    bandwidth = float(frequency[np.searchsorted(np.cumsum(power), MARKED * total)])
+    lines = int(np.searchsorted(np.cumsum(np.sort(power)[::-1]), MARKED * total)) + 1
+    return Content(span, bandwidth, lines, min(_spread(speed), _spread(np.diff(speed))), noise_of(record))
+
+
+def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:
+    """Spectrum of dv, without the highest frequencies in which v moves no more than its recorder's noise would."""
+    if not speed.size:
+        return np.zeros(1, np.complex128)
+    spectrum = np.fft.rfft(speed)
+    angle = np.pi * np.arange(spectrum.size) / speed.size
+    position = np.abs(spectrum[1:]) ** 2 / np.sin(angle[1:]) ** 2 / (2.0 * speed.size**2)
+    beyond = np.cumsum(position[::-1])[::-1]  # power of v from each line on [V²]
+    spectrum[1:][beyond < (UNMEASURED * span) ** 2] = 0.0
+    return spectrum
+
+
+def _spread(values: Samples) -> float:
+    """Over how many samples the power of a signal is spread."""
+    squares = values * values
+    fourth = float(squares @ squares)
+    return float(squares.sum()) ** 2 / fourth if fourth > 0.0 else 0.0
+
+
+def noise_of(record: Record, fewest: int = 64) -> float:
+    """Standard deviation of the sensor noise [m].
+
+    From the longest rest of the record, a parabola removed; without a rest of `fewest` samples from third differences,
+    which a smooth motion leaves near zero.
+    """
+    y = record.displacement
+    moves = np.flatnonzero(np.concatenate(([True], np.diff(record.voltage) != 0.0, [True])))
+    longest = int(np.argmax(np.diff(moves))) if moves.size > 1 else 0
+    start, stop = (int(moves[longest]), int(moves[longest + 1])) if moves.size > 1 else (0, y.size)
+    # The stage rings after the drive stops: the later half is the rest.
+    start += (stop - start) // 2 if start > 0 else 0
+    if stop - start >= fewest:
+        t = np.linspace(-1.0, 1.0, stop - start)
+        rest = y[start:stop] - np.polynomial.Polynomial.fit(t, y[start:stop], 2)(t)
+        return float(np.std(rest))
+    if y.size < 8:
+        return 0.0
+    return noise_on_motion(y, 3)
+
+
+def noise_on_motion(values: Samples, order: int) -> float:
+    """Standard deviation of the noise on a smooth motion, from differences of the order given: robust, and white.
+
+    The differences have the squares of the binomial coefficients for power, in all C(2 order, order).
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).normal(0.0, 0.1, 100_000)
+    >>> round(noise_on_motion(np.sin(np.arange(100_000) / 300.0) + noise, 3), 2)
+    0.1
+    """
+    typical = np.median(np.abs(np.diff(values, order)))
+    return float(GAUSSIAN * typical / np.sqrt(math.comb(2 * order, order)))
+
+
+def excited_part(record: Record, window: int = 64) -> Record:
+    """The part of a broadband record between its ramps: where the drive is curved throughout, not straight."""
+    curvature = np.abs(np.diff(record.voltage, 2))
+    if curvature.size <= window or curvature.max() == 0.0:
+        return record
+    curved = curvature > 0.1 * np.quantile(curvature, 0.95)
+    dense = np.convolve(curved, np.full(window, 1.0 / window), mode="same") > 0.5
+    if not dense.any():
+        return record
+    return record[int(np.argmax(dense)) : dense.size - int(np.argmax(dense[::-1]))]

@@ -1,0 +1,74 @@
+"""The jump with which a record begins: a step experiment within a slow one, that shows delay and lag.
+
+At one frequency a lag and a narrow play turn the loop alike. Only the first moments behind a jump tell them apart, and
+they are few: as a block of their own they keep the weight that they deserve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...record import Record
+
+Blocks = tuple[Sequence[Record], Sequence[float], Collection[int]]
+"""Records in order, the floor of each [m], and the indices of those to fit."""
+
+SUDDEN = 10.0
+"""A jump is so many times steeper than the drive usually is."""
+LARGE = 0.05
+"""Share of the range of the drive that it spans."""
+FEWEST = 8
+"""Samples behind it at least."""
+WEIGHT = 1 / 16
+"""Weight of a jump beside that of the record it begins."""
+
+
+def step_length(record: Record) -> int:
+    """Samples from the jump at the begin of a record until the drive has gone as far again; 0 without a jump.
+
+    Examples
+    --------
+    >>> drive = 1.0 + np.arange(400) / 128
+    >>> step_length(Record(drive, drive, 0.01, initial_voltage=0.0))
+    128
+    """
+    jump = abs(float(record.voltage[0]) - record.settled_voltage)
+    speed = np.abs(np.diff(record.voltage))
+    if speed.size == 0 or jump < SUDDEN * float(np.median(speed)):
+        return 0
+    if jump < LARGE * float(np.ptp(np.append(record.voltage, record.settled_voltage))):
+        return 0
+    length = 1 + int(np.searchsorted(np.cumsum(speed), jump))
+    return length if FEWEST <= length < record.size - FEWEST else 0
+
+
+def steps_apart(records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Blocks:
+    """Records, floors and indices to fit, the jump of every fitted record a block of its own.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The experiment, in order.
+    floors : sequence of float
+        Floor of every record [m]; that of a jump grows, so that it weighs `WEIGHT` of its record.
+    fitted : collection of int
+        Indices of the records to fit.
+    """
+    parts: list[Record] = []
+    sizes: list[float] = []
+    wanted: list[int] = []
+    for index, (record, floor) in enumerate(zip(records, floors, strict=True)):
+        length = 0 if record.continues or index not in fitted else step_length(record)
+        if length:
+            wanted.append(len(parts))
+            parts.append(record[:length])
+            sizes.append(floor / WEIGHT**0.5)
+            record = replace(record[length:], initial_voltage=None)
+        if index in fitted:
+            wanted.append(len(parts))
+        parts.append(record)
+        sizes.append(floor)
+    return parts, sizes, wanted

@@ -1,0 +1,84 @@
+"""`Roles`: which record of an experiment serves which purpose, by its phase name or else by what its drive excites."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from ...errors import RecordError
+from ...record import Experiment
+from .excitation_content import Content, content_of
+
+HELD_OUT = ("validation",)
+"""Phases that are not fitted, unless told otherwise."""
+CARRYING = ("conditioning",)
+"""Phases that bring the stage into a known state; what happened before them is not known."""
+LARGE = 0.5
+"""Share of the largest drive range from which a slow record counts as loops."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Roles:
+    """Indices of the records of an experiment by purpose.
+
+    Parameters
+    ----------
+    contents : tuple of Content
+        Of every record.
+    fitted : tuple of int
+        Records of the joint fit.
+    held_out : tuple of int
+        Records that only judge it.
+    loops : tuple of int
+        Slow records with large loops: they show the hysteresis behind a gain and a lag.
+    broadband : tuple of int
+        Records at the fastest sample period whose drive determines linear dynamics.
+    """
+
+    contents: tuple[Content, ...]
+    fitted: tuple[int, ...]
+    held_out: tuple[int, ...]
+    loops: tuple[int, ...]
+    broadband: tuple[int, ...]
+
+
+def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Roles:
+    """Sort the records of an experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Records of any kind.
+    held_out : collection of str
+        Names of phases that are not fitted.
+
+    Raises
+    ------
+    RecordError
+        If one of `held_out`, other than those of `HELD_OUT`, is no phase of the experiment, or nothing else is left.
+    """
+    names = ", ".join(dict.fromkeys(r.phase for r in experiment))
+    for phase in held_out:
+        if phase not in HELD_OUT and not experiment.named(phase):
+            raise RecordError(f"held_out: got phase '{phase}', expected some of {names}")
+    contents = tuple(content_of(r) for r in experiment)
+    named = {phase: experiment.named(phase) for phase in (*held_out, *CARRYING)}
+
+    def is_one_of(index: int, phases: Collection[str]) -> bool:
+        return any(experiment[index] is record for phase in phases for record in named[phase])
+
+    indices = range(len(experiment))
+    out = tuple(i for i in indices if is_one_of(i, held_out))
+    if len(out) == len(experiment):
+        if not set(held_out) <= set(HELD_OUT):
+            raise RecordError(f"held_out: got every phase ({names}), expected at least one that is fitted")
+        out = ()
+    left = [i for i in indices if i not in out]
+    fitted = tuple(i for i in left if not is_one_of(i, CARRYING) and not experiment[i].truncated) or tuple(left)
+    largest = max((contents[i].span for i in fitted), default=0.0)
+    slow = [i for i in fitted if contents[i].is_slow and contents[i].span >= LARGE * largest > 0.0]
+    triangles = [i for i in slow if experiment[i].phase.split("_")[0] == "triangle"]
+    moving = [i for i in fitted if contents[i].span >= LARGE * largest > 0.0]
+    fastest = experiment.fastest_period
+    broadband = [i for i in fitted if contents[i].is_broadband and experiment[i].sample_period < 1.001 * fastest]
+    return Roles(contents, fitted, out, tuple(triangles or slow or moving), tuple(broadband))

@@ -1,0 +1,109 @@
+"""`Comparison`: ARX from v against ARX from w, at each amplitude of the noise.
+
+Where they disagree, something between v and y depends on amplitude or forgets: the state of a Bouc-Wen operator under
+noise (its gain at low frequency falls towards that of the polynomial), backlash, an amplitude-dependent gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model.model import Model
+from ...record import Notice, Record
+from ..records.excitation_content import excited_part
+from .dynamics import Dynamics, identify_arx
+from .linear_start import dynamics_behind
+from .regressors import Signals
+from .three_steps import voltage_signals
+
+LOW, HIGH = 20.0, 500.0
+"""Frequencies [Hz] between which the shape of G is compared."""
+TOLERANCE = 0.05
+"""Relative difference from which it is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """G seen from v and from w at one noise amplitude.
+
+    Parameters
+    ----------
+    amplitude : float
+        RMS of the drive about its mean [V].
+    from_v, from_w : float
+        |G(20 Hz)|/|G(500 Hz)|.
+    lag_from_v, lag_from_w : float
+        Phase lag at 500 Hz as a time [s].
+    gain_from_w : float
+        |G(500 Hz)| from w.
+    """
+
+    amplitude: float
+    from_v: float
+    from_w: float
+    lag_from_v: float
+    lag_from_w: float
+    gain_from_w: float
+
+    def __str__(self) -> str:
+        return (
+            f"noise {self.amplitude:.3g} V rms: |G({LOW:g} Hz)|/|G({HIGH:g} Hz)| = {self.from_v:.3f} from v, "
+            f"{self.from_w:.3f} from w; lag {self.lag_from_v * 1e6:.4g} and {self.lag_from_w * 1e6:.4g} µs"
+        )
+
+
+def _shape(dynamics: Dynamics) -> tuple[float, float, float]:
+    low, high = dynamics.response(np.array([LOW, HIGH]))
+    return abs(low) / abs(high), float(-np.angle(high)) / (2.0 * np.pi * HIGH), abs(high)
+
+
+def compare_inputs(
+    model: Model, records: Sequence[Record], noise: Collection[int], delay: int, orders: tuple[int, int]
+) -> tuple[tuple[Comparison, ...], tuple[Notice, ...]]:
+    """Identify G from v and from w of the model, separately for every noise amplitude.
+
+    Parameters
+    ----------
+    model : Model
+        With its hysteresis fitted.
+    records : sequence of Record
+        The experiment, in order.
+    noise : collection of int
+        Indices of the noise records, at the model's sample period.
+    delay : int
+        d, samples.
+    orders : (int, int)
+        na and nb.
+
+    Returns
+    -------
+    comparisons : tuple of Comparison
+        In rising order of amplitude; records within 20 % of one another count as one amplitude.
+    notices : tuple of Notice
+        ``inputs_disagree`` where v and w do, ``amplitude_dependent`` where two amplitudes of the noise do.
+    """
+    rms = {i: float(np.std(excited_part(records[i]).voltage)) for i in noise}
+    groups: list[list[int]] = []
+    for index in sorted(rms, key=lambda i: rms[i]):
+        if groups and rms[index] <= 1.2 * rms[groups[-1][0]]:
+            groups[-1].append(index)
+        else:
+            groups.append([index])
+    comparisons = []
+    for group in groups:
+        signals: Signals = voltage_signals([records[i] for i in group], model.voltage_scale, model.displacement_scale)
+        shape_v, lag_v, _ = _shape(identify_arx(signals, delay, model.sample_period, orders))
+        shape_w, lag_w, gain_w = _shape(dynamics_behind(model, records, group, delay, orders))
+        comparisons.append(Comparison(float(np.mean([rms[i] for i in group])), shape_v, shape_w, lag_v, lag_w, gain_w))
+    notices = []
+    worst = max(comparisons, key=lambda c: abs(c.from_v / c.from_w - 1.0), default=None)
+    if worst is not None and abs(worst.from_v / worst.from_w - 1.0) > TOLERANCE:
+        notices.append(Notice("inputs_disagree", f"G differs as seen from v and from w; {worst}", "noise"))
+    gains = [c.gain_from_w for c in comparisons]
+    if len(gains) > 1 and max(gains) > (1.0 + TOLERANCE) * min(gains):
+        told = ", ".join(f"{c.gain_from_w:.4g} at {c.amplitude:.3g} V" for c in comparisons)
+        notices.append(Notice("amplitude_dependent", f"|G({HIGH:g} Hz)| depends on the amplitude: {told}", "noise"))
+    return tuple(comparisons), tuple(notices)

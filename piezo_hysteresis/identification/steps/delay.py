@@ -1,0 +1,171 @@
+"""Step 1: the delay, from the onset of the step response (paper, Sec. 3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm, t
+
+from ...errors import IdentificationError
+from ...record import Notice, Record
+from .step_response import StepResponse, step_response
+
+SURE = 5.0
+"""Standard deviations beyond which a sample alone is response, not noise."""
+LIKELY = 2.0
+"""Standard deviations that suffice where the samples behind it point to the same onset."""
+
+
+@dataclass(frozen=True, slots=True)
+class Onset:
+    """First responding sample at one sample time, and the interval of time in which the response began.
+
+    Parameters
+    ----------
+    sample_period : float
+        Sample time [s].
+    samples : int
+        Delay d in samples of that time.
+    earliest, latest : float
+        The response began after `earliest` and not later than `latest` [s].
+    """
+
+    sample_period: float
+    samples: int
+    earliest: float
+    latest: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Delay:
+    """Delay of the stage, judged at several sample times.
+
+    Parameters
+    ----------
+    samples : int
+        Delay d of Eq. (4) at the finest sample period.
+    onsets : tuple of Onset
+        The answer at each sample time, finest first.
+    response : StepResponse
+        Averaged step response at the finest sample period.
+    notices : tuple of Notice
+        What limits the answer: ``delay_ambiguous``, ``delay_inconsistent``, ``delay_unresolved``.
+    """
+
+    samples: int
+    onsets: tuple[Onset, ...]
+    response: StepResponse
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def sample_period(self) -> float:
+        """Sample period of `samples` [s]."""
+        return self.response.sample_period
+
+    @property
+    def time(self) -> float:
+        """Delay [s]."""
+        return self.samples * self.sample_period
+
+    @property
+    def is_resolved(self) -> bool:
+        """False where the response is already half done at its first sample: the delay is below one sample."""
+        return all(n.kind != "delay_unresolved" for n in self.notices)
+
+    def __str__(self) -> str:
+        first = self.onsets[0]
+        told = f"{first.earliest * 1e6:.4g} to {first.latest * 1e6:.4g} µs"
+        return (
+            f"delay {self.samples} samples of {self.sample_period * 1e6:.4g} µs ({told}, {self.response.edges} edges)"
+        )
+
+
+def _onset(response: StepResponse) -> tuple[int, float, float, list[str]]:
+    """First responding sample, its interval in samples, and what makes it doubtful."""
+    mean = response.mean * np.sign(response.mean[np.argmax(np.abs(response.mean))])
+    threshold = float(t.isf(norm.sf(SURE), response.freedom))
+    beyond = mean > threshold * response.deviation
+    sure = beyond & np.append(beyond[1:], True)
+    if not sure.any():
+        raise IdentificationError(
+            f"delay: no sample of the averaged step response exceeds {threshold:.2g} standard deviations of the noise; "
+            "use higher steps or more of them"
+        )
+    onset = int(np.argmax(sure))
+    doubts = []
+    earliest = onset - 1
+    while onset > 0 and onset + 1 < mean.size:
+        # A stage with mass starts as the square of time: its root is a line that ends at the onset.
+        first, second = np.sqrt(mean[onset]), np.sqrt(max(mean[onset + 1], mean[onset]))
+        start = onset - first / max(second - first, 1e-300)
+        expected = mean[onset] * (max(onset - 1 - start, 0.0) / (onset - start)) ** 2
+        if start >= onset - 1 or abs(mean[onset - 1] - expected) > SURE * response.deviation[onset - 1]:
+            break
+        doubts.append("delay_ambiguous")
+        earliest = onset - 2
+        if mean[onset - 1] <= LIKELY * response.deviation[onset - 1]:
+            break
+        onset -= 1
+    final = float(np.max(mean))
+    if onset <= 1 and mean[onset] > 0.1 * final:
+        doubts.append("delay_unresolved")
+    return onset, max(earliest, 0), float(onset), doubts
+
+
+def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 3, 5)) -> Delay:
+    """Delay from the onset of the step response, at the finest sample period and at multiples of it.
+
+    The onset is the first sample beyond five standard deviations of the averaged response. A sample below that, but
+    beyond two, is the onset where the quadratic start of the response behind it points there too.
+
+    Parameters
+    ----------
+    records : iterable of Record
+        Records with steps; the finest sample period among them decides, slower ones are compared.
+    factors : tuple of int
+        Sample times to compare, as multiples of the finest period.
+
+    Returns
+    -------
+    Delay
+        Delay in samples, the answer at each sample time and what makes it doubtful.
+
+    Raises
+    ------
+    IdentificationError
+        If there is no step, or no response above the noise.
+
+    Notes
+    -----
+    Paper, Sec. 3.2. The cost of a fit does not give the delay: neighbouring integers tie, b1 being small.
+    """
+    records = tuple(records)
+    if not records:
+        raise IdentificationError("delay: got no record, expected at least one with steps")
+    finest = min(r.sample_period for r in records)
+    fine = [r for r in records if r.sample_period < 1.001 * finest]
+    response = step_response(fine)
+    samples, first, last, doubts = _onset(response)
+    onsets = [Onset(finest, samples, first * finest, last * finest)]
+    others = [(fine, factor) for factor in factors if factor > 1]
+    others += [([r], 1) for r in records if r.sample_period >= 1.001 * finest]
+    for part, factor in others:
+        try:
+            at = step_response(part, factor)
+            n, low, high, _ = _onset(at)
+        except IdentificationError:
+            continue
+        onsets.append(Onset(at.sample_period, n, low * at.sample_period, high * at.sample_period))
+    told = {
+        "delay_ambiguous": f"onset at sample {samples} or {int(first)}: noise hides the first response",
+        "delay_unresolved": f"the response begins within one sample period of {finest:.3g} s: only a bound is known",
+    }
+    notices = [Notice(kind, message, "step") for kind, message in told.items() if kind in doubts]
+    if max(o.earliest for o in onsets) >= min(o.latest for o in onsets) + 1e-12:
+        answers = ", ".join(
+            f"{o.earliest * 1e6:.4g} to {o.latest * 1e6:.4g} µs at {o.sample_period:.3g} s" for o in onsets
+        )
+        notices.append(Notice("delay_inconsistent", f"sample times disagree on the delay: {answers}", "step"))
+    return Delay(samples, tuple(onsets), response, tuple(notices))

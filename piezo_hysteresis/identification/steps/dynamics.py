@@ -1,0 +1,250 @@
+"""Step 2: linear dynamics, an ARX model by least squares (paper, Sec. 3.3).
+
+The equation error that least squares makes small is not the output error: noise of the sensor on y enters the
+regressors and biases A(z). Steiglitz-McBride iterations (prefiltering with 1/A of the step before) remove that bias
+where the noise is white.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lstsq
+from scipy.signal import lfilter
+
+from ...effects import Arx, Setting
+from ...errors import IdentificationError, ParameterError
+from ...record import Notice, Samples
+from .regressors import Signals, triangle
+
+_ALL = slice(None)
+LARGEST_POLE = 0.99999
+"""Radius to which poles on or just outside the unit circle are drawn back."""
+DRAWN_IN = 0.9999
+"""Radius of the largest pole where rounding does not allow that."""
+
+PATIENCE, GAINS = 3, 0.99
+"""Iterations without a gain after which no more are made, and the share of the error that a gain leaves at most."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Dynamics:
+    """G(z) = B(z)/A(z)·z^(−d), Eq. (4) and (5), and how well it describes its data.
+
+    Parameters
+    ----------
+    arx : Arx
+        The effect, with a, b and d.
+    sample_period : float
+        Sample period [s].
+    one_step_error : float
+        RMS of y minus its prediction from measured y one sample before; what ARX makes small [unit of y].
+    free_run_error : float
+        RMS of y minus the simulation from the input alone; what counts [unit of y].
+    notices : tuple of Notice
+        ``unstable_reflected`` where poles were mirrored into the unit circle.
+    """
+
+    arx: Arx
+    sample_period: float
+    one_step_error: float = float("nan")
+    free_run_error: float = float("nan")
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def lag(self) -> float:
+        """Group delay of G at dc, d and that of B/A [s]."""
+        return self.arx.group_delay * self.sample_period
+
+    def response(self, frequency: Samples) -> NDArray[np.complex128]:
+        """G at the given frequencies [Hz], complex, shape of `frequency`."""
+        return self.arx.response(frequency, self.sample_period)
+
+    def simulate(self, u: Samples) -> Samples:
+        """Free-run output for the input `u`, starting settled at its first value, shape (n,)."""
+        block = self.arx.block(Setting(self.sample_period, self.sample_period))
+        y, _ = block.run(u, block.rest(float(u[0]), 0.0))
+        return y
+
+    def __str__(self) -> str:
+        orders = f"na = {self.arx.array('a').size}, nb = {self.arx.array('b').size}, d = {self.arx['delay']:g}"
+        return (
+            f"G: {orders}, dc gain {self.arx.dc_gain:.5g}, lag {self.lag * 1e6:.4g} µs, "
+            f"one-step error {self.one_step_error:.3g}, free-run error {self.free_run_error:.3g}"
+        )
+
+
+def _solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> tuple[Samples, float]:
+    """Least squares from the triangle: coefficients of some regressors, and the norm of what is left."""
+    regressors = r[:, :-1][:, columns]
+    scale = np.linalg.norm(regressors, axis=0)
+    scale[scale == 0.0] = 1.0
+    theta = lstsq(regressors / scale, r[:, -1], check_finite=False)[0] / scale
+    return theta, float(np.linalg.norm(r[:, -1] - regressors @ theta))
+
+
+def _reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
+    """Mirror poles outside the unit circle into it and scale B so that |B/A| stays; the number mirrored."""
+    poles = np.roots(np.concatenate(([1.0], a)))
+    outside = np.abs(poles) > LARGEST_POLE
+    if not outside.any():
+        return a, b, 0
+    radius = np.abs(poles[outside])
+    poles[outside] *= np.minimum(1.0 / radius, LARGEST_POLE) / radius
+    a = np.real(np.poly(poles))[1:]
+    # poles that crowd near 1 come out of rounded coefficients elsewhere, and may be outside again: all are drawn in
+    while (largest := float(np.abs(np.roots(np.concatenate(([1.0], a)))).max())) >= 1.0:
+        a = a * (DRAWN_IN / largest) ** np.arange(1, a.size + 1)
+    return a, b / np.prod(np.maximum(radius, 1.0)), int(outside.sum())
+
+
+def settling(a: Samples, b: Samples, delay: int) -> Arx | None:
+    """The ARX of these coefficients; None where it does not settle."""
+    try:
+        arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
+    except ParameterError:
+        return None
+    return arx if 1.0 + a.sum() > 0.0 else None
+
+
+def in_free_run(model: Dynamics, signals: Signals) -> Dynamics:
+    """The model with its free-run error on the signals, every record freed of its offset."""
+    squares, count = 0.0, 0
+    for u, y in signals:
+        error = y - model.simulate(u)
+        squares += float(np.sum((error - error.mean()) ** 2))
+        count += y.size
+    return replace(model, free_run_error=float(np.sqrt(squares / count)))
+
+
+def identify_arx(
+    signals: Signals, delay: int, sample_period: float, orders: tuple[int, int] = (8, 8), iterations: int = 0
+) -> Dynamics:
+    """ARX model by least squares, with a free offset per record.
+
+    Parameters
+    ----------
+    signals : sequence of (u, y)
+        Input and output of every record; the input may be the voltage or the hysteresis output.
+    delay : int
+        d, samples.
+    sample_period : float
+        Sample period [s].
+    orders : (int, int)
+        na and nb.
+    iterations : int
+        Steiglitz-McBride iterations at most after plain least squares; 0 is the paper.
+
+    Returns
+    -------
+    Dynamics
+        A stable model with its one-step and its free-run error.
+
+    Raises
+    ------
+    IdentificationError
+        If a record is shorter than the orders, the input does not move, the orders make no sense, or the output does
+        not follow the input.
+
+    Notes
+    -----
+    Paper, Sec. 3.3; Steiglitz and McBride 1965.
+    """
+    na, nb = orders
+    if na < 0 or nb < 1 or delay < 1:
+        raise IdentificationError(f"ARX: got na = {na}, nb = {nb}, d = {delay}, expected na >= 0, nb >= 1, d >= 1")
+    if not any(np.ptp(u) > 0.0 for u, _ in signals):
+        raise IdentificationError("ARX: the input does not move; expected a record with excitation, e.g. noise")
+    theta, left = _solve(triangle(signals, orders, delay))
+    one_step = left / float(np.sqrt(sum(y.size for _, y in signals)))
+    candidates: list[Dynamics] = []
+    for iteration in range(iterations + 1):
+        if iteration:
+            whitener = np.concatenate(([1.0], candidates[-1].arx.array("a")))
+            whitened = [(lfilter([1.0], whitener, u - u[0]), lfilter([1.0], whitener, y - y[0])) for u, y in signals]
+            theta, _ = _solve(triangle(whitened, orders, delay))
+        a, b, mirrored = _reflected(theta[:na], theta[na:])
+        told = (Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),)
+        arx = settling(a, b, delay)
+        if arx is None:  # the iterations run away
+            if not candidates:
+                raise IdentificationError("ARX: got no dynamics that settle, expected an output that follows the input")
+            break
+        model = Dynamics(arx, sample_period, one_step, notices=told if mirrored else ())
+        candidates.append(in_free_run(model, signals))
+        errors = [c.free_run_error for c in candidates]
+        if len(errors) > PATIENCE and min(errors[-PATIENCE:]) > GAINS * min(errors[:-PATIENCE]):
+            break
+    return min(candidates, key=lambda model: model.free_run_error)
+
+
+def delay_of(signals: Signals, longest: int = 16, order: int = 8, sure: float = 5.0) -> int:
+    """Delay in samples where no step shows it: the first coefficient of a long B(z) that is not zero.
+
+    Parameters
+    ----------
+    signals : sequence of (u, y)
+        Input and output of every record.
+    longest : int
+        Longest delay sought.
+    order : int
+        na, and coefficients of B(z) behind the longest delay.
+    sure : float
+        Standard errors beyond which a coefficient counts.
+    """
+    regressors = triangle(signals, (order, longest + order), 1)
+    theta, left = _solve(regressors)
+    error = left / np.sqrt(sum(y.size for _, y in signals)) * np.linalg.norm(np.linalg.pinv(regressors[:, :-1]), axis=1)
+    onset = np.flatnonzero(np.abs(theta[order:]) > sure * error[order:])
+    return min(1 + int(onset[0]), longest) if onset.size else 1
+
+
+@dataclass(frozen=True, slots=True)
+class OrderError:
+    """Errors of one order na = nb: on the data it was fitted to (one step), and free-run on the records held out."""
+
+    order: int
+    one_step_error: float
+    free_run_error: float
+
+
+def compare_orders(signals: Signals, delay: int, sample_period: float, highest: int = 10) -> tuple[OrderError, ...]:
+    """Error against order na = nb = 1 … `highest`: fitted to the first two thirds of every record, judged on the rest.
+
+    Parameters
+    ----------
+    signals : sequence of (u, y)
+        Input and output of every record.
+    delay : int
+        d, samples.
+    sample_period : float
+        Sample period [s].
+    highest : int
+        Highest order; the regressors of the lower ones are among its own.
+
+    Returns
+    -------
+    tuple of OrderError
+        In rising order.
+    """
+    cuts = [2 * y.size // 3 for _, y in signals]
+    early = [(u[:cut], y[:cut]) for (u, y), cut in zip(signals, cuts, strict=True)]
+    regressors = triangle(early, (highest, highest), delay)
+    table = []
+    for order in range(1, highest + 1):
+        theta, left = _solve(regressors, np.r_[:order, highest : highest + order])
+        a, b, _ = _reflected(theta[:order], theta[order:])
+        model = Dynamics(Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay), sample_period)
+        late = [(y - model.simulate(u))[cut:] for (u, y), cut in zip(signals, cuts, strict=True)]
+        free_run = float(np.std(np.concatenate([e - e.mean() for e in late])))
+        table.append(OrderError(order, left / float(np.sqrt(sum(cuts))), free_run))
+    return tuple(table)
+
+
+def choose_order(table: Sequence[OrderError], slack: float = 0.01) -> int:
+    """Smallest order whose free-run error is within `slack` of the best."""
+    best = min(row.free_run_error for row in table)
+    return next(row.order for row in table if row.free_run_error <= best * (1.0 + slack))

@@ -1,0 +1,142 @@
+"""Plays or one Bouc-Wen state: which of them predicts the blocks of the experiment that were left out.
+
+On loops of one amplitude both fit alike. They differ in what they foretell for another: a Bouc-Wen state has no memory
+of turning points, so its loop of one amplitude says little about the next; plays with weights that are not negative
+(a Prandtl-Ishlinskii operator) hold all smaller loops within the largest. Blocks left out, the first one with its way
+from rest among them, show the difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects import BoucWen, HysteresisMemory
+from ...model.model import Model
+from ...record import Notice, Record
+from ..fit.fit import Fit, fit
+from ..fit.normal_equations import Nuisance, residuals
+from ..records.conditioning import select
+from .hysteresis import fit_hysteresis
+
+Array = NDArray[np.float64]
+
+PLAYS = 16
+"""Plays, geometric in their half widths."""
+WIDEST = 0.47
+"""Half width of the widest play, share of the range of the drive; one of half the range would stand still in a loop."""
+BLOCKS = 8
+"""Blocks into which the records are cut, about."""
+FOLDS = 4
+"""Fits with a part of the blocks left out."""
+FEWEST = 64
+"""Samples of a block at least."""
+TIE = 1.2
+"""Ratio of errors up to which neither leads; then plays are taken, they are bounded by what the loops show."""
+LINEAR = ("bouc_wen.p1", "bouc_wen.p2", *(f"hysteresis_memory.c[{j}]" for j in range(PLAYS)))
+"""Numbers of the plays and of the polynomial beside them."""
+
+
+def with_plays(model: Model, records: Sequence[Record]) -> Model:
+    """The model with plays in the place of its Bouc-Wen state, whose polynomial stays.
+
+    Parameters
+    ----------
+    model : Model
+        With a `BoucWen`.
+    records : sequence of Record
+        Their drive sets the widest play.
+    """
+    low = min(min(float(r.voltage.min()), r.settled_voltage) for r in records)
+    high = max(max(float(r.voltage.max()), r.settled_voltage) for r in records)
+    plays = HysteresisMemory(c=(0.0,) * PLAYS, reach=WIDEST * (high - low) / model.voltage_scale)
+    loop = BoucWen(A=0.0, gamma=0.0, p1=model[BoucWen.name]["p1"], p2=model[BoucWen.name]["p2"])
+    return model.with_effect(loop).with_effect(plays)
+
+
+def choose_memory(
+    joint: Fit, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int], loops: Collection[int]
+) -> tuple[Fit, tuple[Notice, ...]]:
+    """The joint fit, or the same with plays where these predict better what was left out.
+
+    Parameters
+    ----------
+    joint : Fit
+        Of a model with a `BoucWen`.
+    records : sequence of Record
+        The experiment, in order.
+    floors : sequence of float
+        Floor of every record [m].
+    fitted, loops : collection of int
+        Indices of the records of the joint fit, and of the slow ones that show the hysteresis.
+
+    Returns
+    -------
+    fit : Fit
+        The one that holds.
+    notices : tuple of Notice
+        ``memory`` with both errors on blocks left out.
+    """
+    if BoucWen.name not in joint.model:
+        return joint, ()
+    blocks, sizes = _blocks(*select(records, floors, loops))
+    plays = with_plays(joint.model, records)
+    state_error = left_out(blocks, sizes, lambda used: fit_hysteresis(joint.model, blocks, used).model)
+    plays_error = left_out(blocks, sizes, lambda used: _fit_plays(plays, blocks, used))
+    # the mean of logarithms keeps one bad block from deciding
+    of_plays, of_state = (float(np.mean(np.log(np.maximum(e, 1.0)))) for e in (plays_error, state_error))
+    told = (
+        f"on blocks left out plays reach {np.exp(of_plays):.3g} times the floor, "
+        f"a Bouc-Wen state {np.exp(of_state):.3g} times (geometric means)"
+    )
+    lead = of_plays - of_state
+    if lead > np.log(TIE):
+        return joint, (Notice("memory", f"{told}: the state is kept"),)
+    clear = lead < -np.log(TIE)
+    because = "turning points are remembered" if clear else "the data do not decide, plays foretell other loops better"
+    kept, kept_floors = select(records, floors, fitted)
+    free = [*LINEAR, *(n for n in joint.names if n.startswith("arx."))]
+    found = fit(plays, kept, free, floors=kept_floors, nuisance=Nuisance(offset=True))
+    return found, (Notice("memory", f"{told}: {because}; hysteresis_memory is taken"),)
+
+
+def left_out(blocks: Sequence[Record], floors: Sequence[float], fitted_to: Callable[[list[int]], Model]) -> Array:
+    """RMS residual over floor of every block with a finite floor, from a fit without it and its neighbours.
+
+    The zero of every block is free: a drift says nothing about the hysteresis.
+
+    Parameters
+    ----------
+    blocks : sequence of Record
+        In order, those of one record continuing.
+    floors : sequence of float
+        Floor of every block [m]; infinite where it only carries the state.
+    fitted_to : callable
+        The model fitted to the blocks of the indices it is given.
+    """
+    judged = [i for i, f in enumerate(floors) if np.isfinite(f)]
+    errors = {}
+    for fold in np.array_split(judged, min(FOLDS, len(judged))):
+        left = residuals(fitted_to([i for i in judged if i not in fold]), blocks, Nuisance(offset=True))
+        errors.update({i: float(np.sqrt(np.mean(left[i] ** 2))) / floors[i] for i in fold.tolist()})
+    return np.array([errors[i] for i in judged])
+
+
+def _fit_plays(model: Model, blocks: Sequence[Record], used: Collection[int]) -> Model:
+    kept, sizes = select(blocks, [1.0] * len(blocks), used)
+    return fit(model, kept, LINEAR, floors=sizes, nuisance=Nuisance(offset=True)).model
+
+
+def _blocks(records: Sequence[Record], floors: Sequence[float]) -> tuple[list[Record], list[float]]:
+    """Records cut into about `BLOCKS` of equal length in all, as far as they are long enough."""
+    length = max(FEWEST, sum(r.size for r, f in zip(records, floors, strict=True) if np.isfinite(f)) // BLOCKS)
+    blocks, sizes = [], []
+    for record, floor in zip(records, floors, strict=True):
+        count = max(1, round(record.size / length)) if np.isfinite(floor) else 1
+        cuts = record.split(*(round(k * record.size / count) for k in range(1, count)))
+        blocks += [cuts[0], *(replace(c, initial_voltage=None) for c in cuts[1:])]
+        sizes += [floor] * count
+    return blocks, sizes

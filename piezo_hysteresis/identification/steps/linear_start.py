@@ -1,0 +1,99 @@
+"""Linear dynamics behind a known hysteresis: the start of the joint fit.
+
+ARX from w, the output of the current Bouc-Wen operator, does not see the forgetting of the hysteresis state that
+spoils ARX from v.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from ...effects import Arx, Place
+from ...errors import IdentificationError
+from ...model.model import Model
+from ...record import Record
+from ..records.conditioning import carried
+from .dynamics import Dynamics, identify_arx
+from .regressors import Signals
+
+ITERATIONS = 12
+"""Steiglitz-McBride iterations of the start at most: weak, lightly damped modes come last."""
+FEW_ITERATIONS = 3
+"""Those tried beside, for what is missing may lead the many astray."""
+
+
+def hysteresis_signals(model: Model, records: Sequence[Record], wanted: Collection[int]) -> Signals:
+    """(w, y) of the records `wanted`: hysteresis output of the model, and normalised displacement."""
+    before = tuple(e for e in model.effects if e.place < Place.DYNAMICS)
+    alone = Model(before, model.sample_period, model.voltage_scale)
+    kept = carried(records, wanted)
+    outputs = dict(zip(kept, alone.simulate([records[i] for i in kept]), strict=True))
+    return [(outputs[i], np.array(records[i].displacement / model.displacement_scale)) for i in sorted(wanted)]
+
+
+def dynamics_behind(
+    model: Model,
+    records: Sequence[Record],
+    broadband: Collection[int],
+    delay: int,
+    orders: tuple[int, int],
+    iterations: int = ITERATIONS,
+) -> Dynamics:
+    """ARX from w of the model's hysteresis, its dc gain set to that of the model's `Arx`.
+
+    Parameters
+    ----------
+    model : Model
+        With a hysteresis that has been fitted.
+    records : sequence of Record
+        The experiment, in order.
+    broadband : collection of int
+        Indices of the records to use, all at the model's sample period.
+    delay : int
+        d, samples.
+    orders : (int, int)
+        na and nb.
+    iterations : int
+        Steiglitz-McBride iterations at most.
+    """
+    return identify_arx(hysteresis_signals(model, records, broadband), delay, model.sample_period, orders, iterations)
+
+
+def with_dynamics(model: Model, arx: Arx) -> Model:
+    """The model with other dynamics, scaled so that its dc gain, the gauge, stays.
+
+    Raises
+    ------
+    IdentificationError
+        If the dc gain of `arx` has the other sign or is zero.
+    """
+    ratio = arx.dc_gain / dynamics_of(model).dc_gain
+    if not ratio > 0.0:
+        raise IdentificationError(
+            f"dynamics: got a dc gain of {arx.dc_gain:.3g}, expected the sign of {dynamics_of(model).dc_gain:.3g}; "
+            "use excitation that reaches low frequencies"
+        )
+    return model.with_effect(arx.with_values(b=tuple((arx.array("b") / ratio).tolist())))
+
+
+def dynamics_of(model: Model) -> Arx:
+    """The linear dynamics in a model."""
+    arx = model["arx"]
+    assert isinstance(arx, Arx)
+    return arx
+
+
+def form_of(model: Model) -> tuple[int, float, tuple[int, int]]:
+    """Delay in samples, sample period [s] and orders of the dynamics in a model."""
+    arx = dynamics_of(model)
+    return round(arx["delay"]), model.sample_period, (arx.array("a").size, arx.array("b").size)
+
+
+def follower(model: Model, delay: int, orders: tuple[int, int], pole: float = 0.5) -> Arx:
+    """One pole with the dc gain of the model, in the form of higher orders: a start that is never absurd."""
+    na, nb = orders
+    pole = pole if na else 0.0
+    gain = dynamics_of(model).dc_gain * (1.0 - pole)
+    return Arx(a=(-pole, *(0.0,) * (na - 1)) if na else (), b=(gain, *(0.0,) * (nb - 1)), delay=delay)

@@ -1,0 +1,183 @@
+"""Dynamics as a sum of modes, fitted by output error: what poles that crowd near z = 1 need.
+
+At 50 kHz the poles of a mode at 500 Hz lie within 0.06 of z = 1. Coefficients of A(z) then depend on one another to
+the last digits, and noise at high frequencies outweighs the modes. A sum of sections of second order has neither
+trouble; where it begins, dynamics found at a lower rate tell, with their poles carried back by z → z^(1/q).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.signal import decimate, lfilter
+
+from ...errors import IdentificationError
+from .dynamics import LARGEST_POLE, Dynamics, identify_arx, in_free_run, settling
+from .regressors import Signals
+
+Array = NDArray[np.float64]
+
+FACTORS = (4, 16)
+"""Ratios of the full rate to the lower ones."""
+SHORTEST = 50
+"""Samples of a record at the lower rate at least."""
+SAMPLES = 60_000
+"""Samples that are fitted at most."""
+SIMULATIONS, CONVERGED = 20, 1e-3
+"""Simulations of a fit at most, and the relative decrease of the squared error at which it ends."""
+INDEPENDENT = 1e-13
+"""Least share of the largest eigenvalue from which a direction counts."""
+AWAY = 1e3
+"""Multiple of the output that counts as the residual of sections that run away."""
+
+
+def identify_modes(
+    signals: Signals, delay: int, sample_period: float, orders: tuple[int, int], iterations: int
+) -> Dynamics:
+    """The best sum of modes, begun at several lower rates.
+
+    Parameters
+    ----------
+    signals : sequence of (u, y)
+        Input and output of every record.
+    delay : int
+        d, samples.
+    sample_period : float
+        Sample period [s].
+    orders : (int, int)
+        na and nb, equal and even.
+    iterations : int
+        Steiglitz-McBride iterations at most at a lower rate.
+
+    Raises
+    ------
+    IdentificationError
+        On other orders, if no record is long enough or tells a mode, or if poles crowd so much that rounded
+        coefficients do not hold them.
+
+    Notes
+    -----
+    Output error by variable projection, Golub and Pereyra 1973: the numerators follow linearly from the denominators.
+    """
+    if orders[0] != orders[1] or orders[0] % 2:
+        raise IdentificationError(f"modes: got orders {orders}, expected na = nb, an even number")
+    few = _beginnings(signals, delay)
+    found: list[tuple[float, Array]] = []
+    for factor in FACTORS:
+        with suppress(IdentificationError):
+            sections = _found_at(factor, signals, delay, sample_period, orders, iterations)
+            residual = _projected(sections, few)[1]
+            found.append((float(residual @ residual), sections))
+    if not found:
+        raise IdentificationError(f"modes: got no record that tells any, expected {SHORTEST * max(FACTORS)} samples")
+    _, sections = min(found, key=lambda f: f[0])
+    a, b = _polynomials(*_fitted(sections, few))
+    arx = settling(a, b, delay)
+    if arx is None:
+        raise IdentificationError("modes: got poles that crowd so much that coefficients in double precision miss them")
+    return in_free_run(Dynamics(arx, sample_period), signals)
+
+
+def _beginnings(signals: Signals, delay: int) -> Signals:
+    """Delayed drive about its start, and output about its mean, of the beginnings of the records, each settled."""
+    share = min(1.0, SAMPLES / sum(y.size for _, y in signals))
+    cuts = [(u[: int(share * u.size)], y[: int(share * y.size)]) for u, y in signals]
+    return [(_delayed(u - u[0], delay), y - y.mean()) for u, y in cuts]
+
+
+def _found_at(
+    factor: int, signals: Signals, delay: int, sample_period: float, orders: tuple[int, int], iterations: int
+) -> Array:
+    """Denominators (na/2, 2) of sections, from dynamics found at a lower rate."""
+    slow = [
+        (decimate(u - u[0], factor, ftype="fir"), decimate(y - y[0], factor, ftype="fir"))
+        for u, y in signals
+        if y.size >= SHORTEST * factor
+    ]
+    if not slow:
+        raise IdentificationError(f"modes: got no record of {SHORTEST * factor} samples")
+    found = identify_arx(slow, max(1, round(delay / factor)), factor * sample_period, orders, iterations)
+    poles = np.roots(np.concatenate(([1.0], found.arx.array("a")))).astype(complex)
+    modes = poles[poles.imag > 0.0] ** (1.0 / factor)
+    if not modes.size:
+        raise IdentificationError(f"modes: got none at a rate lower by {factor}, expected a pair of poles")
+    sections = np.zeros((orders[0] // 2, 2))  # what is no mode is no pole: slow ones would imitate creep
+    sections[: modes.size] = np.column_stack((-2.0 * modes.real, np.abs(modes) ** 2))
+    return sections
+
+
+def _projected(sections: Array, signals: Signals) -> tuple[Array, Array, Array]:
+    """The numerators that fit best (k, 2), the residual that they leave, and what every tap answers."""
+    shaped = [[lfilter([1.0], [1.0, *a], u) for a in sections] for u, _ in signals]
+    basis = _about_means([np.array([_delayed(s, k) for s in one for k in (0, 1)]) for one in shaped])
+    scale = np.linalg.norm(basis, axis=1)
+    scale[scale == 0.0] = 1.0
+    basis /= scale[:, None]
+    output = np.concatenate([y for _, y in signals])
+    taps = np.linalg.lstsq(basis @ basis.T, basis @ output, rcond=INDEPENDENT)[0]
+    return (taps / scale).reshape(-1, 2), output - taps @ basis, basis
+
+
+def _slopes(sections: Array, numerators: Array, signals: Signals) -> Array:
+    """∂y/∂(a1, a2) of every section, shape (2k, n)."""
+    both = list(zip(sections, numerators, strict=True))
+    twice = [[-lfilter([1.0], [1.0, *a], lfilter(b, [1.0, *a], u)) for a, b in both] for u, _ in signals]
+    return _about_means([np.array([_delayed(s, k) for s in one for k in (1, 2)]) for one in twice])
+
+
+def _about_means(records: Sequence[Array]) -> Array:
+    """Rows of every record about their means, joined."""
+    return np.concatenate([rows - rows.mean(axis=1, keepdims=True) for rows in records], axis=1)
+
+
+def _delayed(x: Array, samples: int) -> Array:
+    return np.concatenate((np.zeros(samples), x[: x.size - samples]))
+
+
+def _fitted(sections: Array, signals: Signals) -> tuple[Array, Array]:
+    """Denominators and numerators of the least output error."""
+    output = np.concatenate([y for _, y in signals])
+
+    @lru_cache(maxsize=1)  # slopes are asked for where the residual has just been
+    def projected(flat: tuple[float, ...]) -> tuple[Array, Array, Array]:
+        return _projected(np.reshape(flat, (-1, 2)), signals)
+
+    def residual(flat: Array) -> Array:
+        return projected(tuple(flat))[1] if _radius(flat.reshape(-1, 2)) < LARGEST_POLE else AWAY * output
+
+    def slopes(flat: Array) -> Array:
+        numerators, _, basis = projected(tuple(flat))
+        along = _slopes(flat.reshape(-1, 2), numerators, signals)
+        inverse = np.linalg.pinv(basis @ basis.T, rcond=INDEPENDENT, hermitian=True)
+        return np.asarray((along @ basis.T @ inverse @ basis - along).T)
+
+    fitted = least_squares(
+        residual, sections.ravel(), slopes, method="lm", x_scale="jac", ftol=CONVERGED, max_nfev=SIMULATIONS
+    )
+    return fitted.x.reshape(-1, 2), projected(tuple(fitted.x))[0]
+
+
+def _radius(sections: Array) -> float:
+    return max(float(np.abs(np.roots([1.0, *a])).max(initial=0.0)) for a in sections)
+
+
+def _polynomials(sections: Array, numerators: Array) -> tuple[Array, Array]:
+    """a and b of the sum of the sections."""
+    feedbacks = [np.array([1.0, *a]) for a in sections]
+    total = np.zeros(2 * len(sections))
+    for k, b in enumerate(numerators):
+        others = _product([f for j, f in enumerate(feedbacks) if j != k])
+        total += np.convolve(b, others)
+    return _product(feedbacks)[1:], total
+
+
+def _product(polynomials: Sequence[Array]) -> Array:
+    product = np.ones(1)
+    for polynomial in polynomials:
+        product = np.convolve(product, polynomial)
+    return product

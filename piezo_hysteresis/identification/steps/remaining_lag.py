@@ -1,0 +1,59 @@
+"""What is left of the dynamics where nothing excites them: the lag of the stage, and how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...record import Notice
+from ..fit.fit import Fit
+from ..records.excitation_content import Content
+from .linear_start import dynamics_of
+
+ONE_FREQUENCY = 4
+"""Drives of at most so many spectral lines hold one frequency."""
+
+
+def lag(fit: Fit) -> tuple[float, float]:
+    """Group delay of G at low frequency and its standard error [s], from the covariance of its coefficients."""
+    names = [n for n in fit.names if n.startswith("arx.")]
+
+    def at(values: dict[str, float]) -> float:
+        model = fit.model.with_values(values)
+        return dynamics_of(model).group_delay * model.sample_period
+
+    steps = {n: max(1e-6 * abs(fit.values[n]), 1e-12) for n in names}
+    value = at({})
+    slopes = np.array([(at({n: fit.values[n] + h}) - value) / h for n, h in steps.items()])  # upward: d may be at 1
+    rows = [fit.names.index(n) for n in names]
+    variance = float(slopes @ fit.covariance[np.ix_(rows, rows)] @ slopes) if names else 0.0
+    return value, float(np.sqrt(max(variance, 0.0)))
+
+
+def lag_notices(fit: Fit, contents: Sequence[Content]) -> tuple[Notice, ...]:
+    """Notices ``lag_only``, and ``one_frequency`` where lag and hysteresis cannot be told apart.
+
+    Parameters
+    ----------
+    fit : Fit
+        The joint fit.
+    contents : sequence of Content
+        Of the records that were fitted.
+    """
+    value, error = lag(fit)
+    highest = max(c.bandwidth for c in contents)
+    notices = [
+        Notice(
+            "lag_only",
+            f"no broadband record, the drive reaches {highest:.3g} Hz: of the dynamics only a lag is reported, "
+            f"{1e3 * value:.4g} ms ± {1.96e3 * error:.2g} ms (95 %); record noise, a chirp or steps for more",
+        )
+    ]
+    moving = [c for c in contents if c.span > 0.0]
+    if max(c.lines for c in moving) <= ONE_FREQUENCY and max(c.bandwidth for c in moving) <= 1.5 * min(
+        c.bandwidth for c in moving
+    ):
+        told = "one frequency only: a lag and a narrow play turn its loop alike, the lag is less sure than its interval"
+        notices.append(Notice("one_frequency", told))
+    return tuple(notices)

@@ -1,0 +1,264 @@
+"""`Model`: a chain of physical effects from drive voltage to displacement, with its scales."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..blocks.samples import row
+from ..effects import CHAIN, Effect, Offset, Setting
+from ..errors import ModelError
+from ..parameter import Parameter, Value
+from ..record import Record
+from .chain import Chain, ChainState, ChainTangent, Channels
+
+Array = NDArray[np.float64]
+
+HOLD_STEPS = 8
+"""Steps in which the time between two records that continue is gone through."""
+
+
+def _place(effect: Effect) -> tuple[int, int]:
+    return int(effect.place), CHAIN.index(type(effect)) if type(effect) in CHAIN else len(CHAIN)
+
+
+def channels_of(record: Record) -> Channels:
+    """The extra channels of a record, by name."""
+    named = {"other_displacement": record.other_displacement, "temperature": record.temperature}
+    return {name: values for name, values in named.items() if values is not None}
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Effects in the order of physics; frozen, ``with_…`` returns a new one.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+        In any order; each at most once.
+    sample_period : float
+        Period at which the discrete dynamics hold [s].
+    voltage_scale : float
+        v = u / voltage_scale [V].
+    displacement_scale : float
+        Displacement at normalised output 1 [m].
+    provenance : mapping of str to str
+        Where the values come from: date, data hash, free-run error, …
+
+    Raises
+    ------
+    ModelError
+        On a doubled effect, a term without its host, or a scale that is not positive.
+
+    Examples
+    --------
+    >>> from piezo_hysteresis.effects import Arx, BoucWen
+    >>> model = Model((Arx(b=[0.5]), BoucWen()), sample_period=2e-5)
+    >>> [e.name for e in model.effects]
+    ['bouc_wen', 'arx']
+    >>> y, state = model.run([0.0, 1.0], model.rest(0.0))
+    >>> y2, state = model.run([2.0], state)
+    """
+
+    effects: tuple[Effect, ...]
+    sample_period: float
+    voltage_scale: float = 10.0
+    displacement_scale: float = 1.0
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        effects = tuple(sorted(self.effects, key=_place))
+        object.__setattr__(self, "effects", effects)
+        names = [e.name for e in effects]
+        for name in names:
+            if names.count(name) > 1:
+                raise ModelError(f"effect '{name}' is in the chain twice; expected each at most once")
+        for effect in effects:
+            if effect.host is not None and effect.host not in names:
+                raise ModelError(f"effect '{effect.name}' needs '{effect.host}' in the chain, got {', '.join(names)}")
+        for name in ("sample_period", "voltage_scale", "displacement_scale"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise ModelError(f"{name}: got {value!r}, expected a positive number")
+
+    def __getitem__(self, name: str) -> Effect:
+        for effect in self.effects:
+            if effect.name == name:
+                return effect
+        raise ModelError(f"no effect '{name}' in the chain {', '.join(e.name for e in self.effects)}")
+
+    def __contains__(self, name: object) -> bool:
+        return any(e.name == name for e in self.effects)
+
+    def with_effect(self, effect: Effect) -> Model:
+        """With `effect` in its place in the chain, instead of one of the same name."""
+        return replace(self, effects=(*(e for e in self.effects if e.name != effect.name), effect))
+
+    def without(self, name: str) -> Model:
+        """Without the effect `name`."""
+        return replace(self, effects=tuple(e for e in self.effects if e.name != name))
+
+    def with_values(self, values: Mapping[str, float]) -> Model:
+        """With other numbers, named ``"creep.gamma"`` or ``"arx.a[0]"``."""
+        changed: dict[str, dict[str, Value]] = {}
+        for name, number in values.items():
+            owner, _, rest = name.partition(".")
+            inside = changed.setdefault(owner, self[owner].values)
+            match = re.fullmatch(r"(\w+)\[(\d+)\]", rest)
+            if match:
+                row = list(inside[match[1]])  # type: ignore[arg-type]
+                row[int(match[2])] = number
+                inside[match[1]] = tuple(row)
+            else:
+                inside[rest] = number
+        return replace(
+            self,
+            effects=tuple(e.with_values(**changed[e.name]) if e.name in changed else e for e in self.effects),
+        )
+
+    def values(self) -> dict[str, float]:
+        """All numbers by name, ``"bouc_wen.A"``, ``"arx.a[0]"``."""
+        return {f"{e.name}.{n}": v for e in self.effects for n, v in zip(e.free_names(), e.free_values(), strict=True)}
+
+    def row(self, name: str) -> Parameter:
+        """The table row of a number."""
+        owner, _, rest = name.partition(".")
+        return next(p for p in self[owner].parameters if p.name == rest.partition("[")[0])
+
+    def at(self, sample_period: float) -> Chain:
+        """The chain at another sample period [s]; kept for the next time.
+
+        Raises
+        ------
+        ModelError
+            If the period is shorter than the model's.
+        """
+        if sample_period < 0.999 * self.sample_period:
+            raise ModelError(
+                f"sample period: got {sample_period:g} s, expected {self.sample_period:g} s (the model's) or more; "
+                "decimate the record or identify at its rate"
+            )
+        kept = self._chains
+        if sample_period not in kept:
+            setting = Setting(sample_period, self.sample_period, self.voltage_scale, self.displacement_scale)
+            kept[sample_period] = Chain(self.effects, setting)
+        return kept[sample_period]
+
+    @cached_property
+    def _chains(self) -> dict[float, Chain]:
+        return {}
+
+    def rest(self, voltage: float, time: float = 0.0) -> ChainState:
+        """State of a stage settled at `voltage` [V], at its own sample period."""
+        return self.at(self.sample_period).rest(voltage, time)
+
+    def run(self, voltage: ArrayLike, state: ChainState, channels: Channels | None = None) -> tuple[Array, ChainState]:
+        """Displacement [m] of the next samples at the model's sample period, and the state after them.
+
+        Bit-identical for every way of cutting the voltage into blocks.
+
+        Parameters
+        ----------
+        voltage : (n,) array_like
+            Drive voltage [V].
+        state : ChainState
+            From `rest`, or from the block before.
+        channels : mapping, optional
+            ``other_displacement`` [m] and ``temperature`` [K], shape (n,).
+
+        Raises
+        ------
+        ModelError
+            On empty or non-finite samples.
+        DivergenceError
+            If the output runs away.
+        """
+        return self.at(self.sample_period).run(row(voltage, "voltage"), state, channels)
+
+    def simulate(self, records: Record | Iterable[Record]) -> list[Array]:
+        """Free-run displacement [m] of every record, each at its own sample period.
+
+        A record starts from a stage at rest at its `settled_voltage`, unless it continues the one before it; between
+        two that continue, the last voltage was held.
+        """
+        outputs: list[Array] = []
+        state: ChainState | None = None
+        chain: Chain | None = None
+        for index, record in self._in_one_go([records] if isinstance(records, Record) else records):
+            before, chain = chain, self.at(record.sample_period)
+            if state is None or not record.continues:
+                state = chain.rest(record.settled_voltage, record.start_time)
+            elif before is not chain:
+                state = chain.resume(state)
+            y, state = chain.run(record.voltage, state, channels_of(record))
+            if index is not None:
+                outputs.append(y)
+        return outputs
+
+    def linearise(
+        self, records: Iterable[Record], wanted: Collection[str], block: int = 8192
+    ) -> Iterator[tuple[int, slice, Array, tuple[str, ...], Array]]:
+        """Free run with sensitivities, block by block, so that records of any length fit in memory.
+
+        Yields
+        ------
+        index : int
+            Of the record.
+        part : slice
+            Samples of the record in this block.
+        y : (k,) ndarray
+            Displacement [m].
+        names : tuple of str
+            The numbers `wanted`, in chain order.
+        slopes : (q, k) ndarray
+            ∂y/∂θ of each of them.
+        """
+        wanted = frozenset(wanted)
+        state: ChainState | None = None
+        tangent: ChainTangent | None = None
+        chain: Chain | None = None
+        for index, record in self._in_one_go(records):
+            before, chain = chain, self.at(record.sample_period)
+            if state is None or tangent is None or not record.continues:
+                state = chain.rest(record.settled_voltage, record.start_time)
+                tangent = chain.rest_tangent(record.settled_voltage, wanted)
+            elif before is not chain:
+                tangent = chain.resume_tangent(state, tangent)
+                state = chain.resume(state)
+            channels = channels_of(record)
+            for start in range(0, record.size, block):
+                part = slice(start, min(start + block, record.size))
+                now, u = chain.channels_in(channels, part), record.voltage[part].copy()
+                y, names, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
+                if index is not None:
+                    yield index, part, y, names, slopes
+
+    def _in_one_go(self, records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:
+        """The records with their index, and without one the holds between those that continue: creep goes on there."""
+        before: Record | None = None
+        for index, record in enumerate(records):
+            if before is not None and record.continues:
+                end = before.start_time + before.duration
+                steps = min(HOLD_STEPS, int((record.start_time - end) / self.sample_period))
+                if steps > 0:
+                    held = np.full(steps, before.voltage[-1])
+                    period = (record.start_time - end) / steps
+                    yield None, Record(held, held, period, "hold", start_time=end, continues=True)
+            yield index, record
+            before = record
+
+    def sensitivities(self, record: Record, wanted: Collection[str]) -> tuple[Array, dict[str, Array]]:
+        """Free-run displacement (n,) of a record from rest, and ∂y/∂θ (n,) of every number `wanted`."""
+        ((_, _, y, names, slopes),) = self.linearise([record], wanted, block=record.size)
+        return y, dict(zip(names, slopes, strict=True))
+
+    def contributions(self, record: Record) -> dict[str, Array]:
+        """How much each effect beyond hysteresis, dynamics and offset adds to the displacement [m], shape (n,)."""
+        (whole,) = self.simulate(record)
+        core = {e.name for e in self.effects if not any(p.off is not None for p in e.parameters)} | {Offset.name}
+        return {e.name: whole - self.without(e.name).simulate(record)[0] for e in self.effects if e.name not in core}

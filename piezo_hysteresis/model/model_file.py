@@ -1,0 +1,121 @@
+"""`model_file`: a `Model` as the parameter YAML that nodes, people and the CLI share.
+
+Strict under ``model.``, blind to everything else: a ``ros2 param dump`` of the identification node is a valid model
+file, and a model file is a valid ``--params-file``. Units stand in the comments; all are SI.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+
+from ..errors import ModelError
+from .model import Model
+from .model_parameters import PREFIX, SCALES, from_parameters, to_parameters
+from .parameter_file import LONGEST_TEXT, Entry, entry, parameters, quoted
+
+_HEADER = """\
+# Model of a piezo stage: a ROS 2 parameter file, in SI units. Load it with --params-file, or give it to `piezo`.
+# After editing a number by hand, delete the line `hash`.
+"""
+
+_PROVENANCE = {
+    "free_run_error": "m; rms on data that were not fitted",
+    "free_run_error_percent": "% of the displacement range",
+    "data_hash": "of the samples that were fitted",
+    "date": "UTC",
+}
+
+
+def dumps(model: Model) -> str:
+    """The text of a model file; reads back bit for bit.
+
+    Raises
+    ------
+    ModelError
+        If a provenance key is no lower-case identifier.
+    """
+    named = to_parameters(model)
+    lines = ["/**:", "  ros__parameters:", "    model:"]
+
+    def line(indent: int, key: str, value: Entry, comment: str) -> None:
+        text = f"{' ' * indent}{key}: {entry(value)}"
+        lines.append(f"{text}  # {comment}" if comment else text)
+
+    line(6, "effects", named[PREFIX + "effects"], "the chain, from drive voltage to displacement")
+    for name, (unit, meaning) in SCALES.items():
+        line(6, name, named[PREFIX + name], f"{unit}; {meaning}")
+    line(6, "valid", named[PREFIX + "valid"], "false: start values, not identified")
+    line(6, "hash", named[PREFIX + "hash"], "of everything but valid and provenance")
+    if model.provenance:
+        lines.append("      provenance:")
+        for key in model.provenance:
+            name = key if yaml.safe_load(key) == key else quoted(key)  # "no" and "on" are truth values to PyYAML
+            line(8, name, named[f"{PREFIX}provenance.{key}"], _PROVENANCE.get(key, ""))
+    for effect in model.effects:
+        rows = [p for p in effect.parameters if f"{PREFIX}{effect.name}.{p.name}" in named]
+        if rows:
+            lines.append(f"      {effect.name}:  # {effect.equation}")
+        for row in rows:
+            line(8, row.name, named[f"{PREFIX}{effect.name}.{row.name}"], f"{row.unit}; {row.meaning}")
+    return _HEADER + "\n".join(lines) + "\n"
+
+
+def loads(text: str, source: str = "model file") -> Model:
+    """The model in the text of a model file or of a ``ros2 param dump``.
+
+    Raises
+    ------
+    ModelError, ParameterError
+        As `from_parameters`; also if the YAML is broken or holds no model, or different ones.
+    """
+    own = [
+        {name: value for name, value in named.items() if name.startswith(PREFIX)}
+        for named in parameters(text, source).values()
+    ]
+    found = [named for named in own if named]
+    if not found:
+        raise ModelError(f"{source}: got parameters but no 'model', expected a model file or a dump with one")
+    if any(named != found[0] for named in found):
+        raise ModelError(f"{source}: got {len(found)} different models, expected one; keep the wanted node only")
+    return from_parameters(found[0], source)
+
+
+def save(model: Model, path: str | Path) -> Path:
+    """Write a model file, whole or not at all; returns its path.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be written.
+    """
+    path = Path(path).expanduser()
+    text = dumps(model)
+    draft = path.with_name(path.name + ".tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(path)
+    except (OSError, UnicodeError) as error:
+        raise ModelError(f"{path}: cannot write the model file: {error}") from None
+    return path
+
+
+def load(path: str | Path) -> Model:
+    """Read a model file.
+
+    Raises
+    ------
+    ModelError, ParameterError
+        If there is no such file, or as `loads`.
+    """
+    path = Path(path).expanduser()
+    try:
+        with path.open(encoding="utf-8") as file:
+            text = file.read(LONGEST_TEXT + 1)
+    except OSError as error:
+        raise ModelError(f"{path}: {error.strerror or error}, expected a model file") from None
+    except UnicodeError:
+        raise ModelError(f"{path}: not a text in UTF-8, expected a model file") from None
+    return loads(text, str(path))

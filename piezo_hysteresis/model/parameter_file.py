@@ -1,0 +1,161 @@
+"""`parameter_file`: ROS 2 parameter YAML, read as rcl reads it and written so that rcl and PyYAML agree.
+
+The two disagree on numbers: ``1e-05`` is a double to rcl and a string to PyYAML, ``3`` never becomes a double. Numbers
+are therefore written with a decimal point, texts always quoted, and files are read by rcl's rules.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+
+import yaml
+
+from ..errors import ParameterError
+
+Scalar = bool | int | float | str
+Entry = Scalar | list[Scalar]
+
+_TRUE = {"y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
+_FALSE = {"n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
+_INTEGER = re.compile(r"[-+]?(0[xX][0-9a-fA-F]{1,15}|[0-9]{1,18})")  # longer ones are doubles to rcl
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.?[0-9]*)([eE][-+]?[0-9]+)?")
+_SPECIAL = re.compile(r"([-+]?)\.(inf|Inf|INF|nan|NaN|NAN)")
+
+
+LONGEST_TEXT = 1_000_000
+"""Characters of a parameter file at most: parsing takes a hundred times as much memory, and a second."""
+
+
+def number(value: float) -> str:
+    """A float that reads back bit for bit and is a float to every reader.
+
+    >>> number(1e-05), number(3.0), number(0.1)
+    ('1.0e-05', '3.0', '0.1')
+    """
+    text = repr(float(value))
+    mantissa, exponent, power = text.partition("e")
+    return text if "." in mantissa or not exponent else f"{mantissa}.0e{power}"
+
+
+def quoted(text: str) -> str:
+    """A text in double quotes, on one line."""
+    return yaml.safe_dump(text, default_style='"', width=math.inf, allow_unicode=True).rstrip("\n")
+
+
+def entry(value: Entry) -> str:
+    """Any parameter value as YAML on one line.
+
+    >>> entry([1.0, 1e-9]), entry(True), entry("a b")
+    ('[1.0, 1.0e-09]', 'true', '"a b"')
+    """
+    if isinstance(value, list):
+        return f"[{', '.join(entry(v) for v in value)}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return number(value)
+    return quoted(value) if isinstance(value, str) else str(value)
+
+
+def parameters(text: str, source: str = "parameter file") -> dict[str, dict[str, Entry]]:
+    """Parameters of every node in a file, names joined by points.
+
+    Parameters
+    ----------
+    text : str
+        YAML.
+    source : str
+        What to call the file in messages.
+
+    Returns
+    -------
+    dict
+        Node key (``"/**"``, ``"/stage_x/identification_node"``) to parameter names to values.
+
+    Raises
+    ------
+    ParameterError
+        If the text is no YAML, too long, uses aliases, gives a parameter twice, or holds no ``ros__parameters``.
+
+    Examples
+    --------
+    >>> parameters("/**: {ros__parameters: {rate: 1e3, x: {y: [a, b]}}}")
+    {'/**': {'rate': 1000.0, 'x.y': ['a', 'b']}}
+    """
+    if len(text) > LONGEST_TEXT:
+        raise ParameterError(f"{source}: got more than {LONGEST_TEXT} characters, expected a ROS 2 parameter file")
+    try:
+        root = yaml.compose(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f" in line {mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or "not a text"
+        raise ParameterError(f"{source}: broken YAML{where}: {problem}; expected a ROS 2 parameter file") from None
+    except RecursionError:
+        raise ParameterError(f"{source}: nested too deeply, expected a ROS 2 parameter file") from None
+    found: dict[str, dict[str, Entry]] = {}
+    for node, mapping in _nodes(root, ""):
+        into = found.setdefault(node, {})
+        for name, value in _flat(mapping, "", source):
+            if name in into:
+                raise ParameterError(f"{source}: '{name}' is given twice for {node}, expected each parameter once")
+            into[name] = value
+    if not found:
+        raise ParameterError(f"{source}: got no 'ros__parameters', expected a ROS 2 parameter file keyed '/**'")
+    return found
+
+
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]
+    """Without aliases, as rcl: a few of them in one another stand for a text without end."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.composer.ComposerError(
+                None, None, "got an alias, which ROS does not read", self.peek_event().start_mark
+            )
+        return super().compose_node(parent, index)
+
+
+def _nodes(node: yaml.Node | None, path: str, depth: int = 0) -> Iterator[tuple[str, yaml.MappingNode]]:
+    if not isinstance(node, yaml.MappingNode) or depth > 8:
+        return
+    for key, value in node.value:
+        if key.value == "ros__parameters" and isinstance(value, yaml.MappingNode):
+            yield path, value
+        elif isinstance(key, yaml.ScalarNode):
+            yield from _nodes(value, f"{path}/{key.value}" if path else key.value, depth + 1)
+
+
+def _flat(mapping: yaml.MappingNode, prefix: str, source: str) -> Iterator[tuple[str, Entry]]:
+    if prefix.count(".") > 8:
+        raise ParameterError(f"{source}: '{prefix}' is nested too deeply, expected a ROS 2 parameter file")
+    for key, value in mapping.value:
+        if not isinstance(key, yaml.ScalarNode):
+            raise ParameterError(f"{source}: line {key.start_mark.line + 1} has a key that is no parameter name")
+        name = prefix + key.value
+        if isinstance(value, yaml.MappingNode):
+            yield from _flat(value, name + ".", source)
+        elif isinstance(value, yaml.SequenceNode):
+            if not all(isinstance(item, yaml.ScalarNode) for item in value.value):
+                raise ParameterError(f"{source}: '{name}' holds a list of lists, expected a list of numbers or texts")
+            yield name, [_scalar(item) for item in value.value]
+        else:
+            yield name, _scalar(value)
+
+
+def _scalar(node: yaml.ScalarNode) -> Scalar:
+    text: str = node.value
+    if node.style in ("'", '"', "|", ">"):
+        return text
+    if text in _TRUE:
+        return True
+    if text in _FALSE:
+        return False
+    if _INTEGER.fullmatch(text):
+        return int(text, 0) if "x" in text.lower() else int(text)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    special = _SPECIAL.fullmatch(text)
+    return float(special[1] + special[2]) if special else text

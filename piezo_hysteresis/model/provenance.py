@@ -1,0 +1,42 @@
+"""`provenance`: what a model file says about where its values come from."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from datetime import UTC, datetime
+
+import numpy as np
+
+from ..record import Experiment
+
+
+def provenance(experiment: Experiment, error: float, percent: float) -> Mapping[str, str]:
+    """Source, date and hash of the data, and the free-run error reached.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        What was fitted.
+    error : float
+        Rms of the free-run error on held-out data [m].
+    percent : float
+        The same in per cent of the displacement range.
+    """
+    return {
+        "source": experiment.source,
+        "date": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "data_hash": data_hash(experiment),
+        "free_run_error": repr(float(f"{error:.6g}")),
+        "free_run_error_percent": repr(float(f"{percent:.6g}")),
+    }
+
+
+def data_hash(experiment: Experiment) -> str:
+    """``sha256:`` and 16 digits of phase names, sample periods, voltages and displacements."""
+    digest = hashlib.sha256()
+    for record in experiment:
+        digest.update(f"{record.phase} {record.sample_period!r} {record.size}\n".encode())
+        digest.update(np.ascontiguousarray(record.voltage, dtype="<f8").tobytes())
+        digest.update(np.ascontiguousarray(record.displacement, dtype="<f8").tobytes())
+    return "sha256:" + digest.hexdigest()[:16]

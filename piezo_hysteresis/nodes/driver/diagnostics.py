@@ -1,0 +1,78 @@
+"""`DriverDiagnostics`: the driver's line on /diagnostics, once a second."""
+
+from __future__ import annotations
+
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from ...acquisition.streaming import Acquisition
+from ..messages.conversions import diagnostic
+from ..runtime.sending import send
+
+
+class DriverDiagnostics:
+    """Publishes state, rate reached and what was lost; every change of state at once.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The driver; its full name stands before every status.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._name = f"{node.get_fully_qualified_name().lstrip('/')}: stage"
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._state = (DiagnosticStatus.STALE, "not configured", "")
+        self._acquisition: Acquisition | None = None
+        self._target = 0.0
+        self._seen = (time.monotonic(), 0, 0.0, 0.0)
+        self.refused = 0
+        node.create_timer(1.0, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def state(self, level: bytes, message: str, stage: str = "") -> None:
+        """Tell a state of the driver from now on."""
+        self._state = (level, message, stage)
+        self.publish()
+
+    def watch(self, acquisition: Acquisition | None, rate: float = 0.0) -> None:
+        """Tell the figures of an acquisition that shall reach a rate [samples per s]; None ends it."""
+        self._acquisition, self._target = acquisition, rate
+        self._seen = (time.monotonic(), 0, 0.0, 0.0)
+
+    def publish(self) -> None:
+        """Publish one array with one status."""
+        level, message, stage = self._state
+        values: dict[str, object] = {"refused_commands": self.refused}
+        acquisition = self._acquisition
+        if acquisition is not None:
+            tally, now = acquisition.tally, time.monotonic()
+            then, samples, postponed, jumps = self._seen
+            covered = tally.samples + tally.never_measured
+            self._seen = (now, covered, tally.postponed, tally.clock_jumps)
+            if tally.postponed > postponed:
+                level = DiagnosticStatus.WARN
+                message = f"behind by {tally.postponed - postponed:.3g} s; the stamps moved"
+            elif tally.clock_jumps > jumps:
+                level = DiagnosticStatus.WARN
+                message = f"the clock jumped by {tally.clock_jumps - jumps:.3g} s; the stamps moved with it"
+            values |= {
+                "rate": (covered - samples) / (now - then) if now > then else 0.0,
+                "rate_expected": self._target,
+                "samples": tally.samples,
+                "blocks": tally.blocks,
+                "never_measured": tally.never_measured,
+                "latency_max": tally.latest,
+                "postponed": tally.postponed,
+                "clock_jumps": tally.clock_jumps,
+                "clock_drift": tally.clock_drift,
+                "voltage": acquisition.playback.voltage,
+                "phase": str(acquisition.playback.phase),
+            }
+            tally.latest = 0.0
+        array = DiagnosticArray(status=[diagnostic(level, self._name, message, stage, **values)])
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        send(self._publisher, array)

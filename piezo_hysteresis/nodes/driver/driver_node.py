@@ -1,0 +1,206 @@
+"""`driver_node`: drives one stage, publishes every sample, plays commands that it has checked whole."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.wait_for_message import wait_for_message
+from sensor_msgs.msg import PointCloud2
+
+from ...acquisition.back_ends import BACK_ENDS
+from ...acquisition.session import DriverSession
+from ...acquisition.settings import DRIVER, IN_FORCE, DriverSettings
+from ...errors import PiezoError, StageError
+from ..runtime.node_clock import now
+from ..runtime.parameters import declare, read
+from ..runtime.process import run
+from ..runtime.qos import SAMPLES
+from .commands import DriverCommands
+from .diagnostics import DriverDiagnostics
+from .publishers import DriverTopics
+
+_SILENCE = 1.0
+"""Time without a block after which a publisher of samples is taken for dead [s]."""
+
+
+class DriverNode(LifecycleNode):
+    """Driver of one axis: topics, services and parameters stand in docs/ros.
+
+    Parameters
+    ----------
+    **options
+        As for `rclpy.node.Node`.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("driver_node", **options)
+        declare(self, DRIVER)
+        for word, back_end in BACK_ENDS.items():
+            declare(self, back_end.rows, f"{word}.")
+        declare(self, IN_FORCE, "in_force.")
+        self._session: DriverSession | None = None
+        self._topics: DriverTopics | None = None
+        self._failure: PiezoError | None = None
+        self._telling = False
+        self._diagnostics = DriverDiagnostics(self)
+        self.add_on_set_parameters_callback(self._refuse_while_configured)
+        self._commands = DriverCommands(self, self._diagnostics)
+
+    def begin(self) -> None:
+        """Configure and activate where `autostart` asks for it; after a failure both can be tried again."""
+        if self.get_parameter("autostart").value and self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
+            self.trigger_activate()
+
+    def end(self) -> None:
+        """Ramp to the safe voltage and release the stage, while publishers still work."""
+        if self._state_machine.current_state[1] == "active":
+            self.trigger_deactivate()
+        if self._state_machine.current_state[1] in ("unconfigured", "inactive"):
+            self.trigger_shutdown()
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Open the stage; on failure the node stays unconfigured and tells why."""
+        try:
+            settings = DriverSettings.from_values(read(self, DRIVER))
+            values = read(self, BACK_ENDS[settings.stage].rows, f"{settings.stage}.")
+            place = f"{self.resolve_topic_name('samples')} of domain {self.context.get_domain_id()}"
+            session = DriverSession(settings, values, place)
+            try:
+                self._refuse_second_driver(settings.discovery_time)
+            except StageError:
+                session.close()
+                raise
+        except Exception as error:  # rclpy would end the transition without a word
+            self._tell_failure(error)
+            return TransitionCallbackReturn.FAILURE
+        name = session.limits.name
+        self._tell_in_force(session.in_force())
+        self._session = session
+        self._topics = DriverTopics(self, name, session.sample_period, settings.live_rate)
+        self._commands.attach(session, self._topics)
+        self._diagnostics.state(DiagnosticStatus.OK, "configured, not active", name)
+        self.get_logger().info(f"configured: {name}, {1 / session.sample_period:g} samples per second")
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let samples flow."""
+        done = super().on_activate(state)
+        assert self._session is not None and self._topics is not None
+        self._failure = None
+        topics, session = self._topics, self._session
+        acquisition = session.start(lambda: now(self), topics.deliver, self._fail, lambda: topics.subscribers)
+        self._diagnostics.watch(acquisition, session.settings.real_time_factor / session.sample_period)
+        self._diagnostics.state(DiagnosticStatus.OK, "streaming", session.limits.name)
+        return done
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Ramp to the safe voltage, then stop the samples."""
+        self._make_safe()
+        done = super().on_deactivate(state)
+        if self._failure is not None:
+            return TransitionCallbackReturn.ERROR
+        self._diagnostics.state(DiagnosticStatus.OK, "configured, not active")
+        return done
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Release the stage."""
+        self._release()
+        self._diagnostics.state(DiagnosticStatus.STALE, "not configured")
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make safe and release the stage."""
+        self._make_safe()
+        self._release()
+        self._diagnostics.state(DiagnosticStatus.STALE, "shut down")
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make safe and release the stage; the node is unconfigured then and can be tried again."""
+        self._make_safe()
+        self._release()
+        super().on_error(state)
+        return TransitionCallbackReturn.SUCCESS
+
+    def _make_safe(self) -> None:
+        self._diagnostics.watch(None)
+        if self._session is not None:
+            try:
+                self._session.make_safe()
+            except Exception as error:
+                self._tell_failure(error)
+
+    def _release(self) -> None:
+        self._commands.detach()
+        self._tell_in_force({row.name: row.value for row in IN_FORCE})
+        session, self._session = self._session, None
+        topics, self._topics = self._topics, None
+        if topics is not None:
+            topics.destroy()
+        if session is not None:
+            try:
+                session.close()
+            except Exception as error:
+                self._tell_failure(error)
+
+    def _fail(self, error: PiezoError) -> None:
+        """The acquisition has ended by itself, in its thread: leave the active state from the executor's."""
+        self._failure = error
+        self._tell_failure(error)
+        self.executor.create_task(self._give_up)
+
+    def _give_up(self) -> None:
+        if self._state_machine.current_state[1] == "active":
+            self.trigger_deactivate()
+
+    def _tell_failure(self, error: Exception) -> None:
+        reason = str(error) if isinstance(error, PiezoError) else f"fault of the driver: {error!r}"
+        self.get_logger().error(reason)
+        self._diagnostics.state(DiagnosticStatus.ERROR, reason)
+
+    def _tell_in_force(self, values: Mapping[str, object]) -> None:
+        self._telling = True
+        self.set_parameters([Parameter(f"in_force.{name}", value=value) for name, value in values.items()])
+        self._telling = False
+
+    def _refuse_second_driver(self, discovery_time: float) -> None:
+        """A publisher of samples that really sends is another driver, on this machine or another one."""
+        deadline = time.monotonic() + discovery_time
+        while self.count_publishers("samples") == 0:
+            if time.monotonic() > deadline:
+                return
+            time.sleep(0.02)
+        sends, _ = wait_for_message(PointCloud2, self, "samples", qos_profile=SAMPLES, time_to_wait=_SILENCE)
+        if sends:
+            topic = self.resolve_topic_name("samples")
+            raise StageError(f"{topic} is published by another driver; stop that one or take another namespace")
+        self.get_logger().warning("a publisher of samples is known but silent; taken for a driver that was killed")
+
+    def _refuse_while_configured(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Parameters are read at configure; a change that would have no effect is not accepted."""
+        ours = {row.name for row in DRIVER}
+        for name in (parameter.name for parameter in parameters):
+            reason = ""
+            if name.startswith("in_force."):
+                reason = "" if self._telling else f"{name} tells what holds; set {name.removeprefix('in_force.')}"
+            elif self._session is not None and (name in ours or name.split(".")[0] in BACK_ENDS):
+                reason = f"{name} is read at configure; deactivate and clean up the driver, set it, configure"
+            if reason:
+                return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a driver; its exit code is 2 where its parameters make no sense."""
+    return run(DriverNode, arguments, begin=DriverNode.begin, end=DriverNode.end)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,126 @@
+"""`DriverTopics`: what the driver publishes, from deliveries and refusals to messages."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Float64, String
+
+from ...acquisition.drive import Event, Happening, Phase
+from ...acquisition.streaming import Delivery
+from ..messages.conversions import diagnostic, live, to_stamp
+from ..messages.samples import SampleBlock, SampleWriter
+from ..runtime.qos import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
+from ..runtime.sending import is_heard, send
+
+_STATES = {Happening.BEGAN: "playing", Happening.DONE: "done", Happening.STOPPED: "stopped"}
+
+
+class DriverTopics:
+    """Publishers of a driver.
+
+    Parameters
+    ----------
+    node : rclpy.lifecycle.LifecycleNode
+        The driver.
+    stage : str
+        Name of the stage.
+    sample_period : float
+        Time between samples [s].
+    live_rate : float
+        Rate of the live scalars in stage time [Hz].
+    """
+
+    def __init__(self, node: LifecycleNode, stage: str, sample_period: float, live_rate: float) -> None:
+        self._stage = stage
+        self._live_step = max(1, round(1 / (live_rate * sample_period)))
+        self._next_live = 0
+        self._first: dict[int, int] = {}
+        self._writer = SampleWriter()
+        self._samples = node.create_lifecycle_publisher(
+            PointCloud2, "samples", SAMPLES, qos_overriding_options=QoSOverridingOptions.with_default_policies()
+        )
+        self._voltage = node.create_lifecycle_publisher(Float64, "voltage", COMMAND)
+        self._displacement = node.create_lifecycle_publisher(Float64, "displacement", COMMAND)
+        self._live = node.create_lifecycle_publisher(JointState, "live", COMMAND)
+        self._phase = node.create_lifecycle_publisher(String, "phase", LATCHED)
+        self._status = node.create_publisher(DiagnosticStatus, "command_status", COMMAND_STATUS)
+        self._node = node
+
+    @property
+    def subscribers(self) -> int:
+        """Matched subscribers of `samples`."""
+        return int(self._samples.get_subscription_count())
+
+    def destroy(self) -> None:
+        """Take the topics back."""
+        for publisher in (self._samples, self._voltage, self._displacement, self._live, self._phase):
+            self._node.destroy_lifecycle_publisher(publisher)
+        self._node.destroy_publisher(self._status)
+
+    def deliver(self, delivery: Delivery) -> None:
+        """Publish a block: phases that begin in it first, commands that end in it last."""
+        begun = [e for e in delivery.events if e.happening is Happening.BEGAN]
+        ended = [e for e in delivery.events if e.happening is not Happening.BEGAN]
+        for event in begun:
+            send(self._phase, String(data=str(event.phase)))
+            self._tell(event, delivery.first)
+        if not send(self._samples, self._writer.write(delivery.block)):
+            told = f"a block of {delivery.block.size} samples was not taken by the middleware; it is lost"
+            self._node.get_logger().warning(told)
+        for event in ended:
+            self._tell(event, delivery.first)
+        last = delivery.first + delivery.block.size - 1
+        if last >= self._next_live:
+            self._next_live = (last // self._live_step + 1) * self._live_step
+            self._publish_live(delivery.block)
+
+    def accepted(self, phase: Phase, size: int) -> None:
+        """Tell that a command of so many samples will be played."""
+        self._publish_status(DiagnosticStatus.OK, phase.name, f"{size} samples", "accepted", phase.stamp, phase.number)
+
+    def refused(self, name: str, stamp: int, reason: str) -> None:
+        """Tell that a command will not be played, and why."""
+        self._publish_status(DiagnosticStatus.WARN, name, reason, "refused", stamp)
+
+    def stopped(self, phase: Phase) -> None:
+        """Tell that the stage was asked to stop when no command was playing."""
+        self._publish_status(DiagnosticStatus.WARN, phase.name, "stop", "stopped", phase.stamp, phase.number)
+
+    def _tell(self, event: Event, first: int) -> None:
+        phase = event.phase
+        if not phase.commanded:
+            return
+        if event.happening is Happening.BEGAN:
+            self._first = {phase.number: first + event.offset}
+        level = DiagnosticStatus.WARN if event.happening is Happening.STOPPED else DiagnosticStatus.OK
+        state = _STATES[event.happening]
+        began = self._first.get(phase.number, first + event.offset)
+        self._publish_status(level, phase.name, state, state, phase.stamp, phase.number, began)
+
+    def _publish_status(
+        self,
+        level: bytes,
+        name: str,
+        message: str,
+        state: str,
+        stamp: int,
+        phase: int | str = "",
+        first: int | str = "",
+    ) -> None:
+        at = to_stamp(stamp)
+        values = {"state": state, "stamp": f"{at.sec}.{at.nanosec:09d}", "phase": phase}
+        if isinstance(first, int):
+            values["first_index"] = first % (1 << 32)
+        send(self._status, diagnostic(level, name, message, self._stage, **values))
+
+    def _publish_live(self, block: SampleBlock) -> None:
+        voltage, displacement = float(block.voltage[-1]), float(block.displacement[-1])
+        for publisher, value in ((self._voltage, voltage), (self._displacement, displacement)):
+            if is_heard(publisher):
+                send(publisher, Float64(data=value))
+        if is_heard(self._live):
+            stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
+            send(self._live, live(stamp, self._stage, voltage=voltage, displacement=displacement))

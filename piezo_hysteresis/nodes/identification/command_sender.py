@@ -1,0 +1,72 @@
+"""`CommandSender`: waveforms to the driver, packed and published in a thread of their own."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from builtin_interfaces.msg import Time
+from rclpy.duration import Duration
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
+
+from ...identification.protocol.protocol import Phase
+from ..messages.conversions import command_to_cloud
+from ..runtime.qos import COMMAND
+from ..runtime.sending import is_taken_by, send
+
+_LONGEST_WAY = 2.0
+"""Wait for a waveform that is on its way when it is called off [s]."""
+
+
+class CommandSender:
+    """Publishes on `command` while its node goes on: minutes of drive are 80 MB, seconds of work on a busy computer.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The identification node.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(PointCloud2, "command", COMMAND)
+        self._thread: threading.Thread | None = None
+        self._called_off = threading.Event()
+
+    def reaches(self, driver: str) -> bool:
+        """Whether the node `driver` of this namespace takes what is sent; a recorder alone plays nothing."""
+        return is_taken_by(driver, self._node, self._publisher)
+
+    def send(self, phase: Phase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
+        """Send a phase, stamped when it is packed and leaves: its age shall be that of its way.
+
+        Parameters
+        ----------
+        phase : Phase
+        leaving : callable
+            Called with the stamp before the message is published, in the thread.
+        lost : callable
+            Called where the middleware did not take the message, in the thread.
+        """
+        self.call_off()
+        self._called_off.clear()
+        self._thread = threading.Thread(target=self._send, args=(phase, leaving, lost), name="command", daemon=True)
+        self._thread.start()
+
+    def call_off(self) -> None:
+        """Return when nothing is on its way any more: what arrived after a stop would be played."""
+        self._called_off.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._publisher.wait_for_all_acked(Duration(seconds=_LONGEST_WAY))
+            self._thread = None
+
+    def _send(self, phase: Phase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
+        cloud = command_to_cloud(phase.voltage, phase.sample_period, phase.name)
+        if self._called_off.is_set():
+            return
+        cloud.header.stamp = self._node.get_clock().now().to_msg()
+        leaving(cloud.header.stamp)
+        if not send(self._publisher, cloud):
+            lost()

@@ -1,0 +1,134 @@
+"""`DriverLink`: the driver as seen from the identification node: its limits, its voltage, commands and their fate."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.task import Future
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from ...errors import PiezoError
+from ...identification.protocol.drive_limits import DriveLimits
+from ...identification.protocol.protocol import Phase
+from ..messages.conversions import values_of
+from ..runtime.qos import COMMAND, COMMAND_STATUS
+from .command_sender import CommandSender
+
+_NAMES = ("sample_period", "voltage_min", "voltage_max", "safe_voltage", "max_slew_rate", "ramp_rate")
+
+_POLL_INTERVAL = 0.5
+
+_SAFE_WITHIN = 5e-3
+"""Distance from the safe voltage that counts as there [V]: converters round, measured voltages are noisy."""
+
+
+class DriverLink:
+    """Asks the driver for what is in force, sends it phases, and follows what becomes of them.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The identification node.
+    driver : str
+        Name of the driver node in the same namespace.
+
+    Attributes
+    ----------
+    limits : DriveLimits or None
+        What the driver accepts; None while there is no configured driver.
+    state, reason : str
+        Fate of the last phase: ``sending``, ``sent``, ``accepted``, ``playing``, ``done``, ``refused`` or ``stopped``.
+    first_index : int
+        Index of its first sample, once it plays.
+    """
+
+    def __init__(self, node: Node, driver: str) -> None:
+        self._node, self._driver = node, driver
+        self.limits: DriveLimits | None = None
+        self.state = self.reason = ""
+        self.first_index = 0
+        self._sent: tuple[str, str] | None = None
+        self._newest: float | None = None
+        self._pending: Future | None = None
+        self._parameters = AsyncParameterClient(node, driver)
+        self._stop = node.create_client(Trigger, f"{driver}/stop")
+        self._command = CommandSender(node)
+        node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
+        node.create_subscription(Float64, "voltage", self._on_voltage, COMMAND)
+        node.create_timer(_POLL_INTERVAL, self._poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def missing(self) -> str:
+        """What is still missing before a phase can be sent; empty when nothing is."""
+        if self.limits is None:
+            return f"a configured '{self._driver}' in {self._node.get_namespace()}"
+        if not self._command.reaches(self._driver):
+            return f"a subscription of '{self._driver}' to 'command'"
+        if self._newest is None:
+            return "a first 'voltage'; is the driver active?"
+        return ""
+
+    @property
+    def is_safe(self) -> bool:
+        """True where the newest voltage is the safe one."""
+        return (
+            self.limits is not None
+            and self._newest is not None
+            and abs(self._newest - self.limits.safe_voltage) <= _SAFE_WITHIN
+        )
+
+    def send(self, phase: Phase) -> None:
+        """Send a phase as a command, without waiting until it has left."""
+        self._sent, self.state, self.reason = None, "sending", ""
+
+        def leaving(stamp: Time) -> None:
+            self._sent, self.state = (phase.name, f"{stamp.sec}.{stamp.nanosec:09d}"), "sent"
+
+        def lost() -> None:
+            self.state, self.reason = "refused", "the middleware did not take the waveform"
+
+        self._command.send(phase, leaving, lost)
+
+    def stop(self) -> Future | None:
+        """Ask the driver to go to the safe voltage; None where there is no driver to ask.
+
+        A phase that is on its way arrives first.
+        """
+        self._command.call_off()
+        self._sent = None
+        return self._stop.call_async(Trigger.Request()) if self._stop.service_is_ready() else None
+
+    def _poll(self) -> None:
+        if self._pending is not None and not self._pending.done() and self._stop.service_is_ready():
+            return
+        self._pending = None
+        if not self._parameters.services_are_ready():
+            self.limits = None
+            return
+        self._pending = self._parameters.get_parameters([f"in_force.{name}" for name in _NAMES])
+        self._pending.add_done_callback(self._on_limits)
+
+    def _on_limits(self, answer: Future) -> None:
+        values = [parameter_value_to_python(value) for value in answer.result().values]
+        self.limits = None
+        if len(values) == len(_NAMES) and values[0]:
+            try:
+                self.limits = DriveLimits(**dict(zip(_NAMES, values, strict=True)))
+            except (PiezoError, TypeError) as error:
+                self._node.get_logger().warning(f"the driver's limits: {error}", throttle_duration_sec=10.0)
+
+    def _on_voltage(self, message: Float64) -> None:
+        self._newest = float(message.data)
+
+    def _on_status(self, status: DiagnosticStatus) -> None:
+        values = values_of(status)
+        if self._sent == (status.name, values.get("stamp")):
+            self.state, self.reason = values.get("state", ""), status.message
+            first = values.get("first_index", "")
+            if first.isdecimal() and len(first) <= 10:
+                self.first_index = int(first)

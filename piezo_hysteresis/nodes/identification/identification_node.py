@@ -1,0 +1,222 @@
+"""`identification_node`: plays a protocol, records it, fits it in another process, and serves the model."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Generator, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from ...effects import Arx, BoucWen, Offset
+from ...errors import ParameterError, PiezoError
+from ...identification.protocol.drive_limits import DriveLimits
+from ...identification.protocol.protocol import Protocol, paper, rich, short
+from ...model.model import Model
+from ...model.model_file import dumps, loads, save
+from ...model.model_parameters import PREFIX
+from ...recording.segmentation.decimation import save_decimation
+from ..runtime.parameters import Row, Setting, declare, read
+from ..runtime.process import run
+from ..runtime.qos import LATCHED
+from ..runtime.sending import send
+from .driver_client import DriverLink
+from .fit_process import FitProcess, Job, diagnosis, identification
+from .protocol_runner import Progress, campaign
+from .served_model import ServedModel
+from .status import IdentificationStatus
+
+PROTOCOLS: dict[str, Callable[[DriveLimits, int], Protocol]] = {"paper": paper, "short": short, "rich": rich}
+"""Words of the parameter `protocol`."""
+
+IDENTIFICATION: tuple[Row, ...] = (
+    Setting("protocol", "short", "what is played to the stage", tuple(PROTOCOLS)),
+    Setting("seed", 0, "fixes everything random in the protocol"),
+    Setting("driver", "driver_node", "name of the driver node in the same namespace; read at start"),
+    Setting("experiment", "", "recording for ~/diagnose, inside experiment_root; empty: the last one"),
+    Setting(
+        "experiment_root", "", "folder of the recordings, read at start; empty: ~/.ros/piezo_hysteresis/<namespace>"
+    ),
+)
+
+START = Model((BoucWen(), Arx(), Offset()), 2e-5)
+"""Declared, not valid, before there is a result."""
+
+_TICK = 0.02
+
+
+class IdentificationNode(Node):
+    """Identification of one axis: topics, services and parameters stand in docs/ros."""
+
+    def __init__(self) -> None:
+        super().__init__("identification_node", allow_undeclared_parameters=True)
+        declare(self, IDENTIFICATION)
+        self._status = IdentificationStatus(self)
+        self._driver = DriverLink(self, self._value("driver"))
+        self._models = self.create_publisher(String, "model", LATCHED)
+        self._job: Generator[Progress] | None = None
+        self._last: Path | None = None
+        self._served = ServedModel(self, START)
+        try:
+            self._served.resume({name: p.value for name, p in self._parameter_overrides.items()})
+        except PiezoError as error:
+            self._status.failed(f"no model from the parameters: {error}")
+        if self._served.model is not None:
+            send(self._models, String(data=dumps(self._served.model)))
+        self.add_on_set_parameters_callback(self._check)
+        for name, callback in (
+            ("plan", self._on_plan),
+            ("identify", self._on_identify),
+            ("diagnose", self._on_diagnose),
+            ("abort", self._on_abort),
+        ):
+            self.create_service(Trigger, f"~/{name}", callback)
+        self.create_timer(_TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def end(self) -> None:
+        """Abort what is under way, while services still work."""
+        if self._job is not None:
+            self._job.close()
+            asked = self._driver.stop()
+            if asked is not None:
+                self.executor.spin_until_future_complete(asked, timeout_sec=2.0)
+
+    def _on_plan(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._driver.limits is None:
+            response.message = f"no limits yet: waiting for {self._driver.missing}"
+            return response
+        try:
+            protocol = self._protocol(self._driver.limits)
+        except PiezoError as error:
+            response.message = str(error)
+            return response
+        response.success, response.message = True, f"{protocol.name}: {protocol.summary}"
+        return response
+
+    def _on_identify(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        path = self._root() / datetime.now(UTC).strftime("%Y%m%dT%H%M%S%fZ")
+        return self._begin(response, self._identify(path), f"recording to {path}")
+
+    def _on_diagnose(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        path = self._experiment()
+        if path is None:
+            response.message = f"no experiment in {self._root()}; set 'experiment', or identify first"
+            return response
+        return self._begin(response, self._fit(diagnosis, path), f"diagnosing {path}")
+
+    def _on_abort(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._job is None:
+            response.message = "nothing is under way"
+            return response
+        self._job.close()
+        self._job = None
+        self._status.aborted("on request; the stage goes to its safe voltage, the recording is readable")
+        response.success, response.message = True, "aborted"
+        return response
+
+    def _begin(self, response: Trigger.Response, job: Generator[Progress], message: str) -> Trigger.Response:
+        if self._job is not None:
+            job.close()
+            response.message = "busy; wait, or abort first"
+            return response
+        self._job = job
+        response.success, response.message = True, message
+        return response
+
+    def _tick(self) -> None:
+        if self._job is None:
+            return
+        try:
+            self._status.progress(next(self._job))
+        except StopIteration:
+            self._job = None
+        except PiezoError as error:
+            self._job = None
+            self._status.failed(str(error))
+
+    def _identify(self, path: Path) -> Generator[Progress]:
+        planned: list[Protocol] = []
+
+        def plan(limits: DriveLimits) -> Protocol:
+            planned.append(self._protocol(limits))
+            return planned[0]
+
+        self._status.experiment = str(path)
+        yield from campaign(self, self._driver, plan, path)
+        save_decimation(path, {phase.name: phase.stored_every for phase in planned[0]})
+        self._last = path
+        yield from self._fit(identification, path)
+
+    def _fit(self, job: Job, path: Path) -> Generator[Progress]:
+        self._status.experiment = str(path)
+        model = self._served.model
+        process = FitProcess(job, path, "" if model is None else dumps(model))
+        try:
+            while (outcome := process.poll()) is None:
+                word, fraction = process.progress
+                yield Progress("fitting", word, fraction)
+        finally:
+            process.close()
+        found = loads(outcome.model)
+        save(found, (path if path.is_dir() else path.parent) / f"{job.__name__}.yaml")
+        self._served.serve(found)
+        send(self._models, String(data=outcome.model))
+        for line in outcome.summary.splitlines():
+            self.get_logger().info(line)
+        self._status.done(outcome.verdict)
+
+    def _protocol(self, limits: DriveLimits) -> Protocol:
+        values = read(self, IDENTIFICATION)
+        return PROTOCOLS[values["protocol"]](limits, values["seed"])
+
+    def _value(self, name: str) -> str:
+        return str(self.get_parameter(name).value)
+
+    def _root(self) -> Path:
+        given = self._value("experiment_root")
+        return Path(given or Path("~/.ros/piezo_hysteresis") / self.get_namespace().strip("/")).expanduser()
+
+    def _experiment(self) -> Path | None:
+        given = self._value("experiment")
+        if given or self._last is not None:
+            return Path(given).expanduser() if given else self._last
+        recorded = sorted(path.parent for path in self._root().glob("*/metadata.yaml"))
+        return recorded[-1] if recorded else None
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        rows = {row.name: row for row in IDENTIFICATION}
+        try:
+            for parameter in parameters:
+                if parameter.name in rows:
+                    rows[parameter.name].check(parameter.value)
+                    self._check_place(parameter)
+                elif not (parameter.name.startswith(PREFIX) or self.has_parameter(parameter.name)):
+                    raise ParameterError(f"{parameter.name} is no parameter of this node, expected {', '.join(rows)}")
+        except PiezoError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _check_place(self, parameter: Parameter) -> None:
+        """Others shall not choose where this node writes: a diagnosis leaves files beside its recording."""
+        if parameter.name in ("driver", "experiment_root"):
+            raise ParameterError(f"{parameter.name} is read at start; give it then")
+        root = self._root().resolve()
+        if parameter.name == "experiment" and parameter.value:
+            place = Path(parameter.value).expanduser().resolve()
+            if not (place.is_relative_to(root) and place.exists()):
+                raise ParameterError(f"experiment: got {place}, expected a recording inside {root}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run an identification node; its exit code is 2 where its parameters make no sense."""
+    return run(IdentificationNode, arguments, end=IdentificationNode.end)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,131 @@
+"""`campaign`: a protocol played to the stage phase by phase, while everything is recorded."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rclpy.node import Node
+
+from ...errors import StageError
+from ...identification.protocol.drive_limits import DriveLimits
+from ...identification.protocol.protocol import Phase, Protocol
+from .bag_recorder import BagRecorder
+from .driver_client import DriverLink
+
+PATIENCE = 30.0
+"""Longest wait for the driver, for an answer, and for samples [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where a long job stands.
+
+    Parameters
+    ----------
+    state : str
+        ``waiting``, ``running`` or ``fitting``.
+    reason : str
+        One line.
+    fraction : float
+        Done of this state, 0 to 1.
+    phase : str
+        ``"3 of 16 noise"`` while a phase is played.
+    """
+
+    state: str
+    reason: str
+    fraction: float = 0.0
+    phase: str = ""
+
+
+def campaign(
+    node: Node, driver: DriverLink, plan: Callable[[DriveLimits], Protocol], path: Path
+) -> Generator[Progress]:
+    """Play and record a protocol; to be resumed at short intervals until it ends.
+
+    Closing the iterator aborts: the driver is asked to go to its safe voltage and the recording is finished.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The identification node.
+    driver : DriverLink
+        The stage.
+    plan : callable
+        Makes the protocol for the limits of the driver.
+    path : Path
+        Folder of the bag.
+
+    Raises
+    ------
+    StageError
+        If there is no driver, a phase is refused or stopped, or the samples cease.
+    RecordingError
+        If the bag cannot be written.
+    IdentificationError
+        If the protocol does not fit the limits.
+    """
+    yield from _until(lambda: driver.limits is not None, lambda: driver.missing)
+    assert driver.limits is not None
+    protocol = plan(driver.limits)
+    recorder = BagRecorder(node, path)
+    finished = False
+    try:
+        seen = recorder.counts
+        yield from _until(
+            lambda: not driver.missing and seen["samples"] > 0 and seen["phase"] > 0,
+            lambda: driver.missing or "samples",
+        )
+        if not driver.is_safe:
+            driver.stop()
+            yield from _until(lambda: driver.is_safe, lambda: "the safe voltage")
+        done = 0.0
+        for number, phase in enumerate(protocol, 1):
+            told = Progress(
+                "running", str(path), done / protocol.summary.duration, f"{number} of {len(protocol)} {phase.name}"
+            )
+            yield from _play(driver, recorder, phase, told)
+            done += phase.duration
+        # what is written lags behind the status while the computer is busy
+        end = driver.first_index + protocol.phases[-1].voltage.size
+        yield from _until(lambda: recorder.holds(end), lambda: "the last samples")
+        finished = True
+    finally:
+        recorder.close()
+        if not finished:
+            driver.stop()
+
+
+def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Generator[Progress]:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > deadline:
+            raise StageError(f"waited {PATIENCE:g} s in vain for {missing()}")
+        yield Progress("waiting", f"for {missing()}")
+
+
+def _play(driver: DriverLink, recorder: BagRecorder, phase: Phase, told: Progress) -> Generator[Progress]:
+    driver.send(phase)
+    # a device that plays from its memory is silent meanwhile
+    longest_silence = PATIENCE + 2.0 * phase.duration
+    deadline = time.monotonic() + PATIENCE
+    played: float | None = None
+    while driver.state != "done":
+        if driver.state in ("refused", "stopped"):
+            raise StageError(f"phase '{phase.name}' was {driver.state}: {driver.reason}")
+        if driver.state in ("sending", "sent") and time.monotonic() > deadline:
+            raise StageError(f"phase '{phase.name}': no answer on 'command_status' within {PATIENCE:g} s")
+        if driver.limits is None:
+            raise StageError(f"phase '{phase.name}': {driver.missing} is gone; /diagnostics and its log tell why")
+        if recorder.silence > longest_silence:
+            raise StageError(f"phase '{phase.name}': no samples for {longest_silence:g} s; is the driver alive?")
+        if recorder.failure is not None:
+            raise recorder.failure
+        if played is None and driver.state == "playing" and recorder.holds(driver.first_index + phase.voltage.size):
+            played = time.monotonic()
+        if played is not None and time.monotonic() > played + PATIENCE:
+            raise StageError(f"phase '{phase.name}' was played, but never told to be done; do others flood 'command'?")
+        yield told

@@ -1,0 +1,103 @@
+"""`ServedModel`: the identified model as parameters of a node, readable by anyone, written by the node alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ...errors import ModelError
+from ...model.model import Model
+from ...model.model_parameters import PREFIX, SCALES, from_parameters, to_parameters
+from ..runtime.parameters import describe
+
+
+class ServedModel:
+    """Parameters under ``model.``, all declared with values; a fit is set atomically.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Made with ``allow_undeclared_parameters``: another chain has other names.
+    start : Model
+        Values to declare before there is a model; not valid.
+
+    Attributes
+    ----------
+    model : Model or None
+        The model served; None while ``model.valid`` is false.
+    """
+
+    def __init__(self, node: Node, start: Model) -> None:
+        self._node = node
+        self._is_ours = False
+        self.model: Model | None = None
+        self._set(start)
+        node.add_on_set_parameters_callback(self._refuse)
+
+    def resume(self, given: Mapping[str, object]) -> None:
+        """Serve the model given at start, if there is one.
+
+        Parameters
+        ----------
+        given : mapping
+            Parameters by name; those of a dump before any fit are not valid and do not count.
+
+        Raises
+        ------
+        ModelError, ParameterError
+            If they are no model.
+        """
+        own = {name: value for name, value in given.items() if name.startswith(PREFIX)}
+        if own and own.get(PREFIX + "valid", True) is not False:
+            self.serve(from_parameters(own, "parameters given at start"))
+
+    def serve(self, model: Model) -> None:
+        """Replace the whole model in one go.
+
+        Raises
+        ------
+        ModelError
+            If a parameter is refused; nothing has changed then.
+        """
+        self.model = model
+        self._set(model)
+
+    def _set(self, model: Model) -> None:
+        named = to_parameters(model, valid=self.model is not None)
+        # a parameter without a type is taken back
+        gone = [name for name in self._node.get_parameters_by_prefix(PREFIX[:-1]) if PREFIX + name not in named]
+        changes = [Parameter(PREFIX + name) for name in gone]
+        changes += [Parameter(name, value=value) for name, value in named.items()]
+        self._is_ours = True
+        try:
+            result = self._node.set_parameters_atomically(changes)
+            if not result.successful:
+                raise ModelError(f"parameters under '{PREFIX}': {result.reason}")
+            for name in named:
+                self._node.set_descriptor(name, _descriptor(name, model))
+        finally:
+            self._is_ours = False
+
+    def _refuse(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name.startswith(PREFIX) and not self._is_ours:
+                reason = f"{parameter.name} is a result; give a model file at start, or identify the stage"
+                return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
+
+def _descriptor(name: str, model: Model) -> ParameterDescriptor:
+    short = name.removeprefix(PREFIX)
+    owner, _, _ = short.partition(".")
+    if owner in model:
+        descriptor = describe(model.row(short))
+    elif short in SCALES:
+        unit, meaning = SCALES[short]
+        descriptor = ParameterDescriptor(description=f"{meaning} [{unit}]")
+    else:
+        descriptor = ParameterDescriptor(description="result of the identification")
+    descriptor.dynamic_typing = True
+    return descriptor

@@ -1,0 +1,161 @@
+"""Streams of sensor_msgs/PointCloud2 as bytes: what their messages have in common is serialised, or read, once."""
+
+from __future__ import annotations
+
+import array
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from numpy.typing import ArrayLike, NDArray
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import PointCloud2
+
+from ...errors import RecordError
+from .cloud import from_cloud, point_type, stored_as, to_cloud, unpacked
+
+_STAMP = struct.Struct("=iI")
+_STAMP_AT = 4
+"""A serialised message begins with four bytes on its encoding; the stamp comes next in a cloud."""
+_AFTER_STAMP = _STAMP_AT + _STAMP.size
+_LONGEST_END = 4
+"""After the data comes `is_dense`, and up to three bytes that say nothing."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Columns:
+    """What a cloud says.
+
+    Parameters
+    ----------
+    stamp : builtin_interfaces.msg.Time
+        Time of the first sample.
+    frame_id : str
+        Phase or stage name.
+    dense : bool
+        False where samples before the first one were never measured.
+    values : dict of str to (n,) ndarray
+        By field name.
+    """
+
+    stamp: Time
+    frame_id: str
+    dense: bool
+    values: dict[str, NDArray]
+
+
+def read_cloud(cloud: PointCloud2, required: Mapping[str, str]) -> Columns:
+    """Columns of a cloud; fields, types and errors as for `from_cloud`."""
+    return Columns(cloud.header.stamp, cloud.header.frame_id, cloud.is_dense, from_cloud(cloud, required))
+
+
+class CloudWriter:
+    """Packs columns as `to_cloud` does, into the bytes that a publisher would send for that message.
+
+    Parameters
+    ----------
+    layout : mapping of str to str
+        Field names in the order of the point, with their numpy types.
+    """
+
+    def __init__(self, layout: Mapping[str, str]) -> None:
+        self._layout = layout
+        self._common: tuple[int, str] | None = None
+
+    def write(self, columns: Mapping[str, ArrayLike], stamp: Time, frame_id: str = "", *, dense: bool = True) -> bytes:
+        """Serialised cloud; parameters as for `to_cloud`, where the first column tells how many points there are."""
+        common = np.size(next(iter(columns.values()))), frame_id
+        if common != self._common:
+            self._begin(*common)
+            self._common = common
+        for name, field in self._fields.items():
+            field[:] = columns[name]
+        message = self._frame.message
+        _STAMP.pack_into(message, _STAMP_AT, stamp.sec, stamp.nanosec)
+        message[self._frame.stop] = dense
+        return bytes(message)
+
+    def _begin(self, size: int, frame_id: str) -> None:
+        blank = {name: np.zeros(size, word) for name, word in self._layout.items()}
+        self._frame = _Frame(to_cloud(blank, self._layout, Time(), frame_id))
+        points = np.frombuffer(self._frame.message, point_type(self._layout), size, self._frame.start)
+        self._fields = {name: points[name] for name in self._layout}
+
+
+class CloudReader:
+    """Unpacks serialised clouds, ours or foreign, as `read_cloud` does.
+
+    A message that equals the one before it, but for stamp, data and `is_dense`, is not deserialised.
+
+    Parameters
+    ----------
+    required : mapping of str to str
+        Field names and the numpy types wanted.
+    """
+
+    def __init__(self, required: Mapping[str, str]) -> None:
+        self._required = required
+        self._known: _Known | None = None
+
+    def read(self, message: bytes) -> Columns:
+        """Columns of a serialised cloud.
+
+        Raises
+        ------
+        RecordError
+            As from `read_cloud`, and on bytes that are no cloud.
+        """
+        if self._known is not None and self._known.is_like(message):
+            return self._known.read(message)
+        try:
+            cloud = deserialize_message(message, PointCloud2)
+        except RuntimeError as error:  # every error of a middleware is one
+            raise RecordError(f"cloud: got {len(message)} bytes of something else, expected a cloud") from error
+        columns = read_cloud(cloud, self._required)
+        self._known = _Known(cloud, message, self._required)
+        return columns
+
+
+class _Known:
+    """Messages like one that was deserialised, which is spoilt."""
+
+    def __init__(self, cloud: PointCloud2, message: bytes, required: Mapping[str, str]) -> None:
+        self._dtype, self._wanted = stored_as(cloud, required)
+        self._frame_id = cloud.header.frame_id
+        frame = _Frame(cloud)
+        self._start, self._stop = frame.start, frame.stop
+        self._encoding = bytes(frame.message[:_STAMP_AT])
+        self._between = message[_AFTER_STAMP : self._start]
+
+    def is_like(self, message: bytes) -> bool:
+        """True where only stamp, data and `is_dense` can differ; not where another encoding puts them elsewhere."""
+        return (
+            message[_AFTER_STAMP : self._start] == self._between
+            and message[:_STAMP_AT] == self._encoding
+            and 0 < len(message) - self._stop <= _LONGEST_END
+        )
+
+    def read(self, message: bytes) -> Columns:
+        """Columns of one of them."""
+        seconds, rest = _STAMP.unpack_from(message, _STAMP_AT)
+        values = unpacked(memoryview(message)[self._start : self._stop], self._dtype, self._wanted)
+        return Columns(Time(sec=seconds, nanosec=rest), self._frame_id, bool(message[self._stop]), values)
+
+
+class _Frame:
+    """A serialised cloud without its data, and where they stand; `is_dense` comes next.
+
+    Parameters
+    ----------
+    cloud : sensor_msgs.msg.PointCloud2
+        It is spoilt.
+    """
+
+    def __init__(self, cloud: PointCloud2) -> None:
+        mark = b"\xff" * len(cloud.data)
+        cloud.data, cloud.is_dense = array.array("B", mark), True
+        self.message = bytearray(serialize_message(cloud))
+        self.start = self.message.rindex(mark + b"\x01")
+        self.stop = self.start + len(mark)

@@ -1,0 +1,95 @@
+"""Messages <-> arrays and plain values: one waveform, one status, one time."""
+
+from __future__ import annotations
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from numpy.typing import ArrayLike, NDArray
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Header
+
+from ...errors import RecordError
+from .cloud import from_cloud, to_cloud
+
+Samples = NDArray[np.float64]
+
+COMMAND = {"time": "f8", "voltage": "f8"}
+"""Point of `command`; `time` is optional."""
+
+PERIOD_TOLERANCE = 0.01
+"""Largest departure of a sample from its place on the clock, in sample periods."""
+
+
+def command_to_cloud(voltage: ArrayLike, sample_period: float, phase: str, stamp: Time | None = None) -> PointCloud2:
+    """Message of `command`: a waveform that opens the phase named `phase`.
+
+    Parameters
+    ----------
+    voltage : (n,) array_like
+        Drive voltage [V].
+    sample_period : float
+        Time between samples [s]; the driver refuses another one than its own.
+    phase : str
+        Name of the phase.
+    stamp : builtin_interfaces.msg.Time, optional
+        Now; without it the driver does not check the age of the command.
+    """
+    values = np.asarray(voltage, dtype=np.float64)
+    columns = {"time": sample_period * np.arange(values.size), "voltage": values}
+    return to_cloud(columns, COMMAND, stamp or Time(), phase)
+
+
+def waveform_from_cloud(cloud: PointCloud2, sample_period: float) -> Samples:
+    """Waveform of a message of `command` [V], shape (n,).
+
+    Raises
+    ------
+    RecordError
+        On a cloud without `voltage`, or a `time` that does not agree with `sample_period`.
+    """
+    arrays = from_cloud(cloud, {"voltage": "f8"}, {"time": "f8"})
+    time, voltage = arrays.get("time"), arrays["voltage"]
+    if time is not None:
+        off = np.abs(time - time[0] - sample_period * np.arange(time.size))
+        if off.max() > PERIOD_TOLERANCE * sample_period:
+            got = float(time[-1] - time[0]) / (time.size - 1)
+            raise RecordError(
+                f"time: got a period of {got:g} s ({off.max():.3g} s off at worst), expected {sample_period:g} s"
+            )
+    return voltage
+
+
+def live(stamp: Time, frame_id: str, **values: float) -> JointState:
+    """Stamped scalars by name, in `position`: PlotJuggler and Foxglove draw loops from it."""
+    return JointState(header=Header(stamp=stamp, frame_id=frame_id), name=list(values), position=list(values.values()))
+
+
+def diagnostic(level: bytes, name: str, message: str, hardware_id: str = "", **values: object) -> DiagnosticStatus:
+    """Status with its values as text; floats with six digits."""
+    pairs = [KeyValue(key=key, value=f"{v:.6g}" if isinstance(v, float) else str(v)) for key, v in values.items()]
+    return DiagnosticStatus(level=level, name=name, message=message, hardware_id=hardware_id, values=pairs)
+
+
+def values_of(status: DiagnosticStatus) -> dict[str, str]:
+    """Values of a status by key."""
+    return {pair.key: pair.value for pair in status.values}
+
+
+def to_stamp(nanoseconds: int) -> Time:
+    """Message time of nanoseconds since the epoch."""
+    seconds, rest = divmod(nanoseconds, 1_000_000_000)
+    return Time(sec=seconds, nanosec=rest)
+
+
+def from_stamp(stamp: Time) -> int:
+    """Nanoseconds since the epoch of a message time.
+
+    Raises
+    ------
+    RecordError
+        On a full second or more of nanoseconds.
+    """
+    if stamp.nanosec >= 1_000_000_000:
+        raise RecordError(f"stamp: got {stamp.nanosec} ns, expected less than a second")
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

@@ -1,0 +1,40 @@
+"""Phases as commands and messages name them. No ROS."""
+
+from __future__ import annotations
+
+import re
+
+from ...errors import RecordError
+
+_PHASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+
+
+def phase_name(frame_id: str) -> str:
+    """Name of a commanded phase; `command` where none is given.
+
+    Raises
+    ------
+    RecordError
+        On a name that could not stand in a file name.
+    """
+    if not frame_id:
+        return "command"
+    if not _PHASE_NAME.fullmatch(frame_id):
+        raise RecordError(
+            f"frame_id: got {frame_id[:80]!r} as phase name, expected 1 to 64 letters, digits, '_', '.', '-'"
+        )
+    return frame_id
+
+
+def phase_from_text(text: str) -> tuple[int, str]:
+    """Number and name of a message of `phase`, ``"<number> <name>"``.
+
+    Raises
+    ------
+    RecordError
+        On any other text.
+    """
+    number, _, name = text.partition(" ")
+    if not (number.isascii() and number.isdigit() and name):
+        raise RecordError(f"phase: got {text[:80]!r}, expected '<number> <name>'")
+    return int(number), name

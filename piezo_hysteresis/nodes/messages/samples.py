@@ -1,0 +1,202 @@
+"""`SampleBlock`: consecutive samples of a stage, and its way into and out of messages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sensor_msgs.msg import PointCloud2
+
+from ...errors import RecordError
+from .cloud import to_cloud
+from .cloud_stream import CloudReader, CloudWriter, Columns, read_cloud
+from .conversions import PERIOD_TOLERANCE, Samples, from_stamp, to_stamp
+
+SAMPLES = {"time": "f8", "voltage": "f8", "displacement": "f8", "index": "u4", "phase": "u4"}
+"""Point of `samples`: time@0, voltage@8, displacement@16, index@24, phase@28."""
+
+PREDICTED_SAMPLES = {
+    "time": "f8",
+    "displacement": "f8",
+    "prediction": "f8",
+    "residual": "f8",
+    "index": "u4",
+    "model": "u4",
+}
+"""Point of `predicted_samples`: time@0, displacement@8, prediction@16, residual@24, index@32, model@36."""
+
+_END_OF_TIME = 2**31
+"""Messages count seconds in 32 bits."""
+
+_LARGEST = {"voltage": 1e4, "displacement": 1.0}
+"""What no piezo stage is driven with [V], and no piezo stage moves [m]."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SampleBlock:
+    """Consecutive samples of a stage, as one message of `samples`.
+
+    Parameters
+    ----------
+    stamp : int
+        Time of the first sample on the driver's clock [ns].
+    time : (n,) ndarray of float64
+        Time of every sample since the stamp [s].
+    voltage : (n,) ndarray of float64
+        Drive voltage before the amplifier [V].
+    displacement : (n,) ndarray of float64
+        Measured displacement [m].
+    index : (n,) ndarray of uint32
+        Running number of the sample, modulo 2^32.
+    phase : (n,) ndarray of uint32
+        Number of the phase.
+    stage : str
+        Name of the stage.
+    follows_gap : bool
+        True where samples before the block were never measured (a device reading out its memory), as told by the
+        index; False where a jump of the index means lost messages.
+    """
+
+    stamp: int
+    time: Samples
+    voltage: Samples
+    displacement: Samples
+    index: NDArray[np.uint32]
+    phase: NDArray[np.uint32]
+    stage: str = ""
+    follows_gap: bool = False
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return int(self.time.size)
+
+    @property
+    def columns(self) -> dict[str, NDArray]:
+        """Arrays by field name of `SAMPLES`."""
+        return {name: getattr(self, name) for name in SAMPLES}
+
+    def after(self, count: int) -> SampleBlock:
+        """Without its first samples."""
+        if count == 0:
+            return self
+        kept: dict[str, Any] = {name: values[count:] for name, values in self.columns.items()}
+        return replace(self, **kept)
+
+    @property
+    def sample_period(self) -> float | None:
+        """Time between samples [s]; None for a block of one."""
+        return float(self.time[-1] - self.time[0]) / (self.size - 1) if self.size > 1 else None
+
+
+def samples_to_cloud(block: SampleBlock) -> PointCloud2:
+    """Message of `samples`."""
+    return to_cloud(block.columns, SAMPLES, to_stamp(block.stamp), block.stage, dense=not block.follows_gap)
+
+
+class SampleWriter:
+    """Serialised messages of `samples`: the bytes of `samples_to_cloud`, for a stream of blocks."""
+
+    def __init__(self) -> None:
+        self._writer = CloudWriter(SAMPLES)
+
+    def write(self, block: SampleBlock) -> bytes:
+        """Message of one block."""
+        return self._writer.write(block.columns, to_stamp(block.stamp), block.stage, dense=not block.follows_gap)
+
+
+def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
+    """Block of a message of `samples`, ours or foreign.
+
+    Raises
+    ------
+    RecordError
+        On missing or wrong fields, wrong sizes, values that are not finite or that no stage has, or samples that do not
+        follow one another evenly.
+    """
+    return _block(read_cloud(cloud, SAMPLES))
+
+
+class SampleReader:
+    """Blocks of serialised messages of `samples`, ours or foreign."""
+
+    def __init__(self) -> None:
+        self._reader = CloudReader(SAMPLES)
+
+    def read(self, message: bytes) -> SampleBlock:
+        """Block of one message; RecordError as from `samples_from_cloud`."""
+        return _block(self._reader.read(message))
+
+
+def _block(columns: Columns) -> SampleBlock:
+    block = SampleBlock(
+        from_stamp(columns.stamp), **columns.values, stage=columns.frame_id, follows_gap=not columns.dense
+    )
+    _require_consecutive(block)
+    for name, largest in _LARGEST.items():
+        values = getattr(block, name)
+        if np.abs(values).max() > largest:
+            worst = float(values[np.abs(values).argmax()])
+            raise RecordError(f"samples: got a {name} of {worst:g}, expected at most {largest:g}")
+    return block
+
+
+def _require_consecutive(block: SampleBlock) -> None:
+    count, places = _counting(block.size)
+    jumps = block.index - block.index[0] != count
+    if jumps.any():
+        raise RecordError(f"samples: the index jumps at sample {int(jumps.argmax())}, expected consecutive samples")
+    first, last = float(block.time[0]), float(block.time[-1])
+    if not all(0 <= block.stamp * 1e-9 + time < _END_OF_TIME for time in (first, last)):
+        raise RecordError(f"samples: got {first:g} to {last:g} s after the stamp {block.stamp} ns, expected a date")
+    period = block.sample_period
+    if period is None:
+        return
+    off = float(np.abs(block.time - first - period * places).max())
+    if not off <= PERIOD_TOLERANCE * period:
+        raise RecordError(f"samples: times are {off:.3g} s off a period of {period:.6g} s, expected even ones")
+
+
+@lru_cache(maxsize=2)
+def _counting(size: int) -> tuple[NDArray[np.uint32], Samples]:
+    """0, 1, 2, … as index and as number: a stream brings blocks of one size."""
+    index, number = np.arange(size, dtype=np.uint32), np.arange(size, dtype=np.float64)
+    for values in (index, number):
+        values.setflags(write=False)
+    return index, number
+
+
+class PredictionWriter:
+    """Serialised messages of `predicted_samples`."""
+
+    def __init__(self) -> None:
+        self._writer = CloudWriter(PREDICTED_SAMPLES)
+
+    def write(
+        self, block: SampleBlock, prediction: Samples, residual: Samples, model: int, *, valid: bool = True
+    ) -> bytes:
+        """Message for the samples of a block.
+
+        Parameters
+        ----------
+        block : SampleBlock
+            What was measured.
+        prediction, residual : (n,) ndarray
+            Predicted displacement and measured minus predicted [m].
+        model : int
+            First 32 bits of the model's hash.
+        valid : bool
+            False while warming up or bridging a gap.
+        """
+        columns: dict[str, ArrayLike] = {
+            "time": block.time,
+            "displacement": block.displacement,
+            "prediction": prediction,
+            "residual": residual,
+            "index": block.index,
+            "model": model,
+        }
+        return self._writer.write(columns, to_stamp(block.stamp), block.stage, dense=valid)

@@ -1,0 +1,142 @@
+"""`ModelDiagnostics`: the model node's line on /diagnostics, once a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from ...model.model import Model
+from ...model.model_parameters import model_hash
+from ...online.predictor import Predictor
+from ..messages.conversions import diagnostic
+from ..messages.samples import SampleBlock
+from ..runtime.sending import send
+
+_LONGEST_REASON = 500
+"""Characters of a reason that are told again every second."""
+
+_LOG_INTERVAL = 0.1
+"""Shortest time between two lines of one kind in the log [s]: no stream of faults fills a disk."""
+
+
+class ModelDiagnostics:
+    """Publishes rate, losses, latency, and the residual against what the model file promises.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The model node; its full name stands before every status.
+    warn, error : float
+        Multiples of the model's free-run error.
+    """
+
+    def __init__(self, node: Node, warn: float, error: float) -> None:
+        self._node, self._warn, self._error = node, warn, error
+        self._name = f"{node.get_fully_qualified_name().lstrip('/')}: prediction"
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._problem = self._refused = ""
+        self._problems = 0
+        self._stage = ""
+        self._model: Model | None = None
+        self._predictor: Predictor | None = None
+        self._promised: float | None = None
+        self._latency = 0.0
+        self._seen = (time.monotonic(), 0, 0, 0)
+        node.create_timer(1.0, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def problem(self, message: str) -> None:
+        """Tell one line of what went wrong, now and in the next report."""
+        if message[:_LONGEST_REASON] != self._problem:
+            self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
+        self._problem = message[:_LONGEST_REASON]
+        self._problems += 1
+
+    def refused(self, message: str) -> None:
+        """Tell why a model was not taken, until another one is."""
+        self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
+        self._refused = message[:_LONGEST_REASON]
+        self._problems += 1
+
+    def model(self, model: Model) -> None:
+        """Tell the model that is followed from now on."""
+        self._model, self._refused = model, ""
+        try:
+            self._promised = float(model.provenance["free_run_error"])
+        except (KeyError, ValueError):
+            self._promised = None
+        told = f"model {model_hash(model)}: {', '.join(e.name for e in model.effects)}"
+        self._node.get_logger().info(told, throttle_duration_sec=_LOG_INTERVAL)
+
+    def follow(self, predictor: Predictor) -> None:
+        """Tell the figures of a predictor from now on."""
+        self._predictor = predictor
+        self._seen = (time.monotonic(), 0, 0, 0)
+
+    def saw(self, block: SampleBlock, now: int) -> None:
+        """Note the age of a block that has been dealt with at `now` [ns]."""
+        self._stage = block.stage
+        self._latency = max(self._latency, (now - block.stamp) * 1e-9 - float(block.time[-1]))
+
+    def _publish(self) -> None:
+        values: dict[str, object] = {"problems": self._problems}
+        if self._model is not None:
+            values["model"] = model_hash(self._model)
+        predictor, received = self._predictor, False
+        lost = repeated = 0
+        if predictor is not None:
+            counts, now = predictor.continuity, time.monotonic()
+            then, received_then, lost_then, repeated_then = self._seen
+            self._seen = (now, counts.received, counts.lost, counts.repeated)
+            received = counts.received > received_then
+            lost, repeated = counts.lost - lost_then, counts.repeated - repeated_then
+            rms = predictor.residual_rms
+            values |= {
+                "rate": (counts.received - received_then) / (now - then) if now > then else 0.0,
+                "received": counts.received,
+                "lost": counts.lost,
+                "repeated": counts.repeated,
+                "restarts": counts.restarts,
+                "latency_max": self._latency,
+                "offset": predictor.offset,
+                "warming_up": predictor.warming_up,
+                "swapping": predictor.is_swapping,
+                **({} if rms is None else {"residual_rms": rms}),
+                **({} if self._promised is None else {"free_run_error": self._promised}),
+            }
+        findings = list(self._findings(received, lost, repeated)) or [(DiagnosticStatus.OK, "predicting")]
+        level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
+        self._problem, self._latency = "", 0.0
+        array = DiagnosticArray(status=[diagnostic(level, self._name, message, self._stage, **values)])
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        send(self._publisher, array)
+
+    def _findings(self, received: bool, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
+        predictor, promised = self._predictor, self._promised
+        for told in filter(None, (self._refused, self._problem)):
+            yield DiagnosticStatus.ERROR, told
+        if predictor is None or not received:
+            yield DiagnosticStatus.STALE, "no samples"
+            return
+        if lost:
+            yield DiagnosticStatus.WARN, f"{lost} samples lost, bridged by holding the voltage"
+        if repeated:
+            yield DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late, dropped"
+        if predictor.model is None and self._model is None:
+            yield DiagnosticStatus.WARN, "no model: give model_file, or identify the stage"
+        elif predictor.model is None:
+            yield DiagnosticStatus.ERROR, "the model cannot follow: slower than the samples, or it ran away"
+        if predictor.model is None:
+            return
+        if predictor.warming_up:
+            yield (
+                DiagnosticStatus.WARN,
+                "warming up: what the drive did before, or in a gap, is unknown",
+            )
+        rms = predictor.residual_rms
+        if rms is not None and promised is not None and rms > self._warn * promised:
+            level = DiagnosticStatus.ERROR if rms > self._error * promised else DiagnosticStatus.WARN
+            yield level, f"residual {rms / promised:.3g} times the model's free-run error"

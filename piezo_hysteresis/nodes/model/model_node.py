@@ -1,0 +1,163 @@
+"""`model_node`: follows a stage with a model: prediction and residual of every sample, live."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from ...errors import ModelError, PiezoError, RecordError
+from ...model.model import Model
+from ...model.model_file import load, loads
+from ...online.predictor import Predictor
+from ...online.warmup import compile_kernels
+from ...parameter import Parameter
+from ...recording.table.time_column import round_period
+from ..messages.samples import SampleBlock, SampleReader
+from ..runtime.node_clock import now
+from ..runtime.parameters import Row, Setting, declare, read
+from ..runtime.process import run
+from ..runtime.qos import DEEP, LATCHED
+from .diagnostics import ModelDiagnostics
+from .publishers import ModelTopics
+
+_SOURCE = "model node"
+
+MODEL: tuple[Row, ...] = (
+    Setting("model_file", "", "path of the first model; a model on the topic `model` replaces it"),
+    Parameter("live_rate", "f_l", "Hz", 50.0, 0.1, 1000.0, "rate of the live scalars", _SOURCE),
+    Parameter("rms_time", "T_r", "s", 1.0, 1e-3, 1e4, "time over which residual_rms is taken", _SOURCE),
+    Parameter("residual_warn", "k_w", "1", 3.0, 0.0, 1e6, "warns above so many free-run errors of the model", _SOURCE),
+    Parameter("residual_error", "k_e", "1", 10.0, 0.0, 1e6, "error above so many free-run errors", _SOURCE),
+)
+
+
+class ModelNode(Node):
+    """Predictor of one axis: topics, services and parameters stand in docs/ros."""
+
+    def __init__(self) -> None:
+        super().__init__("model_node")
+        declare(self, MODEL)
+        self._values = read(self, MODEL)
+        compile_kernels()
+        self._model: Model | None = None
+        self._predictor: Predictor | None = None
+        self._before: SampleBlock | None = None
+        self._reader = SampleReader()
+        self._topics = ModelTopics(self)
+        self._diagnostics = ModelDiagnostics(self, self._values["residual_warn"], self._values["residual_error"])
+        if self._values["model_file"]:
+            self._load(self._values["model_file"])
+        self.add_on_set_parameters_callback(self._check)
+        self.add_post_set_parameters_callback(self._apply)
+        self.create_subscription(String, "model", self._on_model, LATCHED)
+        self.create_subscription(PointCloud2, "samples", self._on_samples, DEEP, raw=True)
+        self.create_service(Trigger, "~/zero", self._on_zero)
+
+    def _on_samples(self, message: bytes) -> None:
+        try:
+            block = self._reader.read(message)
+            predictor = self._predictor_for(block)
+            if predictor is None:
+                return
+            answer = predictor.predict(
+                int(block.index[0]),
+                block.stamp + round(float(block.time[0]) * 1e9),
+                block.voltage,
+                block.displacement,
+                follows_gap=block.follows_gap,
+                settled=block.index[0] == 0 or block.phase[0] == 0,  # nothing was driven since the driver began
+            )
+        except PiezoError as error:
+            self._diagnostics.problem(str(error))
+            return
+        self._diagnostics.saw(block, now(self))
+        if answer.model is not None and answer.prediction.size:
+            self._topics.publish(block.after(answer.first), answer, predictor)
+
+    def _predictor_for(self, block: SampleBlock) -> Predictor | None:
+        """The predictor of the stream, made anew for another sample period; None before that is known."""
+        before, self._before = self._before, block
+        period = block.sample_period
+        if period is None and before is not None:
+            steps = (int(block.index[0]) - int(before.index[-1])) % 2**32
+            elapsed = (block.stamp - before.stamp) * 1e-9 - float(before.time[-1])
+            period = elapsed / steps if steps else None
+        present = self._predictor
+        if period is None or not period > 0:
+            return present
+        if present is None or abs(period / present.sample_period - 1.0) > 0.01:
+            self._predictor = Predictor(round_period(period, 1e-6), rms_time=self._values["rms_time"])
+            self._diagnostics.follow(self._predictor)
+            if self._model is not None:
+                self._predictor.swap(self._model)
+        return self._predictor
+
+    def _on_model(self, message: String) -> None:
+        try:
+            self._follow(loads(message.data, "topic 'model'"))
+        except PiezoError as error:
+            self._diagnostics.refused(str(error))
+
+    def _load(self, path: str) -> None:
+        try:
+            self._follow(_read(path))
+        except PiezoError as error:
+            self._diagnostics.refused(f"model_file: {error}")
+
+    def _follow(self, model: Model) -> None:
+        if self._predictor is not None:
+            self._predictor.swap(model)
+        self._model = model
+        self._diagnostics.model(model)
+
+    def _on_zero(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = self._predictor is not None
+        if self._predictor is None:
+            response.message = "no samples yet: nothing to take the offset from"
+        else:
+            self._predictor.zero()
+            response.message = "the offset is the mean residual of the next 0.1 s"
+        return response
+
+    def _check(self, parameters: list[RosParameter]) -> SetParametersResult:
+        """A model file is read before its name is accepted; the other parameters hold from the start."""
+        rows = {row.name: row for row in MODEL}
+        try:
+            for parameter in parameters:
+                if parameter.name == "model_file":
+                    _read(str(rows[parameter.name].check(parameter.value)))
+                elif parameter.name in rows:
+                    raise RecordError(f"{parameter.name} is read at start; give it then")
+        except PiezoError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, parameters: list[RosParameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == "model_file":
+                self._load(parameter.value)
+
+
+def _read(path: str) -> Model:
+    """The model of a file; a pipe or a device would keep the node waiting."""
+    place = Path(path).expanduser()
+    if place.exists() and not place.is_file():
+        raise ModelError(f"{path}: got no regular file, expected a model file")
+    return load(place)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a model node; its exit code is 2 where its parameters make no sense."""
+    return run(ModelNode, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

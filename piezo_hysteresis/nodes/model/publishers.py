@@ -1,0 +1,73 @@
+"""`ModelTopics`: what the model node publishes, from predictions to messages."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Float64
+
+from ...model.model import Model
+from ...model.model_parameters import hash_number
+from ...online.predictor import Prediction, Predictor
+from ..messages.conversions import live, to_stamp
+from ..messages.samples import PredictionWriter, SampleBlock
+from ..runtime.qos import COMMAND, SAMPLES
+from ..runtime.sending import is_heard, send
+
+
+class ModelTopics:
+    """Publishers of a model node; the parameter `live_rate` is counted in samples, so that a replay does the same.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The model node.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._live_rate = float(node.get_parameter("live_rate").value)
+        self._next_live = 0
+        self._named: tuple[Model, int] | None = None
+        self._writer = PredictionWriter()
+        self._samples = node.create_publisher(
+            PointCloud2,
+            "predicted_samples",
+            SAMPLES,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self._prediction = node.create_publisher(Float64, "prediction", COMMAND)
+        self._residual = node.create_publisher(Float64, "residual", COMMAND)
+        self._rms = node.create_publisher(Float64, "residual_rms", COMMAND)
+        self._live = node.create_publisher(JointState, "predicted_live", COMMAND)
+
+    def publish(self, block: SampleBlock, answer: Prediction, predictor: Predictor) -> None:
+        """Publish what a model says about a block, all of whose samples count."""
+        assert answer.model is not None
+        if self._named is None or self._named[0] is not answer.model:
+            self._named = (answer.model, hash_number(answer.model))
+        told = self._writer.write(
+            block, answer.prediction, answer.residual, self._named[1], valid=not answer.warming_up
+        )
+        send(self._samples, told)
+        step = max(1, round(1.0 / (self._live_rate * predictor.sample_period)))
+        received = predictor.continuity.received
+        if received >= self._next_live or received < self._next_live - step:
+            self._next_live = (received // step + 1) * step
+            self._publish_live(block, answer, predictor.residual_rms)
+
+    def _publish_live(self, block: SampleBlock, answer: Prediction, rms: float | None) -> None:
+        prediction, residual = float(answer.prediction[-1]), float(answer.residual[-1])
+        for publisher, value in ((self._prediction, prediction), (self._residual, residual), (self._rms, rms)):
+            if value is not None and is_heard(publisher):
+                send(publisher, Float64(data=value))
+        if not is_heard(self._live):
+            return
+        values = {
+            "voltage": float(block.voltage[-1]),
+            "displacement": float(block.displacement[-1]),
+            "prediction": prediction,
+            "residual": residual,
+        }
+        stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
+        send(self._live, live(stamp, block.stage, **values))

@@ -1,0 +1,88 @@
+"""ROS parameters from the tables: names, defaults, units, bounds and descriptions are written down once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rclpy.node import Node
+
+from ...errors import ParameterError
+from ...parameter import Parameter
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A ROS parameter that is no physical quantity: a word, a path, a switch, a number of something.
+
+    Parameters
+    ----------
+    name : str
+        Name of the ROS parameter.
+    value : str, bool or int
+        Default.
+    meaning : str
+        One line for its description.
+    choices : tuple of str
+        The words that are accepted; any where empty.
+    """
+
+    name: str
+    value: str | bool | int
+    meaning: str
+    choices: tuple[str, ...] = ()
+
+    def check(self, value: object, prefix: str = "") -> str | bool | int:
+        """Return `value` if it is one of the choices and of the type of the default; ParameterError otherwise."""
+        if type(value) is not type(self.value):
+            raise ParameterError(f"{prefix}{self.name}: got {value!r}, expected a {type(self.value).__name__}")
+        if self.choices and value not in self.choices:
+            raise ParameterError(f"{prefix}{self.name}: got {value!r}, expected one of {', '.join(self.choices)}")
+        return value
+
+
+Row = Parameter | Setting
+
+
+def declare(node: Node, rows: Iterable[Row], prefix: str = "") -> None:
+    """Declare every row as a ROS parameter with default, description and range.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Node that gets the parameters.
+    rows : iterable of Parameter or Setting
+        The table.
+    prefix : str
+        Put before the names, e.g. ``"model.bouc_wen."``.
+    """
+    for row in rows:
+        value = list(row.value) if isinstance(row.value, tuple) else row.value
+        node.declare_parameter(prefix + row.name, value, describe(row))
+
+
+def describe(row: Row) -> ParameterDescriptor:
+    """Descriptor of a row: meaning with unit, bounds as range where there are any."""
+    if isinstance(row, Setting):
+        words = f"one of: {', '.join(row.choices)}" if row.choices else ""
+        return ParameterDescriptor(description=row.meaning, additional_constraints=words)
+    ranged = not row.is_array and math.isfinite(row.lower) and math.isfinite(row.upper)
+    return ParameterDescriptor(
+        description=f"{row.meaning} [{row.unit}]",
+        additional_constraints=f"{row.symbol}: {row.lower:g} to {row.upper:g} {row.unit} ({row.source})",
+        floating_point_range=[FloatingPointRange(from_value=row.lower, to_value=row.upper)] if ranged else [],
+    )
+
+
+def read(node: Node, rows: Iterable[Row], prefix: str = "") -> dict[str, Any]:
+    """Present values of declared rows by name, checked; arrays are tuples.
+
+    Raises
+    ------
+    ParameterError
+        On a value outside its bounds or choices.
+    """
+    return {row.name: row.check(node.get_parameter(prefix + row.name).value, prefix) for row in rows}

@@ -1,0 +1,292 @@
+"""`Predictor`: a model that follows a stage block by block: prediction, residual, change of model in mid-stream."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..blocks.samples import samples
+from ..errors import DivergenceError, RecordError
+from ..model.chain import Chain, ChainState
+from ..model.model import Model
+from .running_rms import RunningRms
+from .sensor_offset import SensorZero
+from .sequence_check import LONGEST_SILENCE, Continuity
+from .voltage_history import FULL_SAMPLES, VoltageHistory, is_held
+from .warmup import Warmup, chain_at
+
+Array = NDArray[np.float64]
+
+ZERO_TIME = 0.1
+"""Time over which the offset between sensor and model is averaged [s]; in motion it takes a whole loop."""
+
+ZERO_SAMPLES = 20
+"""Samples over which it is averaged at least."""
+
+PIECE = 50_000
+"""Samples of the history that a new model is run over with every block: a few milliseconds of computing."""
+
+SHORTEST_PERIOD, LONGEST_PERIOD = 1e-7, 1e3
+"""Sample periods of a stream [s]: memory goes with their inverse."""
+
+FORGETTING = 2.0
+"""Voltage scales after which loops have forgotten where they came from, exponentially with the way travelled."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Prediction:
+    """What a model says about one block.
+
+    Parameters
+    ----------
+    first : int
+        First sample of the block that counts; those before it were repeated.
+    prediction, residual : (n,) ndarray
+        Predicted displacement, and measured minus predicted [m], of the samples from `first` on; empty without a model.
+    model : Model or None
+        Model they come from.
+    warming_up : bool
+        True while what the drive did unseen still matters: before the first block, or in a gap.
+    """
+
+    first: int
+    prediction: Array
+    residual: Array
+    model: Model | None
+    warming_up: bool
+
+
+class Predictor:
+    """Model, carried state and voltage history of one stream of samples.
+
+    Parameters
+    ----------
+    sample_period : float
+        Time between samples of the stream [s].
+    model : Model, optional
+        First model; without one only the history is kept.
+    rms_time : float
+        Time over which `residual_rms` is taken [s].
+
+    Attributes
+    ----------
+    model : Model or None
+        Model in force.
+    continuity : Continuity
+        Counts of received, lost and repeated samples.
+
+    Notes
+    -----
+    A clean stream gives bit for bit ``model.run`` from rest at its first voltage, plus `offset`. Effects that depend on
+    time count it from the first sample. A new model takes over between two blocks, once it has been run over the
+    history; until then the old one goes on.
+
+    Raises
+    ------
+    RecordError
+        On a sample period that no stage has.
+    ModelError
+        If the stream is faster than the model.
+
+    Examples
+    --------
+    >>> from piezo_hysteresis.effects import Arx, BoucWen
+    >>> predictor = Predictor(2e-5, Model((BoucWen(), Arx(b=[0.5])), 2e-5))
+    >>> answer = predictor.predict(0, 0, [0.0, 0.0], [3e-6, 3e-6])
+    >>> answer.residual.tolist(), predictor.offset
+    ([0.0, 0.0], 3e-06)
+    """
+
+    def __init__(self, sample_period: float, model: Model | None = None, rms_time: float = 1.0) -> None:
+        if not SHORTEST_PERIOD <= sample_period <= LONGEST_PERIOD:
+            raise RecordError(
+                f"sample period: got {sample_period:g} s, expected {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
+            )
+        self.sample_period = sample_period
+        self.continuity = Continuity(sample_period)
+        self.model: Model | None = None
+        self._chain: Chain | None = None
+        self._warmup: Warmup | None = None
+        self._waiting: Model | None = None
+        self._unseen: float | None = None  # travel [V] at which the drive was last unknown
+        self._joined_unseen = False
+        self._window = max(ZERO_SAMPLES, round(ZERO_TIME / sample_period))
+        self._rms = RunningRms(max(1, round(rms_time / sample_period)))
+        self._begin()
+        if model is not None:
+            self.swap(model)
+
+    @property
+    def offset(self) -> float:
+        """Sensor minus model where the offset was taken [m]."""
+        return self._zero.offset
+
+    @property
+    def is_swapping(self) -> bool:
+        """True while a new model is being run over the history."""
+        return self._warmup is not None or self._waiting is not None
+
+    @property
+    def warming_up(self) -> bool:
+        """True while what the drive did unseen, before the first block or in a gap, still matters."""
+        if self._unseen is None:
+            return False
+        travelled = self._history.travel - self._unseen
+        return self.model is None or travelled < FORGETTING * self.model.voltage_scale
+
+    @property
+    def residual_rms(self) -> float | None:
+        """Rms of the residual over the last `rms_time` [m]; None before there is one."""
+        return self._rms.value
+
+    def swap(self, model: Model) -> None:
+        """Let another model take over as soon as it has been run over the history.
+
+        While one is on its way, the newest of the others waits until that one has taken over: models that come faster
+        than they can be run over the history hold up none.
+
+        Raises
+        ------
+        ModelError
+            If the stream is faster than the model; the present one goes on.
+        DivergenceError
+            If it runs away on the history; the present one goes on.
+        """
+        chain = chain_at(model, self.sample_period)
+        if self._history.count == 0:
+            self._chain, self.model = chain, model
+        elif self._warmup is not None:
+            self._waiting = model
+        else:
+            self._warmup = Warmup(model, self._history, self._zero)
+            self._warm(PIECE)
+
+    def zero(self) -> None:
+        """Take the offset anew, over the next 0.1 s."""
+        self._zero_from(self._history.count)
+
+    def predict(
+        self,
+        index: int,
+        stamp: int,
+        voltage: ArrayLike,
+        displacement: ArrayLike,
+        follows_gap: bool = False,
+        settled: bool = True,
+    ) -> Prediction:
+        """Follow the stage over the next block.
+
+        Parameters
+        ----------
+        index : int
+            Running index of the first sample, modulo 2³².
+        stamp : int
+            Its time [ns]; tells a new start of the driver from a late block.
+        voltage : (n,) array_like
+            Drive voltage [V].
+        displacement : (n,) array_like
+            Measured displacement [m].
+        follows_gap : bool
+            True where the samples missing before the block were never measured: the drive was held meanwhile.
+        settled : bool
+            False where the stage has been driven before, so that a stream that begins here begins with loops unknown.
+
+        Returns
+        -------
+        Prediction
+
+        Raises
+        ------
+        RecordError, ModelError
+            On channels that are empty, not finite or of different length; the block then counts as lost.
+        DivergenceError
+            If the model, or the one to come, runs away; it is dropped and the history goes on.
+        """
+        drive, measured = samples(voltage, "voltage"), samples(displacement, "displacement")
+        if drive.size != measured.size:
+            raise RecordError(f"displacement: got {measured.size} samples, expected {drive.size} as in voltage")
+        arrival = self.continuity.join(index, stamp, drive.size, follows_gap)
+        drive, measured = drive[arrival.repeated :], measured[arrival.repeated :]
+        modelled: Array | None = None
+        if drive.size:
+            if arrival.restarted:
+                if self._history.count:
+                    self._begin()
+                self._joined_unseen = not (settled and is_held(drive))
+                self._unseen = 0.0 if self._joined_unseen else None
+            if arrival.missing:
+                self._bridge(arrival.missing, follows_gap)
+            modelled = self._run_and_zero(drive, measured)
+        prediction = np.empty(0) if modelled is None else modelled + self.offset
+        residual = measured[: prediction.size] - prediction
+        self._rms.add(residual)
+        answer = Prediction(arrival.repeated, prediction, residual, self.model, self.warming_up)
+        self._warm(max(PIECE, 8 * drive.size))
+        return answer
+
+    def _begin(self) -> None:
+        newest = self._waiting or (self._warmup.model if self._warmup is not None else self.model)
+        self._waiting = None
+        self._history = VoltageHistory(self.sample_period)
+        self._state: ChainState | None = None
+        self._warmup = None
+        self._zero_from(0)
+        if newest is not None:
+            self.swap(newest)
+
+    def _zero_from(self, start: int, at_rest: bool = False) -> None:
+        self._zero = SensorZero(start, self._window, at_rest)
+        self._rms.clear()
+
+    def _bridge(self, missing: int, never_measured: bool) -> None:
+        """Hold the last voltage; what was really driven is unknown where the samples were lost on the way."""
+        if not never_measured:
+            self._unseen = self._history.travel
+        gap = min(missing, round(LONGEST_SILENCE / self.sample_period), FULL_SAMPLES)
+        self._run(np.full(gap, self._history.last))
+
+    def _run(self, drive: Array) -> Array | None:
+        self._history.append(drive)
+        if self._chain is None:
+            return None
+        if self._state is None:
+            self._state = self._chain.rest(self._history.rest_voltage)
+        try:
+            modelled, self._state = self._chain.run(drive, self._state)
+        except DivergenceError:
+            self.model = self._chain = self._state = None
+            raise
+        return modelled
+
+    def _run_and_zero(self, drive: Array, measured: Array) -> Array | None:
+        start, had_rested = self._history.count, self._history.has_rested
+        modelled = self._run(drive)
+        if self._history.has_rested and not had_rested:
+            self._zero_from(start, at_rest=True)
+        elif self._joined_unseen and not self.warming_up:
+            self._joined_unseen = False
+            self._zero_from(start)
+            self._zero.until = 2.0 * self._history.travel  # once more as far as what was forgotten
+        elif self._zero.at_rest and not is_held(drive):
+            self._zero.close()
+        self._zero.add(measured, modelled, self._history.travel)
+        return modelled
+
+    def _warm(self, values: int) -> None:
+        if self._warmup is None and self._waiting is not None:
+            waiting, self._waiting = self._waiting, None
+            self._warmup = Warmup(waiting, self._history, self._zero)
+        if self._warmup is None:
+            return
+        warmup, self._warmup = self._warmup, None
+        if not warmup.advance(values):
+            self._warmup = warmup
+            return
+        self.model, self._chain, self._state = warmup.model, warmup.chain, warmup.state
+        if warmup.zero is self._zero and warmup.mean is not None:
+            self._zero.remodel(warmup.mean)
+            self._rms.clear()
+        else:
+            self._zero_from(self._history.count)

@@ -1,0 +1,121 @@
+"""`Warmup`: a model brought to the present state of the stage by running it over the voltage history."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects import BY_NAME, CHAIN
+from ..errors import PiezoError
+from ..model.chain import Chain, ChainState
+from ..model.model import Model
+from .sensor_offset import SensorZero
+from .voltage_history import VoltageHistory
+
+Array = NDArray[np.float64]
+
+
+def chain_at(model: Model, sample_period: float) -> Chain:
+    """The chain of a model for a stream; its own period where the two agree to a thousandth.
+
+    Raises
+    ------
+    ModelError
+        If the stream is faster than the model.
+    """
+    same = abs(sample_period / model.sample_period - 1.0) < 1e-3
+    return model.at(model.sample_period if same else sample_period)
+
+
+class Warmup:
+    """A run over the history in pieces, so that a stream is not held up.
+
+    Parameters
+    ----------
+    model : Model
+        Model to bring up to date.
+    history : VoltageHistory
+        May grow meanwhile.
+    zero : SensorZero
+        Samples of the stream whose mean prediction is wanted.
+
+    Attributes
+    ----------
+    state : ChainState
+        State at the end of the stream, once `advance` returned True.
+
+    Raises
+    ------
+    ModelError
+        If the stream is faster than the model.
+    """
+
+    def __init__(self, model: Model, history: VoltageHistory, zero: SensorZero) -> None:
+        self.model, self.chain = model, chain_at(model, history.sample_period)
+        self.zero, self._history = zero, history
+        self._slow = model.at(history.factor * history.sample_period) if history.factor > 1 else self.chain
+        self._position = history.start
+        self._running = self._slow
+        self._sum, self._weight = 0.0, 0
+        rest = history.rest_voltage
+        time = history.start * history.sample_period
+        self.state: ChainState = self._slow.rest(rest, time)
+        if zero.start < history.start:
+            settled, _ = self._slow.run(np.array([rest]), self.state)
+            self._add(settled, zero.start, history.start - zero.start)
+
+    @property
+    def mean(self) -> float | None:
+        """Mean prediction [m] over the window; None if the history no longer reaches it."""
+        return self._sum / self._weight if self._weight else None
+
+    def advance(self, values: int) -> bool:
+        """Run over the next piece of the history; True once the model has reached its end.
+
+        Parameters
+        ----------
+        values : int
+            Voltages to run over, averaged or full ones.
+
+        Raises
+        ------
+        DivergenceError
+            If the model runs away.
+        """
+        while values > 0:
+            self._position = max(self._position, self._history.start)
+            factor, voltage = self._history.read(self._position, values)
+            chain = self._slow if factor > 1 else self.chain
+            if chain is not self._running:
+                self.state, self._running = chain.resume(self.state), chain
+            if voltage.size == 0:
+                return True
+            y, self.state = chain.run(voltage, self.state)
+            self._add(y, self._position, factor)
+            self._position += factor * voltage.size
+            values -= voltage.size
+        return self._position == self._history.count
+
+    def _add(self, y: Array, position: int, factor: int) -> None:
+        first = max(0, -(-(self.zero.start - position) // factor))
+        last = max(first, min(y.size, -(-(self.zero.stop - position) // factor)))
+        self._sum += factor * float(y[first:last].sum())
+        self._weight += factor * (last - first)
+
+
+def compile_kernels() -> None:
+    """Run every effect once, switched on, fast and slow, so that no stream waits for a compiler.
+
+    An effect that does not stand alone with its host (softening needs a resonance) is compiled when it is first met.
+    """
+    for kind in CHAIN:
+        rows = [p for p in kind.parameters if p.off is not None and not p.is_array]
+        host = (BY_NAME[kind.host](),) if kind.host else ()
+        with suppress(PiezoError):
+            switched_on = kind(**{p.name: min(p.upper, p.off + 0.1 * p.scale) for p in rows if p.off is not None})
+            model = Model((switched_on, *host), 1e-3)
+            for period in (1e-3, 1e-2):
+                chain = model.at(period)
+                chain.run(np.linspace(0.0, 1.0, 8), chain.rest(0.0))

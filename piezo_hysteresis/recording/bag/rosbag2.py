@@ -1,0 +1,257 @@
+"""A rosbag2 recording of the topics `samples` and `phase` as an experiment, and back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import RecordingError
+from ...record import Experiment, Notice, Record
+from ..checks.error_context import naming
+from ..checks.split_at_gaps import finite_records
+from ..segmentation.decimating_buffer import averaged_notice, shared_averages
+from ..segmentation.phases import labelled
+from ..segmentation.segment import Stretch
+from ..segmentation.waveform import phase_name
+from ..table.read_options import Layout
+from .bag import STORAGES, Bag
+from .bag_writer import BagWriter
+from .block_message import TYPE, Block, typestore
+from .foreign_topics import read_topics
+from .phase_topic import STRING, PhaseNames
+from .sample_stream import SampleStream
+
+IDLE, HOLD = "idle", "hold"
+"""What the stage does before the first and after every phase; left out unless `Layout.include` names it."""
+
+_MOVED = 0.01
+_SEVERE_SHARE = 0.05
+_BLOCK_DURATION = 0.01
+
+
+class Rosbag2:
+    """rosbag2 directory, .mcap or .db3 file, as the nodes or ``ros2 bag record -a`` write them.
+
+    Phases recorded in one go continue each other: from the second one on `Record.continues` holds, also where the
+    `hold` between them is left out. There the drive stands still at its last voltage for as long as the `start_time` of
+    the next phase shows, so whoever carries a slow state (creep) holds that voltage for that time. A hold in which the
+    drive moves is kept: the state cannot be carried without it. The first phase starts settled at the voltage of the
+    `idle` before it. A phase behind lost samples continues and is `truncated`: its state can be carried, but not
+    exactly. So is one whose beginning is not in the bag.
+    """
+
+    def recognises(self, path: Path) -> bool:
+        """True for a storage file or a folder with one."""
+        files = [path] if path.is_file() else path.iterdir()
+        return any(f.suffix in (*STORAGES, ".zstd") or f.name == "metadata.yaml" for f in files)
+
+    def read(self, path: Path, layout: Layout) -> Experiment:
+        """The phases of one stage in the order in which they were recorded."""
+        with naming(path, "a rosbag2 bag"):
+            bag = Bag(path)
+            if any(str(place).startswith("/") for place in layout.columns.values()):
+                records, notices = read_topics(bag, layout)
+            else:
+                if layout.rows is not None:
+                    raise RecordingError(f"rows: got {layout.rows} of a bag of phases, expected none; piezo import it")
+                records, notices = _read_samples(bag, layout)
+            return Experiment(tuple(records), str(path), (*bag.notices, *notices))
+
+    def write(self, experiment: Experiment, path: Path) -> None:
+        """Write the records as the driver would send them, in blocks of 10 ms, to the folder `path` without its ending.
+
+        A record that does not continue the one before it is preceded by one idle sample at its settled voltage, as from
+        a driver that was started again. Other channels than voltage and displacement are not written.
+
+        Raises
+        ------
+        RecordingError
+            If the folder exists or cannot be written.
+        """
+        with BagWriter(path.with_suffix("") if path.suffix == ".mcap" else path) as bag:
+            bag.add_topic("/samples", TYPE)
+            bag.add_topic("/phase", STRING, depth=1, transient_local=True)
+            clock_ns, index = 1_000_000_000, 0
+            for number, record in enumerate(experiment, 1):
+                if not record.continues and not record.truncated:
+                    clock_ns, index = clock_ns + 1_000_000_000, 0
+                    bag.write("/phase", clock_ns, PhaseNames.to_cdr(0, IDLE))
+                    settled = replace(record[:1], voltage=np.array([record.settled_voltage]))
+                    clock_ns, index = _write_blocks(bag, settled, 0, clock_ns, index)
+                bag.write("/phase", clock_ns, PhaseNames.to_cdr(number, record.phase))
+                clock_ns, index = _write_blocks(bag, record, number, clock_ns, index)
+
+
+def recorded_model(path: str | Path, *, axis: str | None = None) -> str | None:
+    """The last model file that a bag carries on the topic `model`.
+
+    Parameters
+    ----------
+    path : path-like
+        rosbag2 directory or storage file.
+    axis : str, optional
+        Namespace of one stage where the bag holds several.
+
+    Returns
+    -------
+    str or None
+        Text of the model file; None if there is none.
+
+    Raises
+    ------
+    RecordingError
+        If the path is no bag.
+    """
+    place = Path(path).expanduser()
+    text = None
+    with naming(place, "a rosbag2 bag"):
+        for message in Bag(place).messages():
+            space = _space(message.topic, "model") if message.type == STRING else None
+            if space is not None and (axis is None or space == _absolute(axis)):
+                text = str(typestore().deserialize_cdr(message.raw, STRING).data)
+    return text
+
+
+def _absolute(axis: str) -> str:
+    return "/" + axis.strip("/")
+
+
+def _space(topic: str, name: str) -> str | None:
+    """Namespace of a topic that is called `name`; None for other topics."""
+    space, _, last = topic.rpartition("/")
+    return _absolute(space) if last == name else None
+
+
+def _read_samples(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]:
+    streams: dict[str, SampleStream] = {}
+    names: dict[str, PhaseNames] = {}
+    damaged = 0
+    for message in bag.messages():
+        space = _space(message.topic, "samples" if message.type == TYPE else "phase")
+        if space is None or (layout.axis is not None and space != _absolute(layout.axis)):
+            continue
+        try:
+            if message.type == TYPE:
+                streams.setdefault(space, SampleStream(layout.sample_period)).add(
+                    Block.from_cdr(message.raw), message.time_ns
+                )
+            elif message.type == STRING:
+                names.setdefault(space, PhaseNames()).add(message.raw, message.time_ns)
+        except Exception:  # the decoder raises whatever it likes on damaged bytes
+            damaged += 1
+        if len(streams) > 1:
+            raise RecordingError(f"holds several stages, expected one; choose an axis: {', '.join(sorted(streams))}")
+    notices = [Notice("damaged", f"{damaged} messages cannot be decoded and are skipped")] if damaged else []
+    if not streams:
+        where = f" of the axis '{layout.axis}'" if layout.axis else ""
+        raise RecordingError(
+            f"got no readable samples{where} (topic 'samples', {TYPE}); map foreign topics by columns, e.g. "
+            "voltage=/ao.data displacement=/sensor.data"
+        )
+    (space, stream), *_ = streams.items()
+    stretches, told = stream.stretches(split_phases=layout.phases is None)
+    averages = shared_averages([s.size for s in stretches], layout.average)
+    records, more = _records(stretches, averages, names.get(space, PhaseNames()), layout)
+    return records, [*notices, *told, *more]
+
+
+def _records(
+    stretches: list[Stretch], averages: list[int], names: PhaseNames, layout: Layout
+) -> tuple[list[Record], list[Notice]]:
+    unlabelled = layout.phases is not None or (not names and all(s.phase == 0 for s in stretches))
+    records: list[Record] = []
+    notices: list[Notice] = []
+    moving = _MOVED * max(_travel(stretch) for stretch in stretches)
+    before: Stretch | None = None
+    kept = excited = False
+    for stretch, average in zip(stretches, averages, strict=True):
+        if stretch.first:
+            before, kept, excited = None, False, False
+        slow = stretch.averaged(average)
+        name = "record" if unlabelled else _name(slow if slow.size else stretch, names, notices)
+        moves = _travel(stretch) > moving
+        left_out = name in (IDLE, HOLD) and name not in layout.include and not (name == HOLD and moves and kept)
+        if missing := stretch.lost + sum(stretch.breaks.values()):
+            lost = f"{missing} samples ({missing * stretch.sample_period:.3g} s) were lost"
+            places = len(stretch.breaks) + (stretch.lost > 0)
+            severe = not left_out and missing > _SEVERE_SHARE * (stretch.size + missing)
+            notices.append(Notice("gap", f"{lost} in {places} places", name, severe))
+        if paused := sum(n for at, n in stretch.pauses.items() if at):
+            held = f"{paused} samples ({paused * stretch.sample_period:.3g} s) were not measured"
+            notices.append(Notice("pause", f"{held} while the device held its voltage and was read out", name))
+        if left_out and moves:
+            text = f"the drive moved by {_travel(stretch):.3g} V before the first phase: taken as settled after it"
+            notices.append(Notice("moved", text, name))
+        if not left_out:
+            begins = stretch.phase == 0 if stretch.first else stretch.lost == 0
+            if excited and not kept:
+                notices.append(Notice("history", "begins after phases that are not recorded: taken as settled", name))
+            if not slow.size:
+                text = f"its {stretch.size} samples are fewer than the {average} to be averaged: left out"
+                notices.append(Notice("averaged", text, name))
+                continue
+            if layout.average is None and average > 1:
+                notices.append(averaged_notice(average, slow.sample_period, name))
+            parts, told = finite_records(
+                slow.channels,
+                slow.sample_period,
+                slow.breaks,
+                slow.pauses,
+                phase=name,
+                start_time=stretch.start_time,
+                continues=kept,
+                truncated=not begins,
+                initial_voltage=float(before.channels["voltage"][-1]) if before and begins and not kept else None,
+            )
+            if not begins:
+                notices.append(Notice("truncated", "its beginning is not recorded: the initial state is unknown", name))
+            records += parts
+            notices += told
+            kept = True
+        excited |= name != IDLE
+        before = stretch
+    if not records:
+        raise RecordingError(f"holds only {IDLE} and {HOLD}, expected phases; include={IDLE},{HOLD} keeps those")
+    origin = records[0].start_time
+    records = [replace(r, start_time=r.start_time - origin) for r in records]
+    if unlabelled:
+        records, told = labelled(records, layout.phases)
+        notices += told
+    return records, notices
+
+
+def _travel(stretch: Stretch) -> float:
+    """Range of the drive [V]."""
+    voltage = stretch.channels["voltage"]
+    return float(np.ptp(voltage)) if np.isfinite(voltage).all() else 0.0
+
+
+def _name(stretch: Stretch, names: PhaseNames, notices: list[Notice]) -> str:
+    """Recorded name of a stretch, or a proposed one."""
+    name = names.at(stretch.phase, stretch.received_ns) or (IDLE if stretch.phase == 0 else "")
+    if not name:
+        name = phase_name(stretch.channels["voltage"], stretch.sample_period)
+        notices.append(
+            Notice("proposed", f"phase number {stretch.phase} has no recorded name: taken for '{name}'", name)
+        )
+    return name
+
+
+def _write_blocks(bag: BagWriter, record: Record, number: int, clock_ns: int, index: int) -> tuple[int, int]:
+    """Send one record; return the time and the index behind it."""
+    longest = max(1, round(_BLOCK_DURATION / record.sample_period))
+    for a in range(0, record.size, longest):
+        part = slice(a, a + longest)
+        n = record.voltage[part].size
+        block = Block(
+            clock_ns,
+            {"voltage": record.voltage[part], "displacement": record.displacement[part]},
+            np.full(n, number, np.uint32),
+            np.asarray(np.arange(n) * record.sample_period),
+            (index + a + np.arange(n)).astype(np.uint32),
+        )
+        bag.write("/samples", clock_ns, block.to_cdr())
+        clock_ns += round(n * record.sample_period * 1e9)
+    return clock_ns, index + record.size

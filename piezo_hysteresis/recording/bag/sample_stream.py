@@ -1,0 +1,244 @@
+"""`SampleStream`: blocks of the topic `samples`, in the order of arrival, become stretches of one phase each."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordError
+from ...record import Notice
+from ..segmentation.segment import Stretch
+from ..table.column import Column, changes
+from ..table.time_column import round_period
+from .block_message import Block
+
+PERIOD_TOLERANCE = 0.01
+"""Blocks whose sample periods differ by more than this share do not belong together."""
+
+UNEVEN = 0.1
+"""Deviation of a step in the times of a block from their mean, as a share of it, above which it is told."""
+
+LONGEST_SILENCE = 60.0
+"""An index that runs ahead of the clock by more than this is no gap but another start of the driver [s]."""
+
+
+@dataclass
+class _Run:
+    """What the driver sent from one start on: index and arrival (start, stop) of every piece in one go."""
+
+    first: bool
+    period: float
+    expected: int
+    pieces: list[tuple[int, int, int]] = field(default_factory=list)
+
+
+class SampleStream:
+    """Collects blocks; a long recording lies in temporary files (`Column`).
+
+    Losses, repetitions and reordering are recognised by the running index, which wraps at 2³². An index that jumps back
+    while time goes on means that the driver was started again.
+
+    Parameters
+    ----------
+    sample_period : float, optional
+        Goes before what the blocks say about their times [s].
+    """
+
+    def __init__(self, sample_period: float | None = None) -> None:
+        self._given_period = sample_period
+        self._channels: dict[str, Column] = {}
+        self._index, self._phase = Column(np.uint32), Column(np.uint32)
+        self._next = 0
+        self._starts: list[int] = []
+        self._times_ns: list[int] = []
+        self._periods: list[float] = []
+        self._received_ns: list[int] = []
+        self._after_pause: set[int] = set()
+        self._uneven = 0
+
+    @property
+    def size(self) -> int:
+        """Number of samples received."""
+        return len(self._index)
+
+    def add(self, block: Block, received_ns: int) -> None:
+        """Append a block in the order of arrival; channels that other blocks have are filled with NaN."""
+        begin, n = self.size, block.phase.size
+        follows = (self._next + np.arange(n, dtype=np.int64)).astype(np.uint32)
+        index = follows if block.index is None else block.index
+        self._next = int(index[-1]) + 1
+        self._index.extend(index)
+        self._phase.extend(block.phase)
+        for name in self._channels.keys() | block.channels.keys():
+            if name not in self._channels:
+                self._channels[name] = Column(np.float64)
+                self._channels[name].fill(np.nan, begin)
+            self._channels[name].extend(block.channels[name] if name in block.channels else np.full(n, np.nan))
+        time = block.time
+        period = self._given_period or np.nan
+        if self._given_period is None and time is not None and n > 1 and np.isfinite(time).all():
+            period = float(time[-1] - time[0]) / (n - 1)
+            self._uneven += bool(np.abs(np.diff(time) - period).max() > UNEVEN * abs(period))
+        offset = float(time[0]) if time is not None and abs(time[0]) < LONGEST_SILENCE else 0.0
+        if block.follows_pause:
+            self._after_pause.add(begin)
+        self._starts.append(begin)
+        self._times_ns.append(block.stamp_ns + round(offset * 1e9))
+        self._periods.append(period if period > 0 else np.nan)
+        self._received_ns.append(received_ns)
+
+    def stretches(self, split_phases: bool = True) -> tuple[list[Stretch], list[Notice]]:
+        """Everything received, in order of the index.
+
+        Parameters
+        ----------
+        split_phases : bool
+            False to ignore the phase numbers.
+
+        Returns
+        -------
+        stretches : list of Stretch
+        notices : list of Notice
+            Repeated and reordered samples, and new starts of the driver; losses are told by the stretches.
+
+        Raises
+        ------
+        RecordError
+            If nothing tells the sample period.
+        """
+        stretches: list[Stretch] = []
+        notices: list[Notice] = []
+        if self._uneven:
+            text = f"times within {self._uneven} of {len(self._starts)} blocks are uneven: taken as uniform"
+            notices.append(Notice("time_base", text))
+        end = 0.0
+        for run in self._runs():
+            if run.first and stretches:
+                seconds = (self._time_ns(run.pieces[0][1], run.period) - self._times_ns[0]) * 1e-9
+                end = max(end, seconds)
+                notices.append(Notice("restart", f"the driver was started again {end:.6g} s after the first sample"))
+            stretches += self._cut(run, end, split_phases, notices)
+            end = stretches[-1].start_time + stretches[-1].size * run.period
+        return stretches, notices
+
+    def _block_periods(self) -> NDArray[np.float64]:
+        periods = np.array(self._periods)
+        known = np.isfinite(periods)
+        if not known.any():  # one sample per block: the stamps are all there is
+            steps = np.diff(np.array(self._times_ns)) * 1e-9 / np.diff(np.array(self._starts))
+            if not (steps > 0).any():
+                raise RecordError("got no field 'time' and no stamps that grow, expected either; give sample_period")
+            return np.full(periods.size, np.median(steps[steps > 0]))
+        latest = np.maximum.accumulate(np.where(known, np.arange(periods.size), known.argmax()))
+        return np.asarray(periods[latest])
+
+    def _block_of(self, arrival: int) -> int:
+        return bisect_right(self._starts, arrival) - 1
+
+    def _time_ns(self, arrival: int, period: float) -> int:
+        block = self._block_of(arrival)
+        return self._times_ns[block] + round((arrival - self._starts[block]) * period * 1e9)
+
+    def _runs(self) -> list[_Run]:
+        periods = self._block_periods()
+        index = self._index.array()
+        other = np.abs(np.diff(periods)) > PERIOD_TOLERANCE * periods[1:]
+        jumps = changes(index, 1)
+        edges = np.unique(np.concatenate(([0], jumps, np.array(self._starts, np.int64)[1:][other], [index.size])))
+        runs: list[_Run] = []
+        for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            period = float(periods[self._block_of(a)])
+            run, step = (runs[-1], _signed(int(index[a]) - runs[-1].expected)) if runs else (None, 0)
+            if run is None or self._restarted(a, step, period):
+                run, step = _Run(True, period, int(index[a])), 0
+                runs.append(run)
+            elif abs(period / run.period - 1) > PERIOD_TOLERANCE:
+                run = _Run(False, period, run.expected)
+                runs.append(run)
+            start = run.expected + step
+            run.pieces.append((start, a, b))
+            run.expected = max(run.expected, start + b - a)
+        for run in runs:
+            same = periods[np.abs(periods / run.period - 1) <= PERIOD_TOLERANCE]
+            run.period = round_period(float(np.median(same)))
+        return runs
+
+    def _restarted(self, arrival: int, step: int, period: float) -> bool:
+        elapsed = (self._time_ns(arrival, period) - self._time_ns(arrival - 1, period)) * 1e-9
+        return elapsed > 0 if step < 0 else step * period > 10 * max(elapsed, 0.0) + LONGEST_SILENCE
+
+    def _cut(self, run: _Run, begin: float, split_phases: bool, notices: list[Notice]) -> Iterator[Stretch]:
+        pieces, repeated = _swept(run.pieces)
+        if repeated:
+            notices.append(Notice("duplicate", f"{repeated} samples came more than once: the first ones count"))
+        late = sum(b[1] < a[1] for a, b in zip(pieces, pieces[1:], strict=False))
+        if late:
+            notices.append(Notice("non_monotonic", f"{late} pieces came out of order: sorted by their index"))
+        starts = [start for start, _, _ in pieces]
+        lost = [0] + [start - _end(earlier) for start, earlier in zip(starts[1:], pieces, strict=False)]
+        pausing = self._after_pause if self._tells_pauses(pieces) else set()
+        offsets = [0, *accumulate(b - a for _, a, b in pieces)]
+        channels = {name: _gathered(column.array(), pieces) for name, column in self._channels.items()}
+        phase = _gathered(self._phase.array(), pieces)
+        edges = changes(phase, 0).tolist() if split_phases else []
+        for i, j in zip([0, *edges], [*edges, phase.size], strict=True):
+            piece = bisect_right(offsets, i) - 1
+            inside = range(piece + 1, bisect_left(offsets, j))
+            within = i - offsets[piece]
+            gaps = {offsets[p] - i: p for p in inside if lost[p]} | ({} if within or not lost[piece] else {0: piece})
+            pauses = {at: lost[p] for at, p in gaps.items() if pieces[p][1] in pausing}
+            breaks = {at: lost[p] for at, p in gaps.items() if at not in pauses}
+            yield Stretch(
+                {name: values[i:j] for name, values in channels.items()},
+                run.period,
+                int(phase[i]),
+                begin + (starts[piece] + within - starts[0]) * run.period,
+                self._received_ns[self._block_of(pieces[piece][1] + within)],
+                breaks.pop(0, 0),
+                breaks,
+                pauses,
+                run.first and i == 0,
+            )
+
+    def _tells_pauses(self, pieces: list[tuple[int, int, int]]) -> bool:
+        """False where blocks are said to follow a pause though nothing is missing: that mark means something else."""
+        begin, end = pieces[0][1], max(b for _, _, b in pieces)
+        told = {start for start in self._after_pause if begin < start < end}
+        return told <= {a for _, a, _ in pieces}
+
+
+def _signed(step: int) -> int:
+    """An index difference modulo 2³² as the nearest signed one."""
+    return (step + 0x80000000) % 0x100000000 - 0x80000000
+
+
+def _end(piece: tuple[int, int, int]) -> int:
+    start, a, b = piece
+    return start + b - a
+
+
+def _swept(pieces: list[tuple[int, int, int]]) -> tuple[list[tuple[int, int, int]], int]:
+    """Pieces in order of their index, each sample once; and the number of samples that came again."""
+    kept: list[tuple[int, int, int]] = []
+    repeated = 0
+    for start, a, b in sorted(pieces):
+        again = min(max(0, _end(kept[-1]) - start), b - a) if kept else 0
+        repeated += again
+        if again < b - a:
+            kept.append((start + again, a + again, b))
+    return kept, repeated
+
+
+def _gathered(values: NDArray[Any], pieces: list[tuple[int, int, int]]) -> NDArray[Any]:
+    if len(pieces) == 1:
+        return values[pieces[0][1] : pieces[0][2]]
+    gathered = Column(values.dtype)
+    for _, a, b in pieces:
+        gathered.extend(values[a:b])
+    return gathered.array()

@@ -1,0 +1,152 @@
+"""Defects of one recorded phase: clipped, stuck, interrupted or coarse channels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...record import Notice, Record, Samples
+from .split_at_gaps import stretches
+
+FEWEST_LEVELS = 1000
+"""Quantisation is told where a channel uses fewer levels than this; below a sixteenth of it nothing rests on it."""
+
+_DRIVE_MOVES = 0.05
+_DRIVE_RETURNS = 0.01
+_RETURN = 0.03
+_ARC = 0.9
+_MISSED = 0.3
+_PARTS = 32
+_CONSTANT_SPEED = 0.75
+_SEVERE_SHARE = 0.05
+_ROUGH_SHARE, _FEW = 0.001, 3
+
+
+def channel_defects(record: Record) -> list[Notice]:
+    """Notices ``clipped``, ``stuck``, ``dropout`` and ``quantisation`` about a phase in which the drive moves."""
+    if record.size < 16:
+        return []
+    return [*_stuck(record), *_clipped_voltage(record), *_dropouts(record), *_quantised(record)]
+
+
+def _runs_of_equal(values: Samples, shortest: int) -> NDArray[np.int64]:
+    """Start and stop of every run of at least `shortest` equal samples, shape (k, 2)."""
+    same = np.diff(values) == 0.0
+    runs = np.array(stretches(same), np.int64).reshape(-1, 2)
+    runs[:, 1] += 1
+    return np.asarray(runs[runs[:, 1] - runs[:, 0] >= shortest])
+
+
+def _extremes(values: Samples, runs: NDArray[np.int64]) -> tuple[Samples, Samples]:
+    """Lowest and highest value in every run."""
+    padded = np.append(values, values[-1])  # a run may end behind the last sample
+    return np.minimum.reduceat(padded, runs.ravel())[::2], np.maximum.reduceat(padded, runs.ravel())[::2]
+
+
+def _stuck(record: Record) -> list[Notice]:
+    """Displacement that stands still while the drive moves: at its extremes it is clipped, elsewhere stuck."""
+    y, u = record.displacement, record.voltage
+    runs = _runs_of_equal(y, 5)
+    if not len(runs):
+        return []
+    at_rail = np.isin(y[runs[:, 0]], (y.min(), y.max()))
+    low, high = _extremes(u, runs)
+    first, last = u[runs[:, 0]], u[runs[:, 1] - 1]
+    beyond = np.maximum(high - np.maximum(first, last), np.minimum(first, last) - low)
+    # behind a turning point of the drive a stage with backlash stands still too; across it, it does not
+    moved = (high - low > _DRIVE_MOVES * np.ptp(u)) | (at_rail & (beyond > _DRIVE_RETURNS * np.ptp(u)))
+    runs, at_rail = runs[moved], at_rail[moved]
+    notices = []
+    for kind, part, text in (
+        ("clipped", runs[at_rail], "the displacement is cut off at {:.4g} m"),
+        ("stuck", runs[~at_rail], "the displacement stands still at {:.4g} m"),
+    ):
+        if len(part):
+            samples = int((part[:, 1] - part[:, 0]).sum())
+            told = text.format(float(y[part[0, 0]])) + f" for {samples} samples while the drive moves"
+            notices.append(Notice(kind, told, record.phase, severe=samples > _SEVERE_SHARE * record.size))
+    return notices
+
+
+def _clipped_voltage(record: Record) -> list[Notice]:
+    """Voltage that stands at its extreme while the displacement goes on and comes back: its recording is cut off."""
+    y, u = record.displacement, record.voltage
+    samples = 0
+    direction = np.sign(np.dot(u - u.mean(), y - y.mean()) or 1.0)
+    returned = _RETURN * float(np.ptp(y))
+    gain = float(np.ptp(y)) / max(float(np.ptp(u)), 1e-300)
+    for rail, sign in ((u.max(), 1.0), (u.min(), -1.0)):
+        runs = _runs_of_equal(np.where(u == rail, rail, np.arange(u.size)), 5)
+        for a, b in runs.tolist():
+            way = sign * direction * _means(y[a:b])
+            rise = way - np.linspace(way[0], way[-1], way.size)
+            # a stage that rings after a step also goes on and comes back, but ends far from where it was, or swings
+            # about its level; a turning point that the recording lacks is one arc over the whole run
+            returns = way.max() - max(way[0], way[-1]) > max(returned, abs(way[0] - way[-1]))
+            arc = np.sin(np.linspace(0.0, np.pi, way.size))
+            likeness = float(rise @ arc) / max(float(np.sqrt((rise @ rise) * (arc @ arc))), 1e-300)
+            if returns and likeness > _ARC and rise.max() > _MISSED * gain * _taken_off(u, a, b):
+                samples += b - a
+    if not samples:
+        return []
+    text = f"the voltage is cut off for {samples} samples while the displacement goes on"
+    return [Notice("clipped", text, record.phase, severe=samples > _SEVERE_SHARE * record.size)]
+
+
+def _means(values: Samples) -> Samples:
+    """Means of at most `_PARTS` equal parts: an arc is no noise."""
+    starts = np.unique(np.linspace(0, values.size, min(_PARTS, values.size), endpoint=False).astype(np.int64))
+    return np.asarray(np.add.reduceat(values, starts) / np.diff(starts, append=values.size))
+
+
+def _taken_off(voltage: Samples, start: int, stop: int) -> float:
+    """Height of the parabola that leaves and meets the voltage around a run at the steeper of its two slopes."""
+    around = voltage[max(0, start - 2) : start + 1], voltage[stop - 1 : stop + 2]
+    slope = max(float(np.abs(np.diff(part)).max(initial=0.0)) for part in around)
+    return slope * (stop - start) / 4.0
+
+
+def _dropouts(record: Record) -> list[Notice]:
+    """Displacement that jumps away and back within a few samples while the drive is smooth."""
+    y, u = record.displacement, record.voltage
+    longest = max(1, min(1000, record.size // 100))
+    steps = np.diff(y)
+    large = np.flatnonzero(np.abs(steps) > max(0.1 * float(np.ptp(y)), 8.0 * float(np.quantile(np.abs(steps), 0.99))))
+    count = samples = 0
+    k = 0
+    while k + 1 < large.size:
+        a, b = int(large[k]), int(large[k + 1])
+        back = abs(y[b + 1] - y[a]) < 0.25 * abs(steps[a])
+        around = u[max(0, a - 20) : b + 20]
+        if back and steps[a] * steps[b] < 0 and b - a <= longest and np.ptp(around) < 0.25 * np.ptp(u):
+            count, samples, k = count + 1, samples + b - a, k + 2
+        else:
+            k += 1
+    if not count:
+        return []
+    text = f"the displacement drops out {count} times, {samples} samples in all"
+    return [Notice("dropout", text, record.phase, severe=samples > max(_FEW, _ROUGH_SHARE * record.size))]
+
+
+def _ramps(values: Samples) -> bool:
+    """Whether samples that move go on as they moved before; those of a rounded ramp stop now and then."""
+    moves = np.diff(values[:200_000])
+    goes_on = np.abs(np.diff(moves)) < 1e-6 * np.abs(moves).max(initial=0.0)
+    return bool(goes_on[moves[1:] != 0.0].mean() > _CONSTANT_SPEED)
+
+
+def _quantised(record: Record) -> list[Notice]:
+    """Channels whose values lie on few levels."""
+    notices = []
+    for name, unit, values in (("voltage", "V", record.voltage), ("displacement", "m", record.displacement)):
+        levels = np.unique(values[:200_000])
+        if levels.size < 3 or (name == "voltage" and (levels.size < 16 or _ramps(values))):
+            continue  # a drive of steps has few levels, one of ramps has equal increments
+        gaps = np.diff(levels)
+        step = float(gaps[gaps > 1e-9 * np.ptp(values)].min(initial=np.inf))
+        count = float(np.ptp(values)) / step
+        on_grid = np.abs(gaps / step - np.rint(gaps / step)).max() < 0.05
+        if count < FEWEST_LEVELS and on_grid and values[:200_000].size > 2 * levels.size:
+            text = f"the {name} is quantised in steps of {step:.3g} {unit}: {count:.0f} levels in its range"
+            notices.append(Notice("quantisation", text, record.phase, severe=count < FEWEST_LEVELS / 16))
+    return notices

@@ -1,0 +1,52 @@
+"""The border to files that others wrote: whatever a decoder raises becomes one clear line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ...errors import PiezoError, RecordError, RecordingError
+
+
+@contextmanager
+def naming(path: Path, expected: str) -> Iterator[None]:
+    """Turn every failure inside into an error that names the file.
+
+    Decoders of foreign formats raise whatever their authors thought of when the bytes are damaged, so the catch is as
+    wide as that; programming errors in here surface in the tests, which read intact files.
+
+    Parameters
+    ----------
+    path : Path
+        File or folder that is read or written.
+    expected : str
+        What the file should have been, e.g. ``"a rosbag2 bag"``.
+
+    Raises
+    ------
+    RecordError
+        Where the samples form no record.
+    RecordingError
+        For everything else.
+    """
+    try:
+        yield
+    except RecordError as error:
+        raise RecordError(_named(path, error)) from None
+    except PiezoError as error:
+        raise RecordingError(_named(path, error)) from None
+    except MemoryError:
+        raise RecordingError(f"{path}: more than the memory holds; keep a part by rows, or average more") from None
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: no such file or folder, expected {expected}") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}, expected {expected}") from None
+    except Exception as error:
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        raise RecordingError(f"{path}: damaged or not {expected} ({reason})") from error
+
+
+def _named(path: Path, error: PiezoError) -> str:
+    text = " ".join(str(error).split())
+    return text if text.startswith(str(path)) else f"{path}: {text}"

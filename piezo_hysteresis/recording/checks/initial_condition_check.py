@@ -1,0 +1,131 @@
+"""How phases begin: whether their first samples agree with a stage that had settled before, and with one another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...record import Experiment, Notice, Record, Samples
+from ..segmentation.waveform import turning_points
+
+_OPENING = 0.1
+_EXCERPT = 1 << 20
+_SWING = 0.02
+_INSIDE = 0.1
+_SAME = 0.02
+_ON_BRANCH = 0.2
+_NOISE = 8.0
+_FIRST = 8
+_SAME_VOLTAGE = 1e-3
+_APART = 0.01
+_STRAIGHT, _NEAR = 0.1, 0.05
+_AHEAD = (0.5, 1.0)
+"""Samples from where a ramp begins to its first sample: for averages half of one, or a little more."""
+
+
+def is_within_its_loop(record: Record) -> bool:
+    """True where a periodic record begins in motion, its displacement already where it is a period later.
+
+    A stage that had settled at the first voltage begins between the branches of its loop, and a little after the drive;
+    one that was cycling before begins on a branch, in motion. Where both are the same, at the end of a swing, the stage
+    is taken to have settled.
+    """
+    if record.continues or record.truncated or record.initial_voltage is not None or record.size < 64:
+        return False
+    u, y = record.voltage[:_EXCERPT], record.displacement[:_EXCERPT]
+    span = float(np.ptp(u))
+    turns = turning_points(u, _SWING * span) if span > 0.0 else np.empty(0, np.int64)
+    if turns.size < 5:
+        return False
+    first, second, third = (int(t) for t in turns[1:4])
+    period, opening = third - first, max(2, first // 20)
+    inside = min(abs(u[0] - u[first]), abs(u[0] - u[second])) > _INSIDE * span
+    if first < 8 or first > period or not inside or abs(u[opening] - u[0]) < 0.02 * abs(u[first] - u[0]):
+        return False
+    if np.abs(u[:first] - u[period : period + first]).max() > _SAME * span:
+        return False
+    back = first + int(np.argmin(np.abs(u[first:second] - u[0])))
+    width = abs(float(y[back] - y[period]))
+    noise = float(np.median(np.abs(np.diff(y, 3)))) / 3.0
+    off = abs(float(np.mean(y[:opening] - y[period : period + opening])))
+    few = min(opening, _FIRST)
+    moves, later = float(y[few] - y[0]), float(y[period + few] - y[period])
+    starts = abs(moves - later) > 0.5 * abs(later) > 3.0 * noise
+    return bool(width > 10.0 * noise and off < _ON_BRANCH * width and not starts)
+
+
+def onset(record: Record) -> list[Notice]:
+    """Notice ``not_at_rest`` where the displacement moves at the start although the drive hardly does.
+
+    A record that continues another one, or whose beginning is missing, claims no rest and is not judged; nor is one
+    whose drive leaves its settled voltage with the first sample, because the stage then rightly answers.
+    """
+    if record.continues or record.truncated or record.size < 20:
+        return []
+    u, y = record.voltage, record.displacement
+    u_span, y_span = float(np.ptp(u)), float(np.ptp(y))
+    if y_span == 0.0 or abs(u[0] - record.settled_voltage) > 0.02 * max(u_span, abs(record.settled_voltage)):
+        return []
+    moved = np.flatnonzero(np.abs(u - u[0]) > _OPENING * u_span) if u_span > 0.0 else np.array([], int)
+    opening = int(moved[0]) if moved.size else record.size
+    if opening < 4:
+        return []
+    opening = min(opening, max(20, record.size // 20))
+    noise = _noise(y)
+    few = max(1, opening // 8)
+    drift = abs(float(y[opening - few : opening].mean() - y[:few].mean()))
+    explained = 3.0 * float(np.abs(u[:opening] - u[0]).max()) * (y_span / u_span if u_span > 0.0 else 0.0)
+    # creep and drift move a resting stage too: only what is large against the phase contradicts rest
+    if drift <= explained + _NOISE * noise / np.sqrt(few) + (0.05 * y_span if u_span > 0.0 else np.inf):
+        return []
+    text = (
+        f"the displacement moves by {drift:.3g} m in the first {opening} samples, the drive by "
+        f"{float(np.abs(u[:opening] - u[0]).max()):.3g} V: not settled at {record.settled_voltage:.4g} V before; "
+        "give initial_voltage"
+    )
+    return [Notice("not_at_rest", text, record.phase)]
+
+
+def _noise(displacement: Samples) -> float:
+    return float(np.median(np.abs(np.diff(displacement, 2)))) / 2.4
+
+
+def departures(experiment: Experiment) -> dict[int, float]:
+    """Records that begin in motion, with the level [V] from which their first samples come.
+
+    A ramp from rest of which a sample, or the average of a slow one, is stored first begins beside that level. Levels
+    are 0 V and those at which other records rest when they begin.
+    """
+    begins_at_rest = (r for r in experiment if r.size > 1 and not r.continues and r.voltage[1] == r.voltage[0])
+    levels, found = {r.settled_voltage for r in begins_at_rest}, dict[int, float]()
+    for i, record in enumerate(experiment):
+        if record.continues or record.truncated or record.initial_voltage is not None or record.size < 3:
+            continue
+        first, step = float(record.voltage[0]), float(record.voltage[1] - record.voltage[0])
+        if abs(float(record.voltage[2] - record.voltage[1]) - step) >= _STRAIGHT * abs(step):
+            continue
+        for level in (*sorted(levels, key=lambda v: abs(v - first)), 0.0):
+            if _AHEAD[0] - _NEAR < (first - level) / step < _AHEAD[1] + _NEAR:
+                found[i] = level
+                break
+    return found
+
+
+def origins(experiment: Experiment) -> list[Notice]:
+    """Notice ``origins_differ`` where two records begin at rest at one voltage, but not at one displacement."""
+    records = [r for r in experiment if not (r.continues or r.truncated) and r.size >= 20]
+    span = float(np.ptp([(r.voltage.max(), r.voltage.min()) for r in records] or 0.0))
+    stroke = max((float(np.ptp(r.displacement)) for r in records), default=0.0)
+    settled = [r for r in records if abs(r.voltage[0] - r.settled_voltage) <= _SAME_VOLTAGE * span]
+    for i, record in enumerate(settled):
+        alike = [r for r in settled[:i] if abs(r.voltage[0] - record.voltage[0]) <= _SAME_VOLTAGE * span]
+        if not alike:
+            continue
+        apart = abs(float(record.displacement[0] - alike[0].displacement[0]))
+        # the noise of a long record takes longest, and most records begin alike
+        if apart > _APART * stroke and all(apart > _NOISE * _noise(r.displacement) for r in (record, alike[0])):
+            text = (
+                f"begins at {record.voltage[0]:.4g} V as {alike[0].phase} does, but {apart:.3g} m from there: a zero "
+                "taken anew, a stage that had not settled, or drift; the model has one zero and starts from rest"
+            )
+            return [Notice("origins_differ", text, record.phase)]
+    return []

@@ -1,0 +1,150 @@
+"""How much later than the drive the displacement moves: dynamics of the stage, or a channel that is late."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...record import Notice, Record, Samples
+from ..segmentation.waveform import turning_points
+
+LATE = 3e-3
+"""Lag that no stage has by itself [s]; a slow sensor filter, or a shifted channel, has."""
+
+_SWING = 0.2
+_WINDOWS = 24
+_POINTS = 96
+_EXCERPT = 1 << 20
+_FEWEST = 6
+_FEWEST_TURNS = 2
+"""One turning point alone may look like a lead by the way its loop bends."""
+_EXPLAINED = 0.999
+_SURE = 4.0
+_JUMP = 0.3
+_BENT = 0.01
+_SLOWER, _ALIKE, _SHARED = 10.0, 1.2, 2.0
+"""Swings, in lags and in swings of the phase, of others that a lag is compared with; how far it may differ."""
+_SLOW = 20e-3
+"""A drive that turns faster [s] may pass a resonance, behind which a lag of over half a period looks like a lead."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lag:
+    """Lag of the displacement behind the drive.
+
+    Parameters
+    ----------
+    time : float
+        Lag [s]; negative where the displacement leads.
+    error : float
+        Its standard error [s].
+    swing : float
+        Usual time between two turning points [s]. What bends the loops (creep, asymmetry, more than two orders of
+        hysteresis) shows as a lag or a lead of up to one per cent of it.
+    """
+
+    time: float
+    error: float
+    swing: float
+
+
+def lag_of(record: Record) -> Lag | None:
+    """Lag at the turning points of the drive; None where it has none, or the displacement does not follow it.
+
+    Hysteresis alone turns where the drive turns, and has another slope behind a turn than ahead of it. So around every
+    turning point the displacement is a line in the drive of some time before, with a slope for each side; the time that
+    fits best, over all turns, is the lag.
+    """
+    u, y = record.voltage[:_EXCERPT], record.displacement[:_EXCERPT]
+    span = float(np.ptp(u))
+    if span == 0.0:
+        return None
+    turns = turning_points(u, _SWING * span)
+    before, at, after = turns[:-2], turns[1:-1], turns[2:]
+    wide = np.minimum(at - before, after - at) >= 2 * _FEWEST
+    sudden = np.maximum.reduceat(np.abs(np.diff(u, append=u[-1])), turns[:-1]) if turns.size > 1 else np.empty(0)
+    wide &= np.maximum(sudden[:-1], sudden[1:]) < _JUMP * np.minimum(
+        np.abs(u[at] - u[before]), np.abs(u[after] - u[at])
+    )
+    if wide.any():  # those that the record cuts off are too short for the others
+        length = np.minimum(at - before, after - at)
+        wide &= length >= 0.6 * np.median(length[wide])
+        wide &= (at >= length) & (at + length < u.size)
+    chosen = np.flatnonzero(wide)[:: max(1, np.count_nonzero(wide) // _WINDOWS)]
+    if chosen.size < _FEWEST_TURNS:
+        return None
+    half = np.minimum(at - before, after - at)[chosen] // 2
+    reach = float(half.min()) / 2.0
+    place = np.rint(at[chosen, None] + half[:, None] * np.linspace(-1.0, 1.0, _POINTS)).astype(np.int64)
+    measured = y[place]
+
+    def misfit(lag: float) -> float:
+        return _misfit(_between(u, place - lag) - u[at[chosen], None], place - lag < at[chosen, None], measured)
+
+    lag, least, curvature = _lowest(misfit, reach)
+    if least > (1.0 - _EXPLAINED) * float(np.var(measured, axis=1).mean()) or abs(lag) > 0.9 * reach:
+        return None
+    error = np.sqrt(2.0 * least / measured.size / curvature) if curvature > 0.0 else reach
+    period = record.sample_period
+    return Lag(lag * period, float(error) * period, 2.0 * float(np.median(half)) * period)
+
+
+def lag_notices(records: Sequence[Record]) -> list[Notice]:
+    """Notices ``leads`` where the displacement moves before the drive does, ``late`` where it lags beyond `LATE`.
+
+    A late channel and a slow filter lag in all that is slow beside the lag; hysteresis that bends a loop does not.
+    """
+    lags = [lag_of(record) for record in records]
+    notices = []
+    for record, lag in zip(records, lags, strict=True):
+        if lag is None:
+            continue
+        samples = f"{abs(lag.time):.3g} s ({abs(lag.time) / record.sample_period:.2g} samples)"
+        doubt = _SURE * lag.error
+        least = max(doubt, 2.0 * _BENT * lag.swing)
+        peers = [o for o in lags if o is not None and _SLOWER * lag.time < o.swing <= _ALIKE * lag.swing]
+        shared = min((max(o.time, 0.0) + _SURE * o.error for o in peers), default=lag.time)
+        if lag.time < -max(least, 0.5 * record.sample_period) and lag.swing > _SLOW:
+            text = f"the displacement leads the voltage by {samples}: one channel is shifted in time"
+            notices.append(Notice("leads", text, record.phase, severe=True))
+        elif lag.time > max(LATE, least) and lag.time - doubt < _SHARED * shared:
+            cause = "a slow sensor filter, a channel that is late, or a wrong time base"
+            text = f"the displacement follows the voltage by {samples}: {cause}"
+            notices.append(Notice("late", text, record.phase))
+    return notices
+
+
+def _between(values: Samples, place: Samples) -> Samples:
+    """Values at fractional places, by straight lines."""
+    place = np.clip(place, 0.0, values.size - 1.0)
+    lower = np.minimum(place.astype(np.int64), values.size - 2)
+    share = place - lower
+    return np.asarray((1.0 - share) * values[lower] + share * values[lower + 1])
+
+
+def _misfit(away: Samples, ahead: NDArray[np.bool_], measured: Samples) -> float:
+    """Mean square of what a constant and a parabola on each side leave of every row."""
+    sides = np.where(ahead, away, 0.0), np.where(ahead, 0.0, away)
+    basis = np.stack((np.ones(away.shape), *sides, *(side**2 for side in sides)), axis=1)
+    scale = np.maximum(np.linalg.norm(basis, axis=2, keepdims=True), 1e-300)
+    basis /= scale
+    gram = basis @ basis.transpose(0, 2, 1) + 1e-12 * np.eye(5)
+    along = basis @ measured[:, :, None]
+    left = measured - (basis.transpose(0, 2, 1) @ np.linalg.solve(gram, along))[:, :, 0]
+    return float(np.mean(left**2))
+
+
+def _lowest(cost: Callable[[float], float], reach: float) -> tuple[float, float, float]:
+    """Place, value and curvature of the minimum within ±reach, from a grid that closes in on it."""
+    middle, width = 0.0, reach
+    for points in (65, 9, 9, 9):
+        grid = middle + width * np.linspace(-1.0, 1.0, points)
+        costs = [cost(float(x)) for x in grid]
+        best = int(np.argmin(costs))
+        middle, width = float(grid[best]), 2.0 * width / (points - 1)
+    low, mid, high = cost(middle - width), cost(middle), cost(middle + width)
+    curvature = (low - 2.0 * mid + high) / width**2
+    return middle, mid, curvature

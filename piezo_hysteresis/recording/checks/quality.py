@@ -1,0 +1,173 @@
+"""What is wrong with the data of an experiment, told before anything rests on them."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from ...record import Experiment, Notice, Record, Samples
+from ..segmentation.waveform import phase_name
+from .channel_defects import channel_defects
+from .initial_condition_check import onset, origins
+from .lag import lag_notices, lag_of
+
+DISPLACEMENT_RANGE = (1e-9, 2e-3)
+"""Range of displacement that a piezo stage can have [m]."""
+VOLTAGE_RANGE = (1e-3, 1.2e3)
+"""Largest drive voltage that a piezo stage can have [V]."""
+
+GAIN_RANGE = (1e-10, 3e-4)
+"""Range of displacement per volt that a piezo stage can have, with or without an amplifier [m/V]."""
+FAINT = (4e-8, 1e-12)
+"""A smaller displacement per volt [m/V], read by a sensor of less noise [m], is rather one in another unit."""
+
+_SCALE_MISMATCH = 100.0
+_FEWEST_PERIODS = 1.8
+_FREQUENCY_MISMATCH = 0.1
+_MOVING = 0.05
+_LEADS = 4.0
+_SINE = re.compile(r"sine_(\d+(?:\.\d+)?(?:e[+-]?\d+)?)hz")
+
+
+def inspect(experiment: Experiment) -> tuple[Notice, ...]:
+    """Judge every channel of every record, and the records against each other.
+
+    Returns
+    -------
+    tuple of Notice
+        Kinds: ``units``, ``scale``, ``constant``, ``sample_period``, ``time_base``, ``clipped``, ``stuck``,
+        ``dropout``, ``quantisation``, ``leads``, ``late``, ``polarity``, ``not_at_rest``,
+        ``origins_differ``. What reading finds (``gap``, ``duplicate``, …) stands in `Experiment.notices`.
+    """
+    spans = np.array([[np.ptp(r.voltage), np.ptp(r.displacement)] for r in experiment])
+    largest = float(spans[:, 0].max())
+    moving = [r for r, (u, _) in zip(experiment, spans, strict=True) if u > _MOVING * largest]
+    notices = [*_units(experiment, spans), *_scale(experiment, spans), *_order(experiment)]
+    for record in moving:
+        notices += _named_frequency(record)
+        notices += channel_defects(record)
+    late = lag_notices(moving)
+    notices += late
+    notices += [n for n in _polarity_and_lead(moving) if n.kind not in {told.kind for told in late}]
+    for record in experiment:
+        notices += onset(record)
+    return (*notices, *origins(experiment))
+
+
+def _units(experiment: Experiment, spans: Samples) -> list[Notice]:
+    u_span, y_span = (float(span) for span in spans.max(axis=0))
+    u_peak = max(float(np.abs(r.voltage).max()) for r in experiment)
+    notices = []
+    if u_span == 0.0:
+        notices.append(Notice("constant", "the voltage never changes: nothing was driven", severe=True))
+    elif not VOLTAGE_RANGE[0] <= u_peak <= VOLTAGE_RANGE[1]:
+        text = f"largest voltage {u_peak:.3g} V, expected 1 mV to 1.2 kV{_likely(u_peak, VOLTAGE_RANGE)}"
+        notices.append(Notice("units", text, severe=True))
+    if y_span == 0.0:
+        notices.append(Notice("constant", "the displacement never changes: sensor dead or wrong column", severe=True))
+    elif not DISPLACEMENT_RANGE[0] <= y_span <= DISPLACEMENT_RANGE[1]:
+        text = f"range of displacement {y_span:.3g} m, expected 1 nm to 2 mm{_likely(y_span, DISPLACEMENT_RANGE)}"
+        notices.append(Notice("units", text, severe=True))
+    return notices or _gain(experiment, y_span / u_span)
+
+
+def _gain(experiment: Experiment, gain: float) -> list[Notice]:
+    """A displacement per volt that both channels alone would not betray."""
+    if not GAIN_RANGE[0] <= gain <= GAIN_RANGE[1]:
+        text = f"displacement per volt {gain:.2g} m/V, expected 0.1 nm/V to 300 µm/V{_likely(gain, GAIN_RANGE)}"
+        return [Notice("units", text)]
+    parts = [r.displacement[_excerpt(r)] for r in experiment if r.size > 8]
+    noise = min((float(np.median(np.abs(np.diff(y, 3)))) / 3.0 for y in parts), default=0.0)
+    if gain < FAINT[0] and 0.0 < noise < FAINT[1]:
+        text = f"displacement per volt {gain:.2g} m/V with a noise of {noise:.1g} m: a unit may be off by 1e+3"
+        return [Notice("units", text)]
+    return []
+
+
+def _likely(value: float, bounds: tuple[float, float]) -> str:
+    """The power of a thousand that puts a value well inside its bounds."""
+    middle = float(np.sqrt(bounds[0] * bounds[1]))
+    power = 3 * round(float(np.log10(middle / value)) / 3)
+    return f"; a unit may be off by 1e{power:+d}" if power else ""
+
+
+def _scale(experiment: Experiment, spans: Samples) -> list[Notice]:
+    """Phases whose gain is far from that of the others."""
+    driven = spans[:, 0] > _MOVING * spans[:, 0].max()
+    if not driven.any() or spans[:, 0].max() == 0.0:
+        return []
+    gains = np.where(driven, spans[:, 1] / np.where(driven, spans[:, 0], 1.0), np.nan)
+    usual = float(np.nanmedian(gains))
+    notices = []
+    for record, gain in zip(experiment, gains, strict=True):
+        if gain == 0.0 and usual > 0.0:
+            notices.append(
+                Notice("constant", "the displacement stands still while the drive moves", record.phase, True)
+            )
+        elif usual > 0.0 and not 1 / _SCALE_MISMATCH < gain / usual < _SCALE_MISMATCH and not np.isnan(gain):
+            power = 3 * round(float(np.log10(gain / usual)) / 3)
+            text = f"displacement per volt is 1e{power:+d} times that of the other phases: another unit"
+            notices.append(Notice("scale", text, record.phase, severe=True))
+    return notices
+
+
+def _order(experiment: Experiment) -> list[Notice]:
+    """Phases that begin before the one before them has ended."""
+    starts = [r.start_time for r in experiment]
+    if sorted(set(starts)) != starts:
+        return []  # no times of a common clock
+    notices = []
+    for before, after in zip(experiment.records, experiment.records[1:], strict=False):
+        overlap = before.start_time + before.duration - after.start_time
+        if overlap > max(0.01 * before.duration, 2 * before.sample_period):
+            text = f"begins {overlap:.3g} s before the phase before it ends: start times or a sample period are wrong"
+            notices.append(Notice("time_base", text, after.phase))
+    return notices
+
+
+def _named_frequency(record: Record) -> list[Notice]:
+    """A phase called sine of a frequency that moves at another one has a wrong name or a wrong sample period."""
+    named, found = _SINE.fullmatch(record.phase), _SINE.fullmatch(phase_name(record.voltage, record.sample_period))
+    if named is None or found is None or abs(float(found[1]) / float(named[1]) - 1) < _FREQUENCY_MISMATCH:
+        return []
+    if float(found[1]) * record.duration < _FEWEST_PERIODS:
+        return []  # the ends of a single period have a say in its frequency
+    text = f"the drive moves at {found[1]} Hz: the name, or the sample period {record.sample_period:g} s, is wrong"
+    return [Notice("sample_period", text, record.phase, severe=True)]
+
+
+def _excerpt(record: Record) -> slice:
+    return slice(0, min(record.size, 1 << 18))
+
+
+def _fundamental(record: Record) -> tuple[float, float]:
+    """Strongest frequency of the drive and the resolution of the estimate [Hz]."""
+    u = record.voltage[_excerpt(record)]
+    spectrum = np.abs(np.fft.rfft((u - u.mean()) * np.hanning(u.size)))
+    resolution = 1.0 / (u.size * record.sample_period)
+    return float(spectrum[1:].argmax() + 1) * resolution if spectrum.size > 1 else 0.0, resolution
+
+
+def _polarity_and_lead(moving: list[Record]) -> list[Notice]:
+    """A stage lags its drive; a displacement that leads it comes from shifted columns."""
+    slowest = min(moving, key=lambda r: _fundamental(r)[0], default=None)
+    if slowest is None or slowest.size < 64:
+        return []
+    part = _excerpt(slowest)
+    window = np.hanning(slowest.voltage[part].size)
+    u, y = (np.fft.rfft((x[part] - x[part].mean()) * window) for x in (slowest.voltage, slowest.displacement))
+    at = int(np.abs(u[1:]).argmax()) + 1
+    if at < 4 or np.abs(u[at]) ** 2 < 0.2 * float(np.sum(np.abs(u[1:]) ** 2)):
+        return []  # no period to speak of
+    angle = float(np.degrees(np.angle(y[at] / u[at]))) if u[at] != 0 else 0.0
+    falls = abs(angle) > 90.0
+    notices = []
+    if falls:
+        angle = (angle + 180.0 + 180.0) % 360.0 - 180.0
+        notices.append(Notice("polarity", "the displacement falls when the voltage rises", slowest.phase))
+    if angle > _LEADS and lag_of(slowest) is None:
+        lead = angle / 360.0 * (1.0 / _fundamental(slowest)[0])
+        text = f"the displacement leads the voltage by {angle:.1f}° ({lead:.3g} s): one channel is shifted in time"
+        notices.append(Notice("leads", text, slowest.phase, severe=True))
+    return notices

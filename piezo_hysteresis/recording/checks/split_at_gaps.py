@@ -1,0 +1,120 @@
+"""Records from channels with holes: split at every hole, told, never interpolated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordError
+from ...record import Notice, Record, Samples
+
+SHORTEST_SHARE = 1 / 64
+"""A piece between two holes is kept when it is at least this share of the phase."""
+
+
+LARGEST = 1e30
+"""Numbers beyond this are damage, in whatever unit [V, m]."""
+
+PERIODS = (1e-9, 1e6)
+"""Sample periods that a recording can have [s]."""
+
+
+def stretches(good: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Start and stop of every run of True.
+
+    >>> stretches(np.array([True, False, True, True]))
+    [(0, 1), (2, 4)]
+    """
+    edges = np.flatnonzero(np.diff(good.astype(np.int8), prepend=0, append=0))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def finite_records(
+    channels: Mapping[str, Samples],
+    sample_period: float,
+    breaks: Mapping[int, int] | None = None,
+    pauses: Mapping[int, int] | None = None,
+    **labels: Any,
+) -> tuple[list[Record], list[Notice]]:
+    """One phase as records without its non-finite and missing samples.
+
+    Parameters
+    ----------
+    channels : mapping of str to (n,) ndarray
+        `voltage` [V] and `displacement` [m], NaN or infinite where nothing was measured; `other_displacement` [m] and
+        `temperature` [K] are optional and left out where they have holes.
+    sample_period : float
+        Time between samples [s].
+    breaks : mapping of int to int, optional
+        Sample before which others are missing, to their number.
+    pauses : mapping of int to int, optional
+        Sample before which others were never measured while the voltage was held, to their number.
+    **labels
+        The other fields of `Record`.
+
+    Returns
+    -------
+    records : list of Record
+        A record behind a hole `continues` and is `truncated`: its state can be carried, but not exactly. Behind a pause
+        it is not `truncated`.
+    notices : list of Notice
+        What was dropped.
+
+    Raises
+    ------
+    RecordError
+        On unequal channels or where no finite sample is left.
+    """
+    phase = str(labels.get("phase", "record"))
+    voltage, displacement = channels["voltage"], channels["displacement"]
+    if voltage.ndim != 1 or voltage.shape != displacement.shape or voltage.size == 0:
+        return [Record(voltage, displacement, sample_period, **labels)], []  # raises, and says what is wrong
+    notices = []
+    kept = {}
+    for name in channels.keys() - {"voltage", "displacement"}:
+        if (np.abs(channels[name]) < LARGEST).all():
+            kept[name] = channels[name]
+        else:
+            notices.append(Notice("non_finite", f"{name} has non-finite samples: the channel is left out", phase))
+    if not PERIODS[0] <= sample_period <= PERIODS[1]:
+        raise RecordError(f"sample_period: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
+    good = (np.abs(voltage) < LARGEST) & (np.abs(displacement) < LARGEST)
+    gaps = {**(breaks or {}), **(pauses or {})}
+    edges = sorted(gaps.keys() - {0})
+    pieces = [(a + i, a + j) for a, b in _between(edges, good.size) for i, j in stretches(good[a:b])]
+    if not pieces:
+        raise RecordError(f"phase '{phase}': got no finite sample among {good.size}")
+    shortest = min(SHORTEST_SHARE * good.size, max(b - a for a, b in pieces))
+    known = {a for (_, before), (a, _) in zip(pieces, pieces[1:], strict=False) if before == a and a in (pauses or {})}
+    known -= {b for a, b in pieces if b - a < shortest}
+    pieces = [(a, b) for a, b in pieces if b - a >= shortest]
+    dropped = good.size - sum(b - a for a, b in pieces)
+    if bad := int(np.count_nonzero(~good)):
+        text = f"{bad} of {good.size} samples are not finite: dropped"
+        notices.append(Notice("non_finite", text, phase, severe=bad > good.size // 2))
+    if dropped > bad:
+        text = f"{dropped - bad} samples between holes too close to each other are dropped"
+        notices.append(Notice("split", text, phase, severe=dropped > good.size // 2))
+    if len(pieces) > 1:
+        notices.append(Notice("split", f"the phase is split at its holes into {len(pieces)} records", phase))
+    begin = float(labels.pop("start_time", 0.0))
+    missing = np.cumsum([0, *(gaps[e] for e in edges)])
+    records: list[Record] = []
+    for a, b in pieces:
+        if a > 0:
+            labels |= {
+                "continues": bool(records or labels.get("continues")),
+                "truncated": a not in known,
+                "initial_voltage": None,
+            }
+        start = begin + (a + int(missing[np.searchsorted(edges, a, "right")])) * sample_period
+        part: dict[str, Any] = {name: values[a:b] for name, values in kept.items()} | labels
+        records.append(Record(voltage[a:b], displacement[a:b], sample_period, start_time=start, **part))
+    return records, notices
+
+
+def _between(edges: list[int], size: int) -> list[tuple[int, int]]:
+    return list(zip([0, *edges], [*edges, size], strict=True))

@@ -1,0 +1,126 @@
+"""CSV with a header that names units, and tables of other software: TSV, white space, no header."""
+
+from __future__ import annotations
+
+import io
+from csv import writer
+from pathlib import Path
+
+from ...errors import RecordingError
+from ...record import Experiment, Notice, Record
+from ..checks.error_context import naming
+from ..segmentation.decimating_buffer import averaged_notice
+from ..table.read_options import CHANNELS, LABELS, Layout
+from ..table.table import resolve, table_records
+from ..table.text_cells import Dialect, read_cells
+from ..table.time_column import TimeBase
+
+_ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
+_ROWS = 1 << 15
+_LOOK = 1 << 12
+_EPOCH = 1e8
+"""A clock that shows more [s] counts from an epoch, not from the start of the experiment."""
+
+
+class Csv:
+    """Text table, one row per sample.
+
+    Written with the header ``time_s,voltage_V,displacement_m,phase`` and, only where the records need them, the columns
+    `record` (between neighbours of one name), `continues`, `truncated`, `initial_voltage_V`, `sample_period_s`,
+    `other_displacement_m` and `temperature_K`. Numbers are written in full, so that reading gives the same ones.
+    """
+
+    def recognises(self, path: Path) -> bool:
+        """True for the endings of text tables, and for any text with rows of numbers."""
+        return path.is_file() and (path.suffix.lower() in _ENDINGS or _is_table(path))
+
+    def read(self, path: Path, layout: Layout) -> Experiment:
+        """The table as phases: labelled ones, or else what the drive looks like."""
+        with naming(path, "a text table"):
+            dialect = Dialect.sniff(path)
+            found = resolve(dialect.header, dialect.width, layout)
+            places = found.columns
+            numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
+            words = {name: at for name, (at, _) in places.items() if name in LABELS}
+            cells = read_cells(path, dialect, numbers, words, layout)
+            channels = {name: layout.in_si(name, values, places[name][1]) for name, values in cells.columns.items()}
+            if "time" in channels and abs(channels["time"][0]) > _EPOCH:
+                channels["time"] = channels["time"] - channels["time"][0]
+            rest = layout.after_reading(cells.average)
+            records, notices = table_records(channels, cells.marks, rest, truncated=layout.passes_over)
+            notices += found.notices
+            if layout.average is None and cells.average > 1:
+                notices.append(averaged_notice(cells.average, records[0].sample_period))
+            if cells.bad:
+                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or no number"))
+            return Experiment(tuple(records), str(path), tuple(notices))
+
+    def write(self, experiment: Experiment, path: Path) -> None:
+        """Write all records into one table.
+
+        Raises
+        ------
+        RecordingError
+            If the file exists or cannot be written.
+        """
+        with naming(path, "a file that can be written"):
+            if path.exists():
+                raise RecordingError("exists already; choose another name")
+            labels = _labels(experiment)
+            channels = [c for c in CHANNELS[3:] if all(getattr(r, c) is not None for r in experiment)]
+            with path.open("w", encoding="utf-8", newline="") as file:
+                titles = [f"{c}_{'m' if 'displacement' in c else 'K'}" for c in channels]
+                units = {"initial_voltage": "initial_voltage_V", "sample_period": "sample_period_s"}
+                titles += [units.get(name, name) for name in labels]
+                file.write(",".join(["time_s", "voltage_V", "displacement_m", *titles]) + "\n")
+                for number, record in enumerate(experiment, 1):
+                    _write_record(file, record, channels, _row_end(number, record, labels))
+
+
+def _is_table(path: Path) -> bool:
+    with path.open("rb") as file:
+        if b"\0" in file.read(_LOOK):
+            return False
+    try:
+        return len(Dialect.sniff(path).header) > 0
+    except RecordingError:
+        return False
+
+
+def _labels(experiment: Experiment) -> list[str]:
+    """Label columns without which the records would not come back as they are."""
+    labels = ["phase"]
+    pairs = list(zip(experiment.records, experiment.records[1:], strict=False))
+    if any(a.phase == b.phase for a, b in pairs):
+        labels.append("record")
+    inferred = [abs(b.start_time - a.start_time - a.duration) < 1.5 * b.sample_period for a, b in pairs]
+    if [False, *inferred] != [r.continues for r in experiment]:
+        labels.append("continues")
+    if any(r.truncated for r in experiment):
+        labels.append("truncated")
+    if any(r.initial_voltage is not None for r in experiment):
+        labels.append("initial_voltage")
+    if any(r.size < 2 or TimeBase.of(r.time).period != r.sample_period for r in experiment):
+        labels.append("sample_period")
+    return labels
+
+
+def _row_end(number: int, record: Record, labels: list[str]) -> str:
+    values = {
+        "phase": record.phase,
+        "record": number,
+        "continues": int(record.continues),
+        "truncated": int(record.truncated),
+        "initial_voltage": "" if record.initial_voltage is None else repr(record.initial_voltage),
+        "sample_period": repr(record.sample_period),
+    }
+    text = io.StringIO()
+    writer(text, lineterminator="").writerow([values[name] for name in labels])
+    return text.getvalue().replace("\n", " ").replace("\r", " ") + "\n"
+
+
+def _write_record(file: io.TextIOBase, record: Record, channels: list[str], end: str) -> None:
+    columns = [record.time, record.voltage, record.displacement, *(getattr(record, c) for c in channels)]
+    for a in range(0, record.size, _ROWS):
+        rows = zip(*(column[a : a + _ROWS].tolist() for column in columns), strict=True)
+        file.write("".join(",".join(map(repr, row)) + "," + end for row in rows))

@@ -1,0 +1,85 @@
+"""PI GCS arrays: what controllers answer to ``DRR?`` and what PIMikroMove saves."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ...errors import RecordingError
+from ...record import Experiment, Notice
+from ..checks.error_context import naming
+from ..segmentation.decimating_buffer import averaged_notice
+from ..table.read_options import CHANNELS, Layout
+from ..table.table import resolve, table_records
+from ..table.text_cells import BLOCK_BYTES, Dialect, decoded, read_cells
+
+_END = "# END_HEADER"
+
+
+class GcsArray:
+    """Text with ``# KEY = value`` lines up to ``# END_HEADER``, then rows of numbers.
+
+    Without a mapping the first column whose name speaks of a voltage is the drive [V], and the first one that speaks of
+    a position, other than a commanded or target one, is the displacement [µm].
+    """
+
+    def recognises(self, path: Path) -> bool:
+        """True where the first block holds the end of a GCS header."""
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            return _END.encode() in file.read(BLOCK_BYTES // 16)
+
+    def read(self, path: Path, layout: Layout) -> Experiment:
+        """The array as phases named by what the drive looks like, unless `Layout.phases` says otherwise."""
+        with naming(path, "a GCS array"):
+            header, skipped = _header(path)
+            width = int(header.get("DIM", "0"))
+            titles = [header.get(f"NAME{i}", f"column {i + 1}") for i in range(min(width, 1000))]
+            if width < 2 or width > 1000:
+                raise RecordingError(f"got DIM = {width}, expected two to 1000 columns")
+            guessed = {"voltage": _first(titles, "volt"), "displacement": _first(titles, "position|displacement")}
+            columns = {c: at for c, at in guessed.items() if at} | dict(layout.columns)
+            places = resolve(titles, width, Layout(columns=columns, sample_period=1.0)).columns
+            separator = int(header.get("SEPARATOR", "32"))
+            dialect = Dialect(None if separator in (9, 32) else chr(separator), False, skipped, (), width)
+            numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
+            cells = read_cells(path, dialect, numbers, {}, layout)
+            units = {"voltage": "V", "displacement": "um", "other_displacement": "um", "time": "s"}
+            channels = {name: layout.in_si(name, column, units.get(name)) for name, column in cells.columns.items()}
+            period = layout.sample_period or float(header.get("SAMPLE_TIME", "nan"))
+            rest = layout.with_period(period if period > 0 else None).after_reading(cells.average)
+            records, notices = table_records(channels, [], rest, truncated=layout.passes_over)
+            said = ", ".join(f"{name} = '{titles[at]}'" for name, at in numbers.items())
+            notices.append(Notice("columns", f"columns taken: {said}; positions without a unit in um"))
+            declared = int(header.get("NDATA", "-1"))
+            if declared >= 0 and layout.rows is None and cells.average == 1 and channels["voltage"].size != declared:
+                notices.append(
+                    Notice("cut", f"got {channels['voltage'].size} rows of the {declared} that the header declares")
+                )
+            if layout.average is None and cells.average > 1:
+                notices.append(averaged_notice(cells.average, records[0].sample_period))
+            if cells.bad:
+                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or no number"))
+            return Experiment(tuple(records), str(path), tuple(notices))
+
+
+def _header(path: Path) -> tuple[dict[str, str], int]:
+    """Keys of the header and its number of lines."""
+    with path.open("rb") as file:
+        lines = decoded(file.read(BLOCK_BYTES // 16)).splitlines()
+    keys: dict[str, str] = {}
+    for number, line in enumerate(lines, 1):
+        if line.strip() == _END:
+            return keys, number
+        key, separator, value = line.lstrip("# ").partition("=")
+        if separator:
+            keys[key.strip()] = value.strip()
+    raise RecordingError(f"got no line '{_END}', expected a GCS array")
+
+
+def _first(titles: list[str], words: str) -> int | None:
+    """Number, from 1, of the first measured column that speaks of one of the `words`."""
+    wanted, target = re.compile(words, re.IGNORECASE), re.compile("command|target|error", re.IGNORECASE)
+    hits = [i for i, title in enumerate(titles, 1) if wanted.search(title)]
+    return next((i for i in hits if not target.search(titles[i - 1])), hits[0] if hits else None)

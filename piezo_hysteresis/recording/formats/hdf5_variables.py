@@ -1,0 +1,97 @@
+"""`Hdf5Variables`: the variables of a MATLAB 7.3 file, read one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordingError
+from ..segmentation.decimating_buffer import PIECE, Intake
+from ..table.read_options import Layout
+from .mat_variables import MatVariables
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_LARGEST_EXPANSION = 1100
+
+
+def is_hdf5(path: Path) -> bool:
+    """True for MATLAB 7.3 (behind its header of 512 bytes) and plain HDF5."""
+    with path.open("rb") as file:
+        head = file.read(520)
+    return _SIGNATURE in (head[:8], head[512:])
+
+
+class Hdf5Variables(MatVariables):
+    """Dotted name to array, oriented as in MATLAB; texts are arrays of one string.
+
+    Parameters
+    ----------
+    path : Path
+        The file, open while this is used as a context manager.
+
+    Raises
+    ------
+    RecordingError
+        If h5py is not installed, or an array declares more than the file can hold.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import h5py
+        except ImportError:
+            raise RecordingError(
+                "is a MATLAB 7.3 file, for which h5py is needed: pip install h5py, or save it in MATLAB with -v7"
+            ) from None
+        self._file = h5py.File(path, "r")
+        self._names: list[str] = []
+        try:
+            self._file.visititems(
+                lambda name, item: self._names.append(name) if isinstance(item, h5py.Dataset) else None
+            )
+        except BaseException:
+            self._file.close()
+            raise
+
+    def close(self) -> None:
+        self._file.close()
+
+    def __iter__(self) -> Iterator[str]:
+        return (name.replace("/", ".") for name in self._names if not name.startswith("#"))
+
+    def samples(self, name: str, column: int | None, layout: Layout) -> Intake:
+        dataset = self._numbers(name)
+        shape = tuple(dataset.shape[::-1])  # as in MATLAB
+        self.check_column(name, shape, column)
+        along = dataset.ndim - 1 if column is not None else int(np.argmax(dataset.shape))
+        intake = Intake.of(1, layout)
+        for first in range(0, dataset.shape[along], PIECE):
+            index: list[int | slice] = [column or 0] * dataset.ndim
+            index[along] = slice(first, first + PIECE)
+            skipped = first + PIECE <= intake.start
+            intake.add(np.empty((PIECE, 1)) if skipped else np.asarray(dataset[tuple(index)], np.float64)[:, None])
+            if intake.is_full:
+                break
+        return intake
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        dataset = self._numbers(name)
+        values = np.asarray(dataset[()]).T
+        if dataset.attrs.get("MATLAB_class") == b"char":
+            return np.array("".join(map(chr, values.ravel(order="F").tolist())))
+        return values
+
+    def _numbers(self, name: str) -> Any:
+        """The dataset of a name, its size checked."""
+        if name not in set(self):
+            raise KeyError(name)
+        dataset = self._file[name.replace(".", "/")]
+        if dataset.dtype.kind not in "fiub":
+            raise RecordingError(f"{name}: got {dataset.dtype}, expected numbers or text")
+        size = dataset.size * dataset.dtype.itemsize
+        if size > _LARGEST_EXPANSION * (dataset.id.get_storage_size() + 1000):
+            raise RecordingError(f"{name}: declares {size} bytes, more than the file can hold")
+        return dataset

@@ -1,0 +1,190 @@
+"""`Mat5Variables`: the variables of a MATLAB file of version 5 to 7.2, long ones read in pieces."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordingError
+from ..segmentation.decimating_buffer import PIECE, Intake
+from ..table.read_options import Layout
+from .mat5_sizes import COMPRESSED, HEADER, MATRIX, ORDERS, Inflated, check_sizes
+from .mat_variables import MatVariables
+
+_LONG = 1 << 20
+_REAL = range(6, 16)
+_COMPLEX = 0x800
+_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Matrix:
+    """Where the numbers of a matrix lie, one column after the other."""
+
+    position: int
+    """Of its element in the file."""
+    shape: tuple[int, ...]
+    offset: int
+    """Of its first number in the element, inflated."""
+    kind: np.dtype[Any]
+
+
+class Mat5Variables(MatVariables):
+    """Dotted name to array of every variable and field; one variable is in memory at a time.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    RecordingError
+        If an array declares more than the file can hold.
+    """
+
+    def __init__(self, path: Path) -> None:
+        from scipy import io  # slow to import, and only needed here
+
+        check_sizes(path)
+        self._path = path
+        self._load = io.loadmat
+        self._classes = {name: kind for name, _, kind in io.whosmat(path)}
+        self._long = _long_matrices(path)
+        self._loaded: tuple[str, dict[str, NDArray[Any]]] = ("", {})
+        self._fields: dict[str, list[str]] = {}
+
+    def close(self) -> None:
+        self._loaded = ("", {})
+
+    def __iter__(self) -> Iterator[str]:
+        for name, kind in self._classes.items():
+            if kind != "struct":
+                yield name
+                continue
+            if name not in self._fields:
+                self._fields[name] = list(self._variable(name))
+            yield from self._fields[name]
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        top = name.partition(".")[0]
+        if top not in self._classes:
+            raise KeyError(name)
+        return self._variable(top)[name]
+
+    def samples(self, name: str, column: int | None, layout: Layout) -> Intake:
+        matrix = self._long.get(name)
+        shape = self[name].shape if matrix is None else matrix.shape
+        self.check_column(name, shape, column)
+        intake = Intake.of(1, layout)
+        if matrix is not None:
+            count = math.prod(shape) if column is None else shape[0]
+            _read(self._path, matrix, (column or 0) * count, count, intake)
+            return intake
+        values = self[name]
+        if values.dtype.kind not in "fiub":
+            raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
+        intake.add_column(values.ravel() if column is None else values[:, column])
+        return intake
+
+    def _variable(self, top: str) -> dict[str, NDArray[Any]]:
+        """Everything in one variable, by dotted names."""
+        if self._loaded[0] != top:
+            self._loaded = ("", {})  # before the next one comes
+            flat: dict[str, NDArray[Any]] = {}
+            _flatten("", self._load(self._path, simplify_cells=True, variable_names=[top]), flat)
+            self._loaded = (top, flat)
+        return self._loaded[1]
+
+
+def _flatten(prefix: str, content: Mapping[str, Any], flat: dict[str, NDArray[Any]]) -> None:
+    for name, value in content.items():
+        if isinstance(value, dict):
+            _flatten(f"{prefix}{name}.", value, flat)
+        elif not name.startswith("__"):
+            flat[prefix + name] = np.asarray(value)
+
+
+def _long_matrices(path: Path) -> dict[str, _Matrix]:
+    """Real matrices of many numbers, by name; a file whose sizes have been checked."""
+    found = {}
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        order = ORDERS[file.read(HEADER)[126:]]
+        position = HEADER
+        while position + 8 <= size:
+            file.seek(position)
+            kind, length = struct.unpack(order + "II", file.read(8))
+            if kind in (MATRIX, COMPRESSED):
+                name, matrix = _described(_opened(file, position, order), position, order)
+                if matrix is not None:
+                    found[name] = matrix
+            position += 8 + length
+    return found
+
+
+def _opened(file: BinaryIO, position: int, order: str) -> BinaryIO | Inflated:
+    """The element at a position of the file, inflated, from its tag on."""
+    file.seek(position)
+    kind, length = struct.unpack(order + "II", file.read(8))
+    if kind == COMPRESSED:
+        return Inflated(file, length)
+    file.seek(position)
+    return file
+
+
+def _described(stream: BinaryIO | Inflated, position: int, order: str) -> tuple[str, _Matrix | None]:
+    """Name of a variable, and where its numbers are, if it is a long matrix of real numbers."""
+    head = stream.read(8 + 16)
+    if len(head) < 24:
+        return "", None
+    flags = struct.unpack(order + "I", head[16:20])[0]
+    taken = len(head)
+    parts = []
+    for _ in range(2):
+        part, length = _small_or_long(stream, order)
+        parts.append(part)
+        taken += length
+    name = parts[1].decode("latin-1")
+    shape = struct.unpack(f"{order}{len(parts[0]) // 4}i", parts[0])
+    tag = stream.read(8)
+    kind = struct.unpack(order + "I", tag[:4])[0] if len(tag) == 8 else 0
+    if flags & 0xFF not in _REAL or flags & _COMPLEX or kind not in _TYPES or math.prod(shape) < _LONG:
+        return name, None
+    return name, _Matrix(position, shape, taken + 8, np.dtype(order + _TYPES[kind]))
+
+
+def _small_or_long(stream: BinaryIO | Inflated, order: str) -> tuple[bytes, int]:
+    """Bytes of an element, and how many it took with its tag and padding."""
+    tag = stream.read(8)
+    if len(tag) < 8:
+        return b"", len(tag)
+    kind, length = struct.unpack(order + "II", tag)
+    if kind >> 16:
+        return tag[4 : 4 + (kind >> 16)], 8
+    padded = length + -length % 8
+    return stream.read(min(padded, 1 << 16))[:length], 8 + padded
+
+
+def _read(path: Path, matrix: _Matrix, first: int, count: int, intake: Intake) -> None:
+    """Take `count` numbers from the number `first` on."""
+    with path.open("rb") as file:
+        order = ORDERS[file.read(HEADER)[126:]]
+        stream = _opened(file, matrix.position, order)
+        ahead = matrix.offset + first * matrix.kind.itemsize
+        while ahead > 0:
+            ahead -= len(stream.read(min(ahead, PIECE))) or ahead
+        while count > 0 and not intake.is_full:
+            raw = stream.read(min(count, PIECE) * matrix.kind.itemsize)
+            values = np.frombuffer(raw[: len(raw) // matrix.kind.itemsize * matrix.kind.itemsize], matrix.kind)
+            if not values.size:
+                raise RecordingError(f"a variable ends {count} numbers early")
+            intake.add(values.astype(np.float64)[:, None])
+            count -= values.size

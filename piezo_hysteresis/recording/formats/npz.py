@@ -1,0 +1,167 @@
+"""A folder of ``NN_<phase>.npz``, one file per phase: the plainest form of an experiment."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import RecordingError
+from ...record import Experiment, Notice, Record, Samples
+from ..checks.error_context import naming
+from ..checks.split_at_gaps import finite_records
+from ..segmentation.decimating_buffer import averaged_notice, shared_averages
+from ..segmentation.phases import labelled
+from ..table.column_inference import guess_notice, guessed, guessed_period, unit_in
+from ..table.read_options import CHANNELS, LABELS, Layout
+from ..table.time_column import TimeBase
+from .npz_members import NpzMembers
+
+_EXPECTED = "an .npz file with voltage, displacement and sample_period"
+_NUMBERED = re.compile(r"\d+[_ -]")
+
+
+class Npz:
+    """Folder of ``NN_<phase>.npz`` files, or one such file.
+
+    Keys `voltage` [V], `displacement` [m], `sample_period` [s], `start_time` [s] and `phase`; optional `continues`,
+    `truncated`, `initial_voltage` [V], `other_displacement` [m], `temperature` [K]. Other keys are ignored, unless
+    `Layout.columns` names them for a channel. Pickled objects are refused.
+    """
+
+    def recognises(self, path: Path) -> bool:
+        """True for an .npz file or a folder that holds one."""
+        return path.suffix == ".npz" if path.is_file() else any(path.glob("*.npz"))
+
+    def read(self, path: Path, layout: Layout) -> Experiment:
+        """The phases in the order of their file numbers."""
+        files = [path] if path.is_file() else sorted(path.glob("*.npz"), key=_order)
+        records: list[Record] = []
+        notices: list[Notice] = []
+        if len(files) > 1 and not isinstance(layout.phases, str | None):
+            raise RecordingError(f"{path}: got start times of phases for {len(files)} files, expected one record")
+        end = 0.0
+        sizes = []
+        for file in files:
+            with naming(file, _EXPECTED):
+                sizes.append(_size(file, layout))
+        for file, size, average in zip(files, sizes, shared_averages(sizes, layout.average), strict=True):
+            if size < average:
+                continue
+            with naming(file, _EXPECTED):
+                parts, told = _phase(file, layout, average, end)
+            records += parts
+            notices += told
+            end = parts[-1].start_time + parts[-1].duration
+        if not records:
+            raise RecordingError(f"{path}: average: got {layout.average}, expected fewer samples than a phase has")
+        return Experiment(tuple(records), str(path), tuple(notices))
+
+    def write(self, experiment: Experiment, path: Path) -> None:
+        """Write every record to its file in a folder that holds no other experiment.
+
+        Raises
+        ------
+        RecordingError
+            If the folder already holds .npz files or cannot be written.
+        """
+        with naming(path, "a folder that can be written"):
+            path.mkdir(parents=True, exist_ok=True)
+            if any(path.glob("*.npz")):
+                raise RecordingError("holds an experiment already; choose an empty folder")
+            for number, record in enumerate(experiment, 1):
+                name = re.sub(r"[^\w.+-]", "_", record.phase)
+                np.savez(path / f"{number:02d}_{name}.npz", **_keys(record))
+
+
+def _places(values: NpzMembers, layout: Layout) -> tuple[dict[str, str], dict[str, str]]:
+    """Channel or label to the key that holds it, and those of them that were guessed."""
+    place = {name: str(layout.columns.get(name, name)) for name in (*CHANNELS, *LABELS)}
+    open_ = [c for c in ("voltage", "displacement") if c not in layout.columns and c not in values]
+    names = [name for name in values if name not in place.values()]
+    guess = {c: names[at] for c, at in guessed(names, (), open_).items()}
+    return place | guess, guess
+
+
+def _size(file: Path, layout: Layout) -> int:
+    """Samples that a layout keeps of a file, before they are averaged."""
+    with zipfile.ZipFile(file) as archive:
+        values = NpzMembers(archive, file.stat().st_size)
+        part = layout.part(values.size(_places(values, layout)[0]["voltage"]))
+        return part.stop - part.start
+
+
+def _phase(file: Path, layout: Layout, average: int, end: float) -> tuple[list[Record], list[Notice]]:
+    """Records of one file; `end` is where the one before it ended [s]."""
+    with zipfile.ZipFile(file) as archive:
+        values = NpzMembers(archive, file.stat().st_size)
+        place, guess = _places(values, layout)
+        units = {c: unit_in(name, c) for c, name in place.items() if c in CHANNELS}
+        part = layout.part(values.size(place["voltage"]))
+
+        def channel(name: str) -> Samples:
+            return layout.in_si(name, values.samples(place[name], part, average), units.get(name))
+
+        def number(name: str, default: float | None) -> float | None:
+            return values.number(place[name]) if place[name] in values else default
+
+        period, breaks, told = _time_base(values, place, layout, lambda: channel("time"), average)
+        optional = [name for name in ("other_displacement", "temperature") if place[name] in values]
+        named = place["phase"] in values or _NUMBERED.match(file.name)
+        records, notices = finite_records(
+            {name: channel(name) for name in ("voltage", "displacement", *optional)},
+            period,
+            breaks,
+            phase=values.text(place["phase"], _NUMBERED.sub("", file.stem)),
+            start_time=number("start_time", end),
+            continues=bool(number("continues", 0.0)),
+            truncated=bool(number("truncated", 0.0)) or layout.truncates(part),
+            initial_voltage=number("initial_voltage", None),
+        )
+    notices += [*told, *guess_notice(guess, units)]
+    if layout.average is None and average > 1:
+        notices.append(averaged_notice(average, period, records[0].phase))
+    if named and layout.phases is None:
+        return records, notices
+    records, told = labelled(records, layout.phases)
+    return records, [*notices, *told]
+
+
+def _time_base(
+    values: NpzMembers, place: dict[str, str], layout: Layout, times: Callable[[], Samples], average: int
+) -> tuple[float, dict[int, int], list[Notice]]:
+    """Sample period [s] from wherever the file tells it; missing samples, where it holds times; what to tell."""
+    if layout.sample_period is not None:
+        return layout.sample_period * average, {}, []
+    if place["sample_period"] in values or "sample_period" in layout.columns:
+        period = layout.in_si("sample_period", np.array(values.number(place["sample_period"])))
+        return float(period) * average, {}, []
+    if place["time"] in values:
+        base = TimeBase.of(times())
+        return base.period, dict(zip(base.breaks.tolist(), base.lost.tolist(), strict=True)), base.notices()
+    if found := guessed_period(values):
+        value = values.number(found[0])
+        return (1.0 / value if found[1] else value) * average, {}, []
+    return values.number(place["sample_period"]), {}, []  # raises, and says what the file holds
+
+
+def _keys(record: Record) -> dict[str, Any]:
+    keys: dict[str, Any] = {
+        "voltage": record.voltage,
+        "displacement": record.displacement,
+        "sample_period": record.sample_period,
+        "start_time": record.start_time,
+        "phase": record.phase,
+    }
+    keys |= {name: True for name in ("continues", "truncated") if getattr(record, name)}
+    optional = ("initial_voltage", "other_displacement", "temperature")
+    return keys | {name: getattr(record, name) for name in optional if getattr(record, name) is not None}
+
+
+def _order(file: Path) -> tuple[float, str]:
+    number = re.match(r"\d{1,9}", file.name)
+    return (float(number[0]) if number else float("inf"), file.name)

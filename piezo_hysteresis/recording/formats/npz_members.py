@@ -1,0 +1,117 @@
+"""`NpzMembers`: the arrays of an .npz archive, long ones read in pieces."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator
+from typing import IO, Any
+
+import numpy as np
+
+from ...errors import RecordingError
+from ...record import Samples
+from ..segmentation.decimating_buffer import PIECE, Intake
+
+_MAGIC_READERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+_LARGEST_EXPANSION = 100
+_SMALL = 1 << 26
+
+
+class NpzMembers:
+    """Arrays of a zip archive, none of them larger than the file can justify.
+
+    Parameters
+    ----------
+    archive : ZipFile
+        Open while this is used.
+    file_size : int
+        Bytes of the archive.
+    """
+
+    def __init__(self, archive: zipfile.ZipFile, file_size: int) -> None:
+        self._archive = archive
+        self._members = {m.filename.removesuffix(".npy"): m for m in archive.infolist()}
+        self._budget = max(_SMALL, _LARGEST_EXPANSION * file_size)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._members
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._members)
+
+    def size(self, name: str) -> int:
+        """Number of samples of an array, from its header."""
+        with self._archive.open(self._member(name)) as stream:
+            shape, _ = self._header(name, stream)
+        return int(np.prod([int(n) for n in shape], dtype=object))
+
+    def samples(self, name: str, part: slice, average: int) -> Samples:
+        """A part of a one-dimensional array, so many samples averaged into one, without reading it as a whole.
+
+        Raises
+        ------
+        RecordingError
+            If it is no array of real numbers, or no part of it is there.
+        """
+        with self._archive.open(self._member(name)) as stream:
+            shape, dtype = self._header(name, stream)
+            self._check(name, dtype, shape)
+            if len(shape) != 1:
+                raise RecordingError(f"{name}: got shape {shape}, expected one dimension")
+            intake = Intake(1, part.start, min(part.stop, shape[0]), average)
+            for first in range(0, intake.stop or 0, PIECE):
+                raw = stream.read(min(PIECE, shape[0] - first) * dtype.itemsize)
+                intake.add(np.frombuffer(raw, dtype).astype(np.float64)[:, None])
+        if intake.rows < (intake.stop or 0):
+            raise RecordingError(f"{name}: got {intake.rows} samples, expected {shape[0]}")
+        return intake.column(0)
+
+    def number(self, name: str) -> float:
+        """The only number of an array."""
+        value = self._array(name)
+        if value.size != 1:
+            raise RecordingError(f"{name}: got shape {value.shape}, expected one number")
+        self._check(name, value.dtype, value.shape)
+        return float(value.reshape(()))
+
+    def text(self, name: str, default: str) -> str:
+        """The only text of an array, or the default where there is no such array."""
+        if name not in self:
+            return default
+        value = self._array(name)
+        if value.size != 1 or value.dtype.kind not in "US":
+            raise RecordingError(f"{name}: got {value.dtype} of shape {value.shape}, expected one text")
+        word = value.reshape(()).item()
+        return word.decode("utf-8") if isinstance(word, bytes) else str(word)
+
+    def _member(self, name: str) -> zipfile.ZipInfo:
+        member = self._members.get(name)
+        if member is None:
+            held = ", ".join(sorted(self._members)[:20]) or "nothing"
+            raise RecordingError(f"holds {held}, expected the key '{name}'; name it by columns or options")
+        return member
+
+    def _header(self, name: str, stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+        """Shape and type of an array, its size checked; the stream then stands at its first item."""
+        version = np.lib.format.read_magic(stream)
+        if version not in _MAGIC_READERS:
+            raise RecordingError(f"{name}: got npy version {version}, expected 1.0 or 2.0")
+        shape, _, dtype = _MAGIC_READERS[version](stream)
+        if dtype.hasobject:
+            raise RecordingError(f"{name}: got pickled objects, expected numbers or text")
+        declared = int(np.prod([int(n) for n in shape], dtype=object)) * dtype.itemsize
+        if declared > self._member(name).file_size or declared > self._budget:
+            raise RecordingError(f"{name}: declares {declared} bytes, more than the file can hold")
+        return shape, dtype
+
+    def _array(self, name: str) -> np.ndarray[Any, Any]:
+        member = self._member(name)
+        with self._archive.open(member) as stream:
+            self._header(name, stream)
+        with self._archive.open(member) as stream:
+            return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+
+    @staticmethod
+    def _check(name: str, dtype: np.dtype[Any], shape: tuple[int, ...]) -> None:
+        if dtype.kind not in "fiub":
+            raise RecordingError(f"{name}: got {dtype} of shape {shape}, expected real numbers")

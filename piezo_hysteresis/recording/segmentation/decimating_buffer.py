@@ -1,0 +1,183 @@
+"""`Intake`: samples on their way from a large file into memory, selected and averaged before they are kept."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordingError
+from ...record import Notice, Samples
+from ..table.read_options import Layout
+
+PIECE = 1 << 18
+"""Numbers that are looked at, or moved, at a time."""
+
+ENOUGH = 1 << 24
+"""Samples of a recording above which they are averaged, where nothing is said: below 2 GB while they are judged."""
+
+MOST = 1 << 26
+"""Samples that are kept of a recording at a rate that was asked for: some 5 GB while they are judged."""
+
+
+def averaged_notice(average: int, sample_period: float, phase: str = "") -> Notice:
+    """What was lost where a recording was averaged because it is long; `sample_period` [s] is the one reached."""
+    return Notice(
+        "averaged",
+        f"more than {ENOUGH} samples: {average} are averaged into one on reading, to a sample period of "
+        f"{sample_period:g} s; what is faster than {0.5 / sample_period:.3g} Hz is lost. "
+        "rows keeps a part at the full rate, average=1 everything",
+        phase,
+    )
+
+
+def shared_averages(sizes: Sequence[int], average: int | None) -> list[int]:
+    """Samples averaged into one in each of several phases; the longest give way first.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Samples of every phase.
+    average : int or None
+        What was asked for.
+
+    Raises
+    ------
+    RecordingError
+        Where more than `MOST` samples would be kept.
+
+    Examples
+    --------
+    >>> shared_averages([2000, 30_000_000], None), shared_averages([9, 9], 3)
+    ([1, 2], [3, 3])
+    """
+    if average is not None:
+        if sum(size // average for size in sizes) > MOST:
+            raise _too_many()
+        return [average] * len(sizes)
+    averages = [1] * len(sizes)
+    while sum(size // n for size, n in zip(sizes, averages, strict=True)) > ENOUGH:
+        longest = max(range(len(sizes)), key=lambda i: sizes[i] // averages[i])
+        averages[longest] *= 2
+    return averages
+
+
+def _too_many() -> RecordingError:
+    return RecordingError(
+        f"got more than {MOST} samples, expected fewer; choose a part by rows, or a larger average while reading"
+    )
+
+
+@dataclass(slots=True)
+class Intake:
+    """Columns that grow block by block.
+
+    Parameters
+    ----------
+    width : int
+        Number of columns.
+    start, stop : int
+        First row to keep and the one after the last; no stop keeps all.
+    average : int or None
+        Rows averaged into one; an incomplete last group is dropped. None begins with 1 and doubles whenever `ENOUGH`
+        rows are kept: the mean of two means is the mean of all, so it does not matter when.
+
+    Raises
+    ------
+    RecordingError
+        Where more than `MOST` samples would be kept of a given `average`.
+
+    Examples
+    --------
+    >>> intake = Intake(1, start=1, stop=7, average=2)
+    >>> intake.add(np.arange(4.0)[:, None]), intake.add(np.arange(4.0, 9.0)[:, None]), intake.column(0).tolist()
+    (None, None, [1.5, 3.5, 5.5])
+    """
+
+    width: int
+    start: int = 0
+    stop: int | None = None
+    average: int | None = 1
+    rows: int = 0
+    factor: int = 1
+    """Rows averaged into one so far."""
+    _columns: list[array[float]] = field(default_factory=list)
+    _rest: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+
+    def __post_init__(self) -> None:
+        self.factor = self.average or 1
+        self._columns = [array("d") for _ in range(self.width)]
+        self._rest = np.empty((0, self.width))
+
+    @classmethod
+    def of(cls, width: int, layout: Layout) -> Intake:
+        """For columns of which a layout keeps a part."""
+        start, stop = layout.from_the_beginning
+        return cls(width, start, stop, layout.average)
+
+    @property
+    def is_full(self) -> bool:
+        """True once no further row is wanted."""
+        return self.stop is not None and self.rows >= self.stop
+
+    def add(self, values: Samples) -> None:
+        """Take a block of rows, shape (n, width)."""
+        first = self.rows
+        self.rows += len(values)
+        stop = len(values) if self.stop is None else max(0, self.stop - first)
+        values = values[max(0, self.start - first) : stop]
+        if len(self._rest):
+            values = np.concatenate((self._rest, values))
+        most = ENOUGH if self.average is None else MOST
+        while len(values) >= self.factor and self.width:
+            kept = len(self._columns[0])
+            if kept >= most:
+                if self.average is not None:
+                    raise _too_many()
+                self._halve()
+                continue
+            whole = min(len(values) // self.factor, most - kept) * self.factor
+            self._keep(values[:whole])
+            values = values[whole:]
+        self._rest = values.copy()
+
+    def add_column(self, values: NDArray[Any]) -> None:
+        """Take numbers of one column, shape (n,), a piece at a time."""
+        for first in range(0, values.size, PIECE):
+            self.add(values[first : first + PIECE].astype(np.float64, copy=False)[:, None])
+
+    def _keep(self, values: Samples) -> None:
+        if self.factor > 1:
+            values = values.reshape(-1, self.factor, self.width).mean(axis=1)
+        for column, part in zip(self._columns, values.T, strict=True):
+            column.frombytes(np.ascontiguousarray(part).tobytes())
+
+    def _halve(self) -> None:
+        self.factor *= 2
+        half = len(self._columns[0]) // 2
+        for column in self._columns:
+            values = np.frombuffer(column, np.float64)
+            values[:half] = (values[0 : 2 * half : 2] + values[1 : 2 * half : 2]) / 2.0
+            del values  # an array that is looked at cannot be cut
+            del column[half:]
+
+    def kept_row(self, row: int) -> int:
+        """Where a row of the file has come to lie; that of the first one kept for rows before it."""
+        return max(0, row - self.start) // self.factor
+
+    def column(self, at: int) -> Samples:
+        """A column as it has been kept.
+
+        Raises
+        ------
+        RecordingError
+            Where a part was asked for that holds no sample.
+        """
+        if not self._columns[at] and (self.start or self.stop is not None):
+            asked = f"{self.start}:{'' if self.stop is None else self.stop}"
+            raise RecordingError(f"rows: got {asked}, expected a part of {self.rows} rows that is not empty")
+        return np.frombuffer(self._columns[at], np.float64)

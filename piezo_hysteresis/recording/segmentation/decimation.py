@@ -1,0 +1,42 @@
+"""`decimation`: which phases of a bag are meant to be averaged on reading; a node records them at the full rate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import yaml
+
+from ...errors import RecordingError
+
+FILE = "decimate.yaml"
+"""Beside the storage files in the folder of the bag."""
+
+
+def save_decimation(folder: Path, factors: Mapping[str, int]) -> None:
+    """Write phase names and how many samples become one (`Record.decimate`)."""
+    text = "# Samples averaged into one on reading, by phase.\n" + yaml.safe_dump(dict(factors))
+    try:
+        (folder / FILE).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"{folder / FILE}: {error.strerror or error}") from None
+
+
+def load_decimation(folder: Path) -> dict[str, int]:
+    """Phase names and factors of a bag; empty where nothing is to be averaged.
+
+    Raises
+    ------
+    RecordingError
+        If the file is there but does not map names to whole numbers.
+    """
+    try:
+        factors = yaml.safe_load((folder / FILE).read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        return {}
+    except (OSError, ValueError, RecursionError, yaml.YAMLError):  # ValueError: dates that do not exist
+        raise RecordingError(f"{folder / FILE}: cannot be read, expected phase names and whole numbers") from None
+    whole = isinstance(factors, dict) and all(type(n) is int and n >= 1 for n in factors.values())
+    if not whole:
+        raise RecordingError(f"{folder / FILE}: got something else, expected phase names and whole numbers")
+    return {str(name): number for name, number in factors.items()}

@@ -1,0 +1,64 @@
+"""`Stretch`: samples of one phase from a stream."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...record import Samples
+from .decimating_buffer import Intake
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Stretch:
+    """Samples of one phase number and one sample period."""
+
+    channels: dict[str, Samples]
+    """Voltage [V], displacement [m] and what else the blocks hold."""
+    sample_period: float
+    phase: int
+    start_time: float
+    """Time of the first sample since the first one of the stream [s]."""
+    received_ns: int
+    """Time at which its first block was received [ns]."""
+    lost: int
+    """Samples missing just before it."""
+    breaks: dict[int, int]
+    """Sample before which others are missing, to their number."""
+    pauses: dict[int, int]
+    """Sample before which others were never measured while the voltage was held, to their number."""
+    first: bool
+    """True for the first stretch since a start of the driver, or of the recording."""
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return self.channels["voltage"].size
+
+    def averaged(self, average: int) -> Stretch:
+        """The same with `average` samples in one, never across missing ones; incomplete last groups are dropped."""
+        if average == 1:
+            return self
+        holes = sorted({**self.breaks, **self.pauses}.items())
+        edges = [0, *(at for at, _ in holes), self.size]
+        starts = np.cumsum([0, *((b - a) // average for a, b in itertools.pairwise(edges))]).tolist()
+        moved = dict(zip([at for at, _ in holes], starts[1:], strict=False))
+        channels = {
+            name: np.concatenate([_averaged(values[a:b], average) for a, b in itertools.pairwise(edges)])
+            for name, values in self.channels.items()
+        }
+        return replace(
+            self,
+            channels=channels,
+            sample_period=self.sample_period * average,
+            breaks={moved[at]: max(1, round(lost / average)) for at, lost in self.breaks.items()},
+            pauses={moved[at]: max(1, round(lost / average)) for at, lost in self.pauses.items()},
+        )
+
+
+def _averaged(values: Samples, average: int) -> Samples:
+    intake = Intake(1, average=average)
+    intake.add_column(values)
+    return intake.column(0)

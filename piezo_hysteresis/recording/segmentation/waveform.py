@@ -1,0 +1,199 @@
+"""The name of a drive signal by what it looks like: sine, triangle, chirp, multisine, noise, step, ramp, rest."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...record import Samples
+
+_POINTS = 40_000
+_LEAST_SWING = 0.05
+_REGULAR = 0.1
+_STRAIGHT = 0.03
+_OTHER_POWER = 0.005
+_PERIODIC = 0.9
+_STILL = 0.01
+
+
+def phase_name(voltage: Samples, sample_period: float) -> str:
+    """Propose the phase name of a drive signal without pauses.
+
+    A swing is the movement from one turning point to the next. Straight swings make a triangle, swings of equal
+    duration with periods that a sine fits make a sine; what repeats itself otherwise is a multisine, and what does not
+    is noise.
+
+    Parameters
+    ----------
+    voltage : (n,) ndarray
+        Drive [V].
+    sample_period : float
+        Time between samples [s].
+
+    Returns
+    -------
+    str
+        One of rest, step, ramp, steps, chirp, triangle, minor_loops, ``sine_<f>hz``, multisine, noise.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) * 1e-3
+    >>> phase_name(np.sin(2 * np.pi * 5 * t), 1e-3), phase_name(np.abs(t % 1 - 0.5), 1e-3)
+    ('sine_5hz', 'triangle')
+    """
+    span = float(np.ptp(voltage))
+    if span <= 1e-9 * float(np.abs(voltage).max()):
+        return "rest"
+    turns = turning_points(voltage, _LEAST_SWING * span)
+    if turns.size <= 2:
+        return _transition(voltage)
+    wave = voltage[turns[1] : turns[-2] + 1]  # without what leads into it and out of it
+    if _has_levels(wave):
+        return "steps"
+    if _is_chirp(wave):
+        return "chirp"
+    if np.median(np.diff(turns)) < 8 * (voltage.size // _POINTS):  # too fast for the coarse turning points
+        middle = wave.size // 2
+        voltage = wave[max(0, middle - _POINTS // 2) : middle + _POINTS // 2]
+        turns = turning_points(voltage, _LEAST_SWING * span)
+    straight = _straightness(voltage, turns)
+    reversals = turns[1:-1]  # the ends of the record are none
+    periods = reversals[2:] - reversals[:-2]
+    swings = np.diff(reversals if reversals.size > 1 else turns)  # those of the ends may be parts of swings
+    usual = float(np.median(periods)) if periods.size else 2.0 * float(swings[0])
+    like = periods[np.abs(periods - usual) <= _REGULAR * usual]
+    regular = like.size >= 0.8 * periods.size - 1  # one may belong to what leads in or out
+    if straight < _STRAIGHT:
+        return "triangle" if regular else "minor_loops"
+    period = float(np.mean(like)) if like.size else usual
+    body = voltage[turns[0] if turns.size <= 3 else turns[1] :]
+    if regular and _is_sine(body, period):
+        return sine_name(_frequency(body, 1 / period) / sample_period)
+    return "multisine" if _repeats(wave) else "noise"
+
+
+def sine_name(frequency: float) -> str:
+    """Phase name of a sine, its frequency [Hz] to three digits.
+
+    >>> sine_name(0.99996), sine_name(12345.0)
+    ('sine_1hz', 'sine_12300hz')
+    """
+    return f"sine_{np.format_float_positional(float(f'{frequency:.3g}'), trim='-')}hz"
+
+
+def turning_points(voltage: Samples, least_swing: float) -> NDArray[np.int64]:
+    """Positions of the first sample, of every reversal by at least `least_swing` [V], and of the last sample."""
+    positions = np.arange(voltage.size)
+    if voltage.size > _POINTS:
+        length = 2 * voltage.size // _POINTS
+        blocks = voltage[: voltage.size // length * length].reshape(-1, length)
+        extremes = np.stack((blocks.argmin(axis=1), blocks.argmax(axis=1)), axis=1)
+        extremes.sort(axis=1)
+        positions = np.append((extremes + length * np.arange(len(blocks))[:, None]).ravel(), voltage.size - 1)
+    found = [0]
+    candidate, direction = 0, 0
+    values = voltage.tolist() if voltage.size <= _POINTS else None
+    for position in positions.tolist():
+        value = values[position] if values else voltage[position]
+        best = values[candidate] if values else voltage[candidate]
+        if direction == 0 and abs(value - best) >= least_swing:
+            direction, candidate = (1 if value > best else -1), position
+        elif direction and (value - best) * direction > 0:
+            candidate = position
+        elif direction and (best - value) * direction >= least_swing:
+            found.append(candidate)
+            direction, candidate = -direction, position
+    return np.array([*found, voltage.size - 1])
+
+
+def _transition(voltage: Samples) -> str:
+    """Step or ramp, by the time that the middle four fifths of the way take."""
+    way = np.abs(voltage - voltage[0]) / np.ptp(voltage)
+    moving = np.count_nonzero((way > 0.1) & (way < 0.9))
+    return "step" if moving <= max(2, voltage.size // 20) else "ramp"
+
+
+def _has_levels(voltage: Samples) -> bool:
+    """True where the drive stays at one of a few voltages; a sine of few samples per period visits as few."""
+    if voltage.size < 3 or np.median(np.abs(np.diff(voltage))) > _STILL * float(np.ptp(voltage)):
+        return False
+    place = (voltage - voltage.min()) / (float(np.ptp(voltage)) or 1.0)
+    counts = np.sort(np.bincount((200 * place).astype(np.intp), minlength=201))
+    return bool(counts[-8:].sum() > 0.7 * voltage.size and counts[-1] < 0.8 * voltage.size)
+
+
+def _straightness(voltage: Samples, turns: NDArray[np.int64]) -> float:
+    """Deviation of the swings from straight lines: rms relative to the swing, median over swings."""
+    swings = list(itertools.pairwise(turns.tolist()))
+    whole = swings[1:-1] or swings
+    deviations = [1.0]
+    for a, b in whole[:: max(1, len(whole) // 200)]:
+        if voltage[b] != voltage[a]:
+            way = (voltage[a : b + 1] - voltage[a]) / (voltage[b] - voltage[a])
+            deviations.append(float(np.sqrt(np.mean((way - np.linspace(0.0, 1.0, b - a + 1)) ** 2))))
+    return float(np.median(deviations[1:] or deviations))
+
+
+def _is_sine(voltage: Samples, period: float) -> bool:
+    """True where single periods are sines, whatever their amplitude and level; `period` in samples."""
+    length = max(3, round(period))
+    starts = np.arange(0, voltage.size - length, max(length, voltage.size // 200))
+    if not starts.size:
+        starts, length = np.array([0]), voltage.size
+    angle = 2.0 * np.pi * np.arange(length) / period
+    basis, _ = np.linalg.qr(np.stack((np.ones(length), np.sin(angle), np.cos(angle), np.arange(length)), axis=1))
+    shares = []
+    for start in starts.tolist():
+        part = voltage[start : start + length] - voltage[start : start + length].mean()
+        left = part - basis @ (basis.T @ part)
+        shares.append(float(left @ left) / (float(part @ part) or 1.0))
+    return float(np.median(shares)) < _OTHER_POWER
+
+
+def _frequency(voltage: Samples, start: float) -> float:
+    """Frequency of a sine [1/sample], from the turn of its phase between two halves of the record."""
+    half = voltage.size // 2
+    if half * start < 1.0:
+        return start
+    frequency = start
+    for _ in range(2):
+        window = np.hanning(half) * np.exp(-2j * np.pi * frequency * np.arange(half))
+        first, second = ((part - part.mean()) @ window for part in (voltage[:half], voltage[half : 2 * half]))
+        turn = np.angle(second * np.conj(first) * np.exp(-2j * np.pi * frequency * half))
+        frequency += float(turn) / (2.0 * np.pi * half)
+    return frequency if abs(frequency / start - 1.0) < _REGULAR else start
+
+
+def _is_chirp(voltage: Samples) -> bool:
+    """True where the rate of mean crossings grows or falls steadily by at least three times."""
+    parts = 8
+    if voltage.size < 32 * parts:
+        return False
+    blocks = voltage[: voltage.size // parts * parts].reshape(parts, -1)
+    crossings = np.array([_crossings(block) for block in blocks], float)
+    if crossings[0] > crossings[-1]:
+        crossings = crossings[::-1]
+    steady = np.all(np.diff(crossings) >= -1) and np.count_nonzero(np.diff(crossings) > 0) >= parts - 3
+    return bool(steady and crossings[-1] >= 3 * max(crossings[0], 1.0) and crossings[-1] >= 8)
+
+
+def _crossings(voltage: Samples) -> int:
+    centred = voltage - voltage.mean()
+    away = np.sign(centred[np.abs(centred) > 0.2 * centred.std()])
+    return int(np.count_nonzero(np.diff(away)))
+
+
+def _repeats(voltage: Samples) -> bool:
+    """True where the autocorrelation comes back, for odd multisines also with the other sign."""
+    x = voltage[: 1 << 20] - voltage[: 1 << 20].mean()
+    size = 1 << (2 * x.size - 1).bit_length()
+    overlap = np.fft.irfft(np.abs(np.fft.rfft(x, size)) ** 2, size)[: x.size // 2 + 1]
+    energy = np.cumsum(x**2)
+    lags = np.arange(overlap.size)
+    head = energy[x.size - 1 - lags]
+    tail = energy[-1] - np.concatenate(([0.0], energy))[lags]
+    similarity = np.abs(overlap) / np.sqrt(np.maximum(head * tail, 1e-12 * energy[-1] ** 2 + 1e-300))
+    first = np.flatnonzero(similarity < 0.5)
+    return bool(first.size and similarity[first[0] :].max() > _PERIODIC)

@@ -1,0 +1,80 @@
+"""`Column`: numbers that come block by block and may become more than the memory holds."""
+
+from __future__ import annotations
+
+import tempfile
+import weakref
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from ..segmentation.decimating_buffer import ENOUGH, PIECE
+
+
+class Column:
+    """Numbers of one kind; beyond `ENOUGH` they lie in a temporary file, of which memory holds what is looked at.
+
+    The file has no name and goes with the column. It lies where ``TMPDIR`` says; that should be no memory disk.
+
+    Parameters
+    ----------
+    kind : dtype_like
+        Kind of the numbers.
+
+    Examples
+    --------
+    >>> column = Column(np.uint32)
+    >>> column.extend(np.arange(3)), column.extend(np.arange(2)), len(column), column.array().tolist()
+    (None, None, 5, [0, 1, 2, 0, 1])
+    """
+
+    def __init__(self, kind: DTypeLike) -> None:
+        self._kind = np.dtype(kind)
+        self._recent = bytearray()
+        self._file: IO[bytes] | None = None
+        self._size = 0
+
+    def __len__(self) -> int:
+        return self._size
+
+    def extend(self, values: NDArray[Any]) -> None:
+        """Append numbers, shape (n,)."""
+        for first in range(0, values.size, PIECE):
+            self._recent += values[first : first + PIECE].astype(self._kind, copy=False).tobytes()
+            if self._file is not None or self._size > ENOUGH:
+                self._move_out()
+        self._size += values.size
+
+    def fill(self, value: float, count: int) -> None:
+        """Append one number `count` times."""
+        for first in range(0, count, PIECE):
+            self.extend(np.full(min(PIECE, count - first), value))
+
+    def array(self) -> NDArray[Any]:
+        """All numbers, shape (n,), as long as no more are appended."""
+        if self._file is None:
+            return np.frombuffer(bytes(self._recent), self._kind)
+        self._move_out()
+        self._file.flush()
+        return np.memmap(self._file, self._kind, "r")
+
+    def _move_out(self) -> None:
+        if self._file is None:
+            self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- open as long as the column
+            weakref.finalize(self, self._file.close)  # an array that is still in use keeps its own hold
+        self._file.write(self._recent)
+        self._recent.clear()
+
+
+def changes(values: NDArray[Any], step: int) -> NDArray[np.int64]:
+    """Positions at which integers are not by `step` larger than the one before, modulo their size.
+
+    >>> changes(np.array([4, 5, 6, 9, 10], np.uint32), 1)
+    array([3])
+    """
+    found = [
+        first + np.flatnonzero(np.diff(values[first - 1 : first + PIECE]) != step)
+        for first in range(1, values.size, PIECE)
+    ]
+    return np.concatenate([np.empty(0, np.int64), *found])

@@ -1,0 +1,87 @@
+"""Which column of a foreign file is which channel, where its titles leave no doubt; told, and overridable."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+from ...record import Notice
+from .units import UNITS, plain
+
+_UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$|[\s_,/:]\s*([^\s_,/:\[\]()]+)\s*$")
+_WORDS = {
+    "time": r"time|zeit|\bt\b|\bx value\b",
+    "voltage": r"volt|drive|spannung|input|\bu\b|\bv\b|\bu_?in\b|\bv_?in\b",
+    "displacement": r"disp|posi|sensor|stroke|weg\b|elong|output|\by\b|\bx\b",
+}
+_PERIODS = ("sampleperiod", "ts", "dt", "sampletime", "samplingperiod", "samplingtime", "deltat")
+_RATES = ("fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate")
+_NOT_MEASURED = re.compile(r"command|target|desired|set_?point|reference|error|other", re.IGNORECASE)
+
+
+def unit_in(title: str, channel: str) -> str | None:
+    """Unit at the end of a column title, if it is one of the channel.
+
+    >>> unit_in("Weg [µm]", "displacement"), unit_in("t_ms", "time"), unit_in("Drive (um)", "voltage")
+    ('um', 'ms', None)
+    """
+    match = _UNIT.search(title.strip().strip('#"'))
+    unit = plain(match[1] or match[2] or "") if match else ""
+    return unit if unit in UNITS.get(channel, {}) else None
+
+
+def guessed(names: Sequence[str], taken: Iterable[int], wanted: Iterable[str]) -> dict[str, int]:
+    """Position of the only column that a channel can be, for each of `wanted` that has one.
+
+    A column counts by the unit in its title, or else by its words; two that count the same leave the channel open.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Titles of columns, or names of variables.
+    taken : iterable of int
+        Positions that serve another channel.
+    wanted : iterable of str
+        Channels to look for, among time, voltage and displacement.
+
+    Examples
+    --------
+    >>> guessed(["t_ms", "Piezo Voltage", "Target (um)", "Sensor (um)"], (), ("time", "voltage", "displacement"))
+    {'time': 0, 'voltage': 1, 'displacement': 3}
+    """
+    used = set(taken)
+    found: dict[str, int] = {}
+    for channel in wanted:
+        free = [i for i in range(len(names)) if i not in used]
+        if channel != "voltage":
+            free = [i for i in free if not _NOT_MEASURED.search(names[i])]
+        by_unit = [i for i in free if unit_in(names[i], channel)]
+        by_word = [i for i in free if re.search(_WORDS[channel], names[i].replace("_", " "), re.IGNORECASE)]
+        for candidates in ([i for i in by_unit if i in by_word], by_unit, by_word):
+            if candidates:
+                if len(candidates) == 1:
+                    found[channel] = candidates[0]
+                    used.add(candidates[0])
+                break
+    return found
+
+
+def guessed_period(names: Iterable[str]) -> tuple[str, bool] | None:
+    """Name of the variable that holds the sample period [s], or with True the sample rate [Hz]; None where none does.
+
+    >>> guessed_period(["u", "y", "fs"]), guessed_period(["run.Ts"]), guessed_period(["u"])
+    (('fs', True), ('run.Ts', False), None)
+    """
+    for name in names:
+        word = name.rpartition(".")[2].lower().replace("_", "")
+        if word in _PERIODS or word in _RATES:
+            return name, word in _RATES
+    return None
+
+
+def guess_notice(found: Mapping[str, str], units: Mapping[str, str | None]) -> tuple[Notice, ...]:
+    """What was guessed: channel to title, and the unit that the title names."""
+    if not found:
+        return ()
+    told = ", ".join(f"{c} = '{title}'{f' in {units[c]}' if units.get(c) else ''}" for c, title in found.items())
+    return (Notice("columns", f"columns taken by their titles: {told}; name others by columns"),)

@@ -1,0 +1,131 @@
+"""`Layout`: how a recording is to be read, as far as the file itself does not tell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...errors import RecordingError
+from ...record import Samples
+from .units import si_factor
+
+CHANNELS = ("time", "voltage", "displacement", "other_displacement", "temperature")
+"""What a column of numbers can be."""
+
+LABELS = ("phase", "record", "continues", "truncated", "initial_voltage", "sample_period", "start_time")
+"""What is constant within a record."""
+
+Column = str | int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the channels of a recording are and what the file does not say about them.
+
+    Parameters
+    ----------
+    axis : str, optional
+        Namespace of one stage in a bag that holds several, e.g. ``"/stage_x"``.
+    columns : mapping of str to str or int
+        Channel (one of `CHANNELS`) or label (one of `LABELS`) to its place: a column number counted from 1, the name of
+        a column, key or variable, or ``/topic.field[element]`` in a bag.
+    units : mapping of str to str or float
+        Channel to its unit (``um``, ``nm``, ``mV``, ``ms``, …) or to the SI value of one count.
+    sample_period : float, optional
+        Time between samples [s]; goes before what the file says.
+    initial_voltage : float, optional
+        Voltage at which the stage had settled before every phase that does not continue another [V].
+    rows : (int, int), optional
+        First sample and the one after the last of a table or of a record in one piece; as a Python slice. Without its
+        first samples, and without `initial_voltage`, a record is `truncated`.
+    phases : str or sequence of (float, str), optional
+        Name of the only phase, or start time [s] and name of each one, instead of what the data propose.
+    average : int, optional
+        Samples averaged into one while they are read. Default 1, and in a recording that is too long for the memory
+        as few as it takes; 1 keeps every sample, or refuses.
+    include : sequence of str
+        Phases to keep that are otherwise left out: ``idle``, ``hold``.
+
+    Raises
+    ------
+    RecordingError
+        On an unknown channel or unit, or a number that is not physical.
+    """
+
+    axis: str | None = None
+    columns: Mapping[str, Column] = field(default_factory=dict)
+    units: Mapping[str, str | float] = field(default_factory=dict)
+    sample_period: float | None = None
+    initial_voltage: float | None = None
+    rows: tuple[int | None, int | None] | None = None
+    phases: str | Sequence[tuple[float, str]] | None = None
+    include: Sequence[str] = ()
+    average: int | None = None
+
+    def __post_init__(self) -> None:
+        known = (*CHANNELS, *LABELS)
+        for name in (*self.columns, *self.units):
+            if name not in known:
+                raise RecordingError(f"columns: got channel '{name}', expected one of {', '.join(known)}")
+        for name, unit in self.units.items():
+            si_factor(name, unit)
+        if self.sample_period is not None and not (math.isfinite(self.sample_period) and self.sample_period > 0):
+            raise RecordingError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
+        if self.initial_voltage is not None and not math.isfinite(self.initial_voltage):
+            raise RecordingError(f"initial_voltage: got {self.initial_voltage!r} V, expected a finite voltage")
+        if self.average is not None and self.average < 1:
+            raise RecordingError(f"average: got {self.average}, expected a whole number of samples, 1 or more")
+        columns = {k: int(c) if isinstance(c, str) and c.isdigit() else c for k, c in self.columns.items()}
+        for name, column in columns.items():
+            if isinstance(column, int) and column < 1:
+                raise RecordingError(f"columns: got {column} for {name}, expected a number counted from 1")
+        object.__setattr__(self, "columns", columns)
+
+    def in_si(self, channel: str, values: Samples, unit: str | None = None) -> Samples:
+        """Values of a channel in SI units, by the unit given for it or else by the `unit` the file names."""
+        given = self.units.get(channel, unit)
+        factor = 1.0 if given is None else si_factor(channel, given)
+        return values if factor == 1.0 else np.asarray(values * factor)
+
+    @property
+    def from_the_beginning(self) -> tuple[int, int | None]:
+        """`rows` as far as a reader can apply them on its way through a file: those not counted from the end."""
+        start, stop = self.rows or (None, None)
+        if (start or 0) < 0 or (stop is not None and stop < 0):
+            return 0, None
+        return start or 0, stop
+
+    def after_reading(self, average: int) -> Layout:
+        """What is left to do once `from_the_beginning` has been applied and `average` samples became one."""
+        rows = None if self.rows is None or self.from_the_beginning != (0, None) else self.rows
+        period = None if self.sample_period is None else self.sample_period * average
+        if rows is not None and average > 1:
+            raise RecordingError(
+                f"rows: got {self.rows} of a recording that is averaged, expected rows counted from the beginning"
+            )
+        return replace(self, rows=rows, sample_period=period, average=average)
+
+    def part(self, size: int) -> slice:
+        """`rows` as a slice of a record of `size` samples."""
+        if self.rows is None:
+            return slice(0, size)
+        start, stop, _ = slice(*self.rows).indices(size)
+        if stop <= start:
+            raise RecordingError(f"rows: got {self.rows}, expected a part of {size} rows that is not empty")
+        return slice(start, stop)
+
+    def truncates(self, part: slice) -> bool:
+        """True where a part of a record leaves its beginning, and so its initial state, unknown."""
+        return bool(part.start) and self.initial_voltage is None
+
+    @property
+    def passes_over(self) -> bool:
+        """True where reading begins behind the first row, with an unknown initial state."""
+        return bool(self.from_the_beginning[0]) and self.initial_voltage is None
+
+    def with_period(self, sample_period: float | None) -> Layout:
+        """The same layout with a sample period [s] that the file tells."""
+        return replace(self, sample_period=sample_period)

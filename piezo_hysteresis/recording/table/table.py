@@ -1,0 +1,204 @@
+"""Columns of numbers and labels, from whatever file, as an experiment."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from ...errors import RecordingError
+from ...record import Notice, Record, Samples
+from ..checks.split_at_gaps import finite_records
+from ..segmentation.phases import labelled
+from .column_inference import guess_notice, guessed, unit_in
+from .read_options import LABELS, Layout
+from .time_column import TimeBase
+from .units import UNITS, plain
+
+Mark = tuple[int, Mapping[str, str]]
+"""First row of a record and its labels."""
+
+
+def named_column(title: str) -> tuple[str, str | None]:
+    """Channel and unit that a column title names, e.g. ``displacement_um``, ``Voltage [V]``.
+
+    >>> named_column("displacement_um"), named_column("Voltage [mV]"), named_column("phase")
+    (('displacement', 'um'), ('voltage', 'mV'), ('phase', None))
+    """
+    name = title.strip().strip('#"').strip()
+    for separator in ("[", "(", " ", "_"):
+        channel, _, unit = name.rpartition(separator) if separator == "_" else name.partition(separator)
+        channel = channel.strip().lower().replace(" ", "_")
+        if plain(unit) in UNITS.get(channel, {}):
+            return channel, plain(unit)
+    return name.lower(), None
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where the channels of a table are.
+
+    Parameters
+    ----------
+    columns : dict of str to (int, str or None)
+        Channel or label to its column, counted from 0, and the unit that its title names.
+    notices : tuple of Notice
+        What was guessed from titles of other software.
+    """
+
+    columns: dict[str, tuple[int, str | None]]
+    notices: tuple[Notice, ...]
+
+
+def resolve(titles: Sequence[str], width: int, layout: Layout) -> Places:
+    """Find every channel and label of a table.
+
+    Parameters
+    ----------
+    titles : sequence of str
+        Column titles; empty where there are none.
+    width : int
+        Number of columns.
+    layout : Layout
+        Its `columns` go before the titles.
+
+    Raises
+    ------
+    RecordingError
+        If voltage or displacement is nowhere, or a column that was named does not exist.
+    """
+    parsed = [named_column(title) for title in titles]
+    places: dict[str, tuple[int, str | None]] = {}
+    for at, (name, unit) in enumerate(parsed):
+        if (name in UNITS or name in LABELS) and name not in places:
+            places[name] = (at, unit)
+    for channel, column in layout.columns.items():
+        if isinstance(column, int):
+            at = column - 1
+        else:
+            matches = [i for i, title in enumerate(titles) if column in (title.strip(), parsed[i][0])]
+            at = matches[0] if matches else width
+        if at >= width:
+            raise RecordingError(f"columns: got {column!r} for {channel}, expected {_listed(titles, width)}")
+        places[channel] = (at, unit_in(titles[at], channel) if titles else None)
+    open_ = [c for c in ("time", "voltage", "displacement") if c not in places]
+    if "time" in open_ and layout.sample_period is not None:
+        open_.remove("time")
+    found = guessed(titles, (at for at, _ in places.values()), open_)
+    places |= {channel: (at, unit_in(titles[at], channel)) for channel, at in found.items()}
+    for channel in ("voltage", "displacement"):
+        if channel not in places:
+            raise RecordingError(
+                f"got {_listed(titles, width)}, expected a column for {channel}; name it by columns, e.g. {channel}=2"
+            )
+    names = {channel: titles[at].strip() for channel, at in found.items()}
+    return Places(places, guess_notice(names, {channel: places[channel][1] for channel in found}))
+
+
+def _listed(titles: Sequence[str], width: int) -> str:
+    if not titles:
+        return f"{width} columns without titles"
+    return "the columns " + ", ".join(f"{i} '{title}'" for i, title in enumerate(titles[:30], 1))
+
+
+def table_records(
+    columns: Mapping[str, Samples],
+    marks: Sequence[Mark],
+    layout: Layout,
+    before: Sequence[Record] = (),
+    *,
+    truncated: bool = False,
+) -> tuple[list[Record], list[Notice]]:
+    """Records of a table.
+
+    Parameters
+    ----------
+    columns : mapping of str to (n,) ndarray
+        Channels in SI units, `time` among them where the table has it.
+    marks : sequence of Mark
+        Where records begin, and their labels; empty for a table in one piece without any.
+    layout : Layout
+        Its `rows`, `phases`, `sample_period` apply; its `average` has been applied.
+    before : sequence of Record
+        Records of tables that come before.
+    truncated : bool
+        True where rows before the first one were passed over.
+
+    Returns
+    -------
+    records : list of Record
+        A labelled record continues the one before where the table says so, or else where time goes on without a gap.
+    notices : list of Notice
+
+    Raises
+    ------
+    RecordingError, RecordError
+        If there is no sample period, or no sample.
+    """
+    part = layout.part(min(values.size for values in columns.values()))
+    columns = {name: values[part] for name, values in columns.items()}
+    size = part.stop - part.start
+    marks = marks or [(0, {})]
+    if layout.phases is not None or not any("phase" in labels for _, labels in marks):
+        records, notices = _stretch(columns, marks[0][1], layout, before)
+        if truncated or layout.truncates(part):
+            records[0] = replace(records[0], truncated=True)
+        named, told = labelled(records, layout.phases)
+        return named, [*notices, *told]
+    starts = [max(row - part.start, 0) for row, _ in marks]
+    records, notices = [], []
+    for (a, b), (_, labels) in zip(itertools.pairwise([*starts, size]), marks, strict=True):
+        if a < min(b, size):
+            piece = {name: values[a : min(b, size)] for name, values in columns.items()}
+            parts, told = _stretch(piece, labels, layout, [*before, *records[-1:]])
+            records += parts
+            notices += told
+    if truncated or layout.truncates(part):
+        records[0] = replace(records[0], truncated=True)
+    return records, notices
+
+
+def _stretch(
+    columns: Mapping[str, Samples], labels: Mapping[str, str], layout: Layout, before: Sequence[Record]
+) -> tuple[list[Record], list[Notice]]:
+    phase = labels.get("phase") or "record"
+    time = columns.get("time")
+    labelled_period = _number(labels, "sample_period")
+    period = layout.sample_period or (labelled_period and labelled_period * (layout.average or 1))
+    notices: list[Notice] = []
+    breaks: dict[int, int] = {}
+    if time is not None and (time.size > 1 or period is None):
+        base = TimeBase.of(time)
+        period = period or base.period
+        breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
+        notices = base.notices(phase)
+    if period is None:
+        raise RecordingError("got no times and no sample period, expected either; give sample_period")
+    end = before[-1].start_time + before[-1].duration if before else 0.0
+    start = _number(labels, "start_time")
+    if start is None:
+        start = end if time is None else float(time[0])
+    goes_on = abs(start - end) < 1.5 * period
+    parts, told = finite_records(
+        {name: values for name, values in columns.items() if name != "time"},
+        period,
+        breaks,
+        phase=phase,
+        start_time=start,
+        continues=bool(before) and (_flag(labels, "continues") if "continues" in labels else goes_on),
+        truncated=_flag(labels, "truncated"),
+        initial_voltage=_number(labels, "initial_voltage"),
+    )
+    return parts, [*notices, *told]
+
+
+def _flag(labels: Mapping[str, str], name: str) -> bool:
+    return labels.get(name, "").strip().lower() in ("1", "1.0", "true", "yes")
+
+
+def _number(labels: Mapping[str, str], name: str) -> float | None:
+    text = labels.get(name, "").strip()
+    try:
+        return float(text) if text else None
+    except ValueError:
+        raise RecordingError(f"{name}: got '{text}', expected a number") from None

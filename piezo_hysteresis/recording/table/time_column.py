@@ -1,0 +1,103 @@
+"""The time base of a recording: its sample period, and where time stands still, jumps or runs back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordError
+from ...record import Notice, Samples
+
+JITTER = 0.02
+"""Deviation of the steps from their mean, in sample periods (rms), above which it is told."""
+
+
+def round_period(period: float, tolerance: float = 1e-12) -> float:
+    """The number with the fewest digits within a relative tolerance: recorded times are rounded, clocks are not.
+
+    >>> round_period(2.0000000000000002e-05), round_period(0.004999, 1e-3)
+    (2e-05, 0.005)
+    """
+    for digits in range(1, 17):
+        short = float(f"{period:.{digits}g}")
+        if abs(short - period) <= tolerance * period:
+            return short
+    return period
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TimeBase:
+    """What a column of times says.
+
+    Attributes
+    ----------
+    period : float
+        Time between samples [s].
+    breaks : ndarray of int
+        Samples before which some are missing or time runs back.
+    lost : ndarray of int
+        Samples missing before each break; 0 where time runs back.
+    jitter : float
+        Deviation of the other steps from the period, rms, in periods.
+    """
+
+    period: float
+    breaks: NDArray[np.int64]
+    lost: NDArray[np.int64]
+    jitter: float
+
+    @classmethod
+    def of(cls, time: Samples) -> TimeBase:
+        """Read the times of samples.
+
+        Parameters
+        ----------
+        time : (n,) ndarray
+            Time of every sample [s].
+
+        Raises
+        ------
+        RecordError
+            With fewer than two times, or where they do not grow.
+        """
+        steps = np.diff(time)
+        forward = steps[steps > 0]
+        if not forward.size or not np.isfinite(time).all():
+            raise RecordError(
+                "time: got times that are not finite or do not grow, expected seconds or ISO dates; give sample_period"
+            )
+        # times written with few digits stand still between their steps: then only the mean step tells
+        usual = float(np.median(steps[steps >= 0]))
+        longest = 1.5 * usual if usual > 0 else 3.0 * float(np.min(forward))
+        broken = (steps < 0) | (steps > longest)
+        if usual > 0:
+            broken |= steps == 0
+        whole = steps[~broken]
+        mean = float(whole.mean())
+        slack = float(np.abs(whole - mean).max() + 4 * np.spacing(np.abs(time).max())) / whole.size
+        period = round_period(mean, slack / mean)
+        breaks = np.flatnonzero(broken) + 1
+        lost = np.maximum(np.rint(steps[broken] / period).astype(np.int64) - 1, 0)
+        jitter = float(np.sqrt(np.mean((whole - mean) ** 2))) / period if usual > 0 else 0.0
+        return cls(period, breaks, np.where(steps[broken] > 0, lost, 0), jitter)
+
+    def notices(self, phase: str = "") -> list[Notice]:
+        """What a reader of the data should know about their times."""
+        told = []
+        if self.jitter > JITTER:
+            told.append(
+                Notice(
+                    "time_base",
+                    f"steps of the time base scatter by {100 * self.jitter:.1f} % of the sample period "
+                    f"{self.period:g} s: taken as uniform",
+                    phase,
+                    severe=self.jitter > 0.5,
+                )
+            )
+        if missing := int(self.lost.sum()):
+            told.append(Notice("gap", f"{missing} samples are missing in {int((self.lost > 0).sum())} places", phase))
+        if back := int((self.lost == 0).sum()):
+            told.append(Notice("non_monotonic", f"time stands still or runs back {back} times", phase, severe=back > 1))
+        return told

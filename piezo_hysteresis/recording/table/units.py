@@ -1,0 +1,73 @@
+"""Units of foreign recordings and their SI values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from ...errors import RecordingError
+
+_METRE: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "pm": 1e-12}
+_VOLT: Mapping[str, float] = {"V": 1.0, "kV": 1e3, "mV": 1e-3, "uV": 1e-6}
+_SECOND: Mapping[str, float] = {"s": 1.0, "min": 60.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_KELVIN: Mapping[str, float] = {"K": 1.0, "mK": 1e-3}
+
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "time": _SECOND,
+    "sample_period": _SECOND,
+    "voltage": _VOLT,
+    "initial_voltage": _VOLT,
+    "displacement": _METRE,
+    "other_displacement": _METRE,
+    "temperature": _KELVIN,
+}
+"""Channel to the units it may have, each with its SI value."""
+
+
+def plain(unit: str) -> str:
+    """A unit as it is typed on a keyboard: ``"[µm]"`` becomes ``"um"``."""
+    return unit.strip(" \t[]()").replace("µ", "u").replace("μ", "u")
+
+
+def is_unit(word: str) -> bool:
+    """True for a unit of any channel.
+
+    >>> is_unit("[µm]"), is_unit("Position")
+    (True, False)
+    """
+    return any(plain(word) in known for known in UNITS.values())
+
+
+def si_factor(channel: str, unit: str | float) -> float:
+    """SI value of one `unit` of a channel.
+
+    Parameters
+    ----------
+    channel : str
+        Channel name, e.g. ``"displacement"``.
+    unit : str or float
+        Unit word, or a number: the SI value of one count (a sensor of 2 µm/V recorded in V has 2e-6).
+
+    Raises
+    ------
+    RecordingError
+        If the channel has no such unit or the number is not finite or zero.
+
+    Examples
+    --------
+    >>> si_factor("displacement", "um"), si_factor("displacement", 2e-6)
+    (1e-06, 2e-06)
+    """
+    known = UNITS.get(channel, {})
+    if isinstance(unit, str):
+        if plain(unit) in known:
+            return known[plain(unit)]
+        try:
+            unit = float(unit)
+        except ValueError:
+            raise RecordingError(
+                f"units: got '{unit}' for {channel}, expected one of {', '.join(known)} or the SI value of one count"
+            ) from None
+    if not math.isfinite(unit) or unit == 0.0:
+        raise RecordingError(f"units: got {unit} for {channel}, expected a finite number other than zero")
+    return float(unit)

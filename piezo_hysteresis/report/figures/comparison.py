@@ -1,0 +1,103 @@
+"""`Comparison`: an experiment and the models held against it, the one to report last."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...discrepancy.residual.noise_floor import floors, noise_floors
+from ...discrepancy.residual.residual import Errors, errors
+from ...identification.fit.normal_equations import Nuisance
+from ...model.model import Model
+from ...record import Experiment
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Comparison:
+    """What all figures of a report are drawn from.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        The measurement.
+    models : mapping of str to Model
+        Label to model, in the order in which the model grew; may be empty.
+    errors : mapping of str to Errors
+        Free-run errors of every model.
+    noise : (r,) ndarray
+        Noise of every record at its own sample period [m].
+    floors : (r,) ndarray
+        Residual of every record below which nothing is left to explain [m].
+    """
+
+    experiment: Experiment
+    models: Mapping[str, Model]
+    errors: Mapping[str, Errors]
+    noise: Array
+    floors: Array
+
+    @property
+    def floor(self) -> float:
+        """Floor of all judged records together, each counting the same [m]."""
+        floors = self.floors if self.now is None else self.floors[[row.index for row in self.now.judged]]
+        return float(np.sqrt(np.mean(floors**2)))
+
+    @property
+    def label(self) -> str | None:
+        """Label of the model that is reported, None where there is no model."""
+        return list(self.models)[-1] if self.models else None
+
+    @property
+    def model(self) -> Model | None:
+        """The model that is reported."""
+        return None if self.label is None else self.models[self.label]
+
+    @property
+    def now(self) -> Errors | None:
+        """Errors of the model that is reported."""
+        return None if self.label is None else self.errors[self.label]
+
+    @property
+    def before(self) -> Errors | None:
+        """Errors of the model that growth began with, None where it did not grow."""
+        return self.errors[next(iter(self.models))] if len(self.models) > 1 else None
+
+    def indices(self, *phases: str) -> list[int]:
+        """Numbers of the records whose phase name is, or begins with, one of `phases`."""
+        return [i for i, r in enumerate(self.experiment) if r.phase in phases or r.phase.split("_")[0] in phases]
+
+
+def compare(
+    experiment: Experiment,
+    models: Mapping[str, Model] | None = None,
+    nuisances: Mapping[str, Nuisance] | None = None,
+    record_floors: Sequence[float] | None = None,
+) -> Comparison:
+    """Simulate every model over the experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        The measurement.
+    models : mapping of str to Model, optional
+        Label to model, the one to report last.
+    nuisances : mapping of str to Nuisance, optional
+        Label to what is free per record, as for `errors`; for the others one zero of the sensor is free.
+    record_floors : sequence of float, optional
+        Floor of every record [m] where a diagnosis has found it.
+    """
+    models, nuisances = dict(models or {}), nuisances or {}
+    records = experiment.records
+    noise = noise_floors(records)
+    return Comparison(
+        experiment=experiment,
+        models=models,
+        errors={label: errors(model, experiment, nuisances.get(label)) for label, model in models.items()},
+        noise=noise,
+        floors=floors(records, noise) if record_floors is None else np.asarray(record_floors, dtype=float),
+    )

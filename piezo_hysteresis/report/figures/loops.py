@@ -1,0 +1,175 @@
+"""Hysteresis loops, measured and predicted: one panel per amplitude, one per frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from ...discrepancy.residual.residual import drive_frequency
+from ...record import Record
+from .comparison import Comparison
+from .drawing import Drawing
+from .style import MEASURED, PREDICTED, canvas, styled
+from .thinning import thinned
+
+Array = NDArray[np.float64]
+
+CLOSED = 0.25
+"""Distance of the ends of a loop, over its height, beyond which it is none."""
+PANELS = 6
+"""Most loops in one figure."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """One way up and down of the drive in a record, between two samples of equal drive."""
+
+    index: int
+    part: slice
+    swing: float
+
+
+def cycles(record: Record, index: int = 0) -> list[Cycle]:
+    """Cycles of a drive between its troughs; wiggles below 5 % of its span do not count.
+
+    Parameters
+    ----------
+    record : Record
+        Its drive is cut; the way down to the first trough and up from the last one are no cycles.
+    index : int
+        Number of the record, handed on to the cycles.
+    """
+    u = record.voltage
+    span = float(np.ptp(u))
+    if span == 0.0:
+        return []
+    padded = np.concatenate(([u.max() + span], u, [u.max() + span]))
+    troughs = find_peaks(-padded, prominence=0.05 * span)[0] - 1
+    return [_closed(u, int(a), int(b), index) for a, b in zip(troughs, troughs[1:], strict=False)]
+
+
+def _closed(u: Array, first: int, last: int, index: int) -> Cycle:
+    """The part between two troughs that begins and ends at the drive of the higher one."""
+    peak = first + int(np.argmax(u[first : last + 1]))
+    level = max(u[first], u[last])
+    start = first + int(np.flatnonzero(u[first : peak + 1] <= level)[-1])
+    stop = peak + int(np.flatnonzero(u[peak : last + 1] <= level)[0]) + 1
+    return Cycle(index, slice(start, stop), float(u[peak] - level))
+
+
+def _closes(record: Record, cycle: Cycle) -> bool:
+    """False where the stage comes from elsewhere: the first way of a record, with its transient, is no loop."""
+    y = record.displacement[cycle.part]
+    return abs(float(y[-1] - y[0])) < CLOSED * float(np.ptp(y))
+
+
+def opening(voltage: Array, displacement: Array) -> float:
+    """Width of a loop halfway up, in % of its height; NaN where a branch has too few samples there."""
+    peak = int(np.argmax(voltage))
+    middle, height = (voltage.max() + voltage.min()) / 2, float(np.ptp(displacement))
+    ways = []
+    for u, y in ((voltage[: peak + 1], displacement[: peak + 1]), (voltage[peak:], displacement[peak:])):
+        if u.size < 4 or height == 0.0:
+            return float("nan")
+        order = np.argsort(u, kind="stable")
+        ways.append(np.interp(middle, u[order], y[order]))
+    return 100.0 * abs(ways[1] - ways[0]) / height
+
+
+@styled
+def loops_by_amplitude(comparison: Comparison) -> Drawing | None:
+    """Slow loops of up to six swings, from the largest to the smallest."""
+    slow = comparison.indices("triangle", "minor")
+    sines = [row for row in _sines(comparison) if row[0] <= 10.0]
+    slow += [index for _, index in sines[:1]]
+    slow = slow or [int(np.argmax([float(np.ptp(r.voltage)) for r in comparison.experiment]))]
+    found = [c for i in slow for c in cycles(comparison.experiment[i], i) if _closes(comparison.experiment[i], c)]
+    if not found:
+        return None
+    largest = max(c.swing for c in found)
+    groups: list[Cycle] = []
+    for cycle in sorted(found, key=lambda c: -c.swing):
+        if not groups or groups[-1].swing - cycle.swing > 0.05 * largest:
+            groups.append(cycle)
+        elif cycle.index < groups[-1].index:
+            groups[-1] = cycle
+    kept = [groups[i] for i in np.unique(np.linspace(0, len(groups) - 1, PANELS).round().astype(int))]
+    titles = [f"{c.swing:.3g} V, {comparison.experiment[c.index].phase}" for c in kept]
+    return _drawing(
+        comparison,
+        kept,
+        titles,
+        "loops_by_amplitude",
+        "Loops by amplitude",
+        "Slow loops, one panel per swing of the drive. The dashed line should cover the solid one; the opening is the "
+        "width of the loop halfway up, in per cent of its height.",
+    )
+
+
+@styled
+def loops_by_frequency(comparison: Comparison) -> Drawing | None:
+    """The last cycle of every sine: rate-dependent hysteresis and lag open the loop with frequency."""
+    kept, titles = [], []
+    for frequency, index in _sines(comparison)[:PANELS]:
+        found = cycles(comparison.experiment[index], index)
+        full = [c for c in found if c.swing > 0.95 * max(c.swing for c in found)]
+        middle = [c for c in full if _steady(comparison.experiment[index], c, frequency)]
+        if middle:
+            kept.append(middle[-1])
+            titles.append(f"{frequency:g} Hz")
+    if len(kept) < 2:
+        return None
+    return _drawing(
+        comparison,
+        kept,
+        titles,
+        "loops_by_frequency",
+        "Loops by frequency",
+        "The last full cycle of every sine. Lag of amplifier, mechanics and sensor opens the loops with frequency, on "
+        "top of the hysteresis that the slowest one shows.",
+    )
+
+
+def _sines(comparison: Comparison) -> list[tuple[float, int]]:
+    named = ((drive_frequency(r), i) for i, r in enumerate(comparison.experiment))
+    return sorted({f: (f, i) for f, i in named if f is not None}.values())
+
+
+def _steady(record: Record, cycle: Cycle, frequency: float) -> bool:
+    length = (cycle.part.stop - cycle.part.start) * record.sample_period
+    return abs(length * frequency - 1.0) < 0.1
+
+
+def _drawing(
+    comparison: Comparison, kept: list[Cycle], titles: list[str], name: str, title: str, caption: str
+) -> Drawing:
+    columns = min(3, len(kept))
+    rows = -(-len(kept) // columns)
+    figure, axes = canvas(rows, columns, 2.9 * rows + 0.3)
+    data: dict[str, Array] = {}
+    told = []
+    for panel, (axis, cycle, heading) in enumerate(zip(axes.flat, kept, titles, strict=False), 1):
+        record = comparison.experiment[cycle.index]
+        u, y = record.voltage[cycle.part], record.displacement[cycle.part]
+        shown = np.union1d(thinned(u, 600), thinned(y, 300))
+        axis.plot(u[shown], 1e6 * y[shown], label="measured", **MEASURED)
+        words = f"opening {opening(u, y):.1f} %"
+        data |= {f"voltage_V_{panel}": u[shown], f"measured_m_{panel}": y[shown]}
+        if comparison.now is not None:
+            p = comparison.now.predicted[cycle.index][cycle.part]
+            axis.plot(u[shown], 1e6 * p[shown], label="predicted", **PREDICTED)
+            words += f", predicted {opening(u, p):.1f} %"
+            data[f"predicted_m_{panel}"] = p[shown]
+        axis.set_title(heading)
+        axis.set_xlabel("drive u [V]")
+        axis.text(0.97, 0.04, words.replace(", ", "\n"), transform=axis.transAxes, ha="right", fontsize=8.5)
+        told.append(f"{heading}: {words}")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("displacement y [µm]")
+    for axis in list(axes.flat)[len(kept) :]:
+        axis.set_axis_off()
+    axes.flat[0].legend(loc="upper left")
+    return Drawing(name, title, caption, f"{title}. " + "; ".join(told) + ".", figure, data)

@@ -1,0 +1,79 @@
+"""Spectrum of the residual beside the noise that nobody can explain."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from ..words import duration
+from .comparison import Comparison
+from .drawing import Drawing
+from .style import BEFORE, FLOOR, MEASURED, PREDICTED, canvas, handles_of, legend_above, styled
+
+Array = NDArray[np.float64]
+
+PANELS = 3
+"""Most sample periods drawn."""
+
+
+@styled
+def residual_spectrum(comparison: Comparison) -> Drawing | None:
+    """Amplitude density of displacement, residual and floor, one panel per sample period of the experiment."""
+    now, before = comparison.now, comparison.before
+    if now is None:
+        return None
+    groups: dict[float, list[int]] = {}
+    for index, record in enumerate(comparison.experiment):
+        if record.size >= 64:
+            period = next((p for p in groups if abs(p / record.sample_period - 1.0) < 1e-3), record.sample_period)
+            groups.setdefault(period, []).append(index)
+    if not groups:
+        return None
+    periods = sorted(sorted(groups, key=lambda p: -sum(comparison.experiment[i].size for i in groups[p]))[:PANELS])
+    figure, axes = canvas(1, len(periods), 3.4)
+    data: dict[str, Array] = {}
+    told = []
+    for axis, period in zip(axes.flat, periods, strict=True):
+        members = groups[period]
+        name = duration(period).replace(" ", "").replace("µ", "u")
+        f, moved = _density([comparison.experiment[i].displacement for i in members], period)
+        _, left = _density([now.residuals[i] for i in members], period)
+        axis.loglog(f, 1e9 * moved, label="displacement", **MEASURED)
+        data |= {f"frequency_Hz_{name}": f, f"displacement_m_per_rtHz_{name}": moved}
+        if before is not None:
+            _, old = _density([before.residuals[i] for i in members], period)
+            axis.loglog(f, 1e9 * old, label="residual before", **BEFORE)
+            data[f"residual_before_m_per_rtHz_{name}"] = old
+        axis.loglog(f, 1e9 * left, label="residual", **PREDICTED)
+        floor = float(np.sqrt(2.0 * period * np.mean(comparison.noise[members] ** 2)))
+        axis.axhline(1e9 * floor, label="white noise", **FLOOR)
+        data |= {f"residual_m_per_rtHz_{name}": left, f"white_noise_m_per_rtHz_{name}": np.array([floor])}
+        axis.set_title(f"sampled every {duration(period)}")
+        axis.set_xlabel("frequency [Hz]")
+        worst = f[int(np.argmax(left / floor))] if floor > 0 else f[int(np.argmax(left))]
+        told.append(f"sampled every {duration(period)} the residual stands out most at {worst:.3g} Hz")
+    axes[0, 0].set_ylabel("amplitude density [nm/√Hz]")
+    legend_above(figure, handles_of(axes[0, 0]))
+    return Drawing(
+        "residual_spectrum",
+        "Spectrum of the residual",
+        "Where the residual lies above the white noise of the sensor, something is left to explain at that frequency. "
+        "Phases of one sample period are averaged with equal weight.",
+        "Spectrum of the residual: " + "; ".join(told) + ".",
+        figure,
+        data,
+    )
+
+
+def _density(signals: list[Array], period: float) -> tuple[Array, Array]:
+    """Root of the mean power density over the signals, on one frequency axis without dc, smoothed on a log axis."""
+    segment = min(1 << 14, max(64, min(s.size for s in signals)))
+    spectra = [welch(s, 1.0 / period, nperseg=segment, detrend="constant") for s in signals]
+    frequency, power = spectra[0][0][1:], np.mean([p for _, p in spectra], axis=0)[1:]
+    edges = np.geomspace(frequency[0], frequency[-1], 161)
+    place = np.clip(np.digitize(frequency, edges) - 1, 0, 159)
+    count = np.bincount(place, minlength=160)
+    good = count > 0
+    f = np.bincount(place, frequency, 160)[good] / count[good]
+    return f, np.sqrt(np.bincount(place, power, 160)[good] / count[good])

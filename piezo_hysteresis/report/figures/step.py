@@ -1,0 +1,79 @@
+"""The averaged step response, near its onset and as a whole, with the delay."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ...errors import IdentificationError
+from ...identification.steps.delay import identify_delay
+from ...identification.steps.step_response import StepResponse, step_response
+from ..words import duration
+from .comparison import Comparison
+from .drawing import Drawing
+from .style import BLUE, GREEN, MEASURED, PREDICTED, canvas, styled
+
+ZOOM = 24
+"""Samples drawn around the onset."""
+
+
+@styled
+def step(comparison: Comparison) -> Drawing | None:
+    """Response per volt to the fastest edges of the experiment, averaged, ± 2σ of the noise."""
+    members = comparison.indices("step", "steps") or list(range(len(comparison.experiment)))
+    period = min(comparison.experiment[i].sample_period for i in members)
+    members = [i for i in members if comparison.experiment[i].sample_period < 1.001 * period]
+    records = [comparison.experiment[i] for i in members]
+    try:
+        measured = step_response(records)
+        delay = identify_delay(records)
+    except IdentificationError:
+        return None
+    predicted = None
+    if comparison.now is not None:
+        answers = [comparison.now.predicted[i] for i in members]
+        predicted = step_response([replace(r, displacement=y) for r, y in zip(records, answers, strict=True)])
+    figure, (axes,) = canvas(1, 2, 3.4)
+    _draw(axes[0], measured, predicted, min(measured.mean.size, max(ZOOM, delay.samples + 8)))
+    _draw(axes[1], measured, predicted, measured.mean.size)
+    axes[0].axvline(1e6 * delay.time, color=BLUE, linestyle=(0, (6, 2, 1, 2)), label=f"delay {delay.samples} samples")
+    model = comparison.model
+    if model is not None and "arx" in model:
+        lag = model["arx"]["delay"] * model.sample_period
+        axes[0].axvline(1e6 * lag, color=GREEN, linestyle=(0, (1, 1.4)), label=f"delay of the model {duration(lag)}")
+    axes[0].set_title("onset")
+    axes[1].set_title("whole response")
+    axes[1].set_xscale("log")
+    axes[0].set_ylabel("displacement per volt [µm/V]")
+    axes[0].legend(loc="lower right")
+    data = {
+        "time_s": measured.sample_period * np.arange(measured.mean.size),
+        "measured_m_per_V": measured.mean,
+        "deviation_m_per_V": measured.deviation,
+    }
+    if predicted is not None:
+        data["predicted_m_per_V"] = predicted.mean
+    told = "; ".join(n.message for n in delay.notices)
+    return Drawing(
+        "step",
+        "Step and delay",
+        f"Mean of {measured.edges} edges, ± 2σ; {delay}. The first sample that stands out of the noise tells it, the "
+        "cost of a fit does not." + (f" Note: {told}." if told else ""),
+        f"Step response: {delay}; it reaches {1e6 * measured.mean[-1]:.4g} µm/V after {duration(data['time_s'][-1])}.",
+        figure,
+        data,
+    )
+
+
+def _draw(axis: Axes, measured: StepResponse, predicted: StepResponse | None, end: int) -> None:
+    time = 1e6 * measured.sample_period * np.arange(end)
+    scale, unit = (1e-3, "ms") if time[-1] > 1e3 else (1.0, "µs")
+    style = {**MEASURED, "marker": "o" if end < 64 else "", "markersize": 3}
+    mean, bars = 1e6 * measured.mean[:end], 2e6 * measured.deviation[:end]
+    axis.errorbar(scale * time, mean, bars, label="measured ± 2σ", elinewidth=0.8, **style)
+    if predicted is not None:
+        upto = min(end, predicted.mean.size)
+        axis.plot(scale * time[:upto], 1e6 * predicted.mean[:upto], label="predicted", zorder=3, **PREDICTED)
+    axis.set_xlabel(f"time since the edge [{unit}]")

@@ -1,0 +1,72 @@
+"""The residual tests of the field, drawn with their bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...discrepancy.residual.correlation import CAPTION, correlate
+from ...errors import RecordError
+from .comparison import Comparison
+from .drawing import Drawing
+from .style import BLACK, GREY, canvas, styled
+from .thinning import thinned
+
+SHARE = 40
+"""The largest lag drawn is one part in so many of the record."""
+WIDE = 0.1
+"""Bound of the cross-correlation above which nothing found beyond it says little."""
+
+
+@styled
+def whiteness(comparison: Comparison) -> Drawing | None:
+    """Auto- and cross-correlation of the residual in the phase with the broadest drive."""
+    now = comparison.now
+    if now is None:
+        return None
+    for phases in (("validation",), ("multisine",), ("noise",), ("chirp",), ("triangle",)):
+        members = comparison.indices(*phases)
+        if members:
+            break
+    else:
+        members = [max(range(len(comparison.experiment)), key=lambda i: comparison.experiment[i].size)]
+    record = comparison.experiment[members[0]]
+    try:
+        found = correlate(
+            now.residuals[members[0]], record.voltage, record.sample_period, max(20, record.size // SHARE)
+        )
+    except RecordError:
+        return None
+    figure, (axes,) = canvas(1, 2, 3.0)
+    scale, unit = (1e3, "ms") if found.lag[-1] < 0.5 else (1.0, "s")
+    for axis, lag, values, bound, title in (
+        (axes[0], found.lag, found.auto, found.auto_bound, "residual with itself"),
+        (axes[1], found.cross_lag, found.cross, found.cross_bound, "residual with the drive"),
+    ):
+        axis.axhspan(-bound, bound, color="#dddddd", label="99 % bounds", zorder=0)
+        at = thinned(values)
+        axis.plot(scale * lag[at], values[at], color=BLACK, linewidth=1.2)
+        axis.axhline(0.0, color=GREY, linewidth=0.8)
+        axis.set_title(f"{title}, {record.phase}")
+        axis.set_xlabel(f"lag [{unit}]")
+        axis.legend(loc="upper right")
+    if found.cross_bound >= 1.0:
+        axes[1].set_title(f"{title}, {record.phase}: undecided")
+    reach = 1.1 * float(np.max(np.abs(found.cross), initial=min(found.cross_bound, 1.0)))
+    axes[1].set_ylim(-reach, reach)
+    axes[0].set_ylabel("correlation")
+    white = "white" if found.is_white else "not white"
+    free = "depends on the drive" if not found.is_independent else "does not depend on the drive"
+    if found.is_independent and WIDE < found.cross_bound < 1.0:
+        free = f"may depend on the drive by less than the bound of {found.cross_bound:.2g}, wide for so slow a drive"
+    if found.cross_bound >= 1.0:
+        free = "may or may not depend on the drive: one of few frequencies decides nothing, the bound is above 1"
+    return Drawing(
+        "residual_tests",
+        "Residual tests",
+        f"In {record.phase} the residual is {white} and {free}. {CAPTION} With this many samples the tests fire at the "
+        "slightest misfit: read the height, not only the crossing.",
+        f"Residual tests in {record.phase}: the residual is {white} and {free}; largest cross-correlation "
+        f"{np.max(np.abs(found.cross)):.3g} against a bound of {found.cross_bound:.3g}.",
+        figure,
+        {"lag_s": found.lag, "auto": found.auto, "cross_lag_s": found.cross_lag, "cross": found.cross},
+    )

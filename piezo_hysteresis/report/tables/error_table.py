@@ -1,0 +1,79 @@
+"""Tables of the free-run error: by phase, and by frequency in the form of the paper's Table 1."""
+
+from __future__ import annotations
+
+import math
+
+from ..figures.comparison import Comparison
+from .table import Table
+
+
+def error_table(comparison: Comparison) -> Table | None:
+    """Every record: its floor, the error of every model, and of the last one in nm, at worst and as fit."""
+    now = comparison.now
+    if now is None:
+        return None
+    labels = list(comparison.models)
+    rows = []
+    for row in now.rows:
+        errors = [f"{comparison.errors[label].rows[row.index].percent:.3f}" for label in labels]
+        floor = 100.0 * comparison.floors[row.index] / now.range
+        fit = "–" if math.isnan(row.fit) else f"{row.fit:.2f}"
+        rows.append((row.phase, f"{row.size}", f"{floor:.3f}", *errors, _nm(row.rms), _nm(row.largest), fit))
+    totals = [f"{comparison.errors[label].percent:.3f}" for label in labels]
+    floor = 100.0 * comparison.floor / now.range
+    whole = len(now.judged) == len(now.rows)
+    rows.append(
+        (
+            "all phases" if whole else "known start",
+            f"{comparison.experiment.size}",
+            f"{floor:.3f}",
+            *totals,
+            _nm(now.rms),
+            _nm(now.largest),
+            "",
+        )
+    )
+    header = (
+        "phase",
+        "samples",
+        "floor [%]",
+        *(f"{label} [%]" for label in labels),
+        "rms [nm]",
+        "worst [nm]",
+        "fit [%]",
+    )
+    return Table(
+        "Free-run error by phase",
+        header,
+        tuple(rows),
+        f"Per cent of range; the range is {1e6 * now.range:.4g} µm, peak to peak over the experiment. Every phase "
+        "counts the same in the last row"
+        + ("" if whole else ", but for those that begin in an unknown state (conditioning, truncated)")
+        + ". Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase; it means little where "
+        "the stage hardly moves.",
+        frozenset(range(1, len(header))),
+    )
+
+
+def frequency_table(comparison: Comparison) -> Table | None:
+    """Error of every model at every frequency of the sine phases, as in the paper's Table 1."""
+    now = comparison.now
+    if now is None or not now.by_frequency:
+        return None
+    frequencies = list(now.by_frequency)
+    rows = tuple(
+        (f"{label} [%]", *(f"{errors.by_frequency[f]:.3f}" for f in frequencies))
+        for label, errors in comparison.errors.items()
+    )
+    return Table(
+        "Free-run error by frequency",
+        ("sine of", *(f"{f:g} Hz" for f in frequencies)),
+        rows,
+        "",
+        frozenset(range(1, len(frequencies) + 1)),
+    )
+
+
+def _nm(metres: float) -> str:
+    return f"{1e9 * metres:.1f}"

@@ -1,0 +1,70 @@
+"""Tables of the parameters of a model: values, intervals, bounds, correlations."""
+
+from __future__ import annotations
+
+from ...identification.fit.fit import Fit
+from ...model.model import Model
+from .table import Table
+
+ALIKE = 0.95
+"""Correlation from which two numbers are hard to tell apart."""
+
+
+def parameter_table(model: Model, fit: Fit | None = None) -> Table:
+    """Every scalar of the model with its 95 % interval where a fit gave one; arrays in one row each.
+
+    Parameters
+    ----------
+    model : Model
+        Values, units, bounds and meanings.
+    fit : Fit, optional
+        Fit of this model, for intervals and bounds hit.
+    """
+    rows = []
+    sure = {} if fit is None else {n: 1.96 * s for n, s in fit.standard_errors.items()}
+    hit = () if fit is None else fit.at_bounds
+    for effect in model.effects:
+        for row in effect.parameters:
+            name, value = f"{effect.name}.{row.name}", effect.values[row.name]
+            bounds = f"{row.lower:g} … {row.upper:g}"
+            if isinstance(value, tuple):
+                rows.append(
+                    (
+                        name,
+                        row.symbol,
+                        ", ".join(f"{v:.4g}" for v in value) or "none",
+                        "",
+                        row.unit,
+                        bounds,
+                        row.meaning,
+                    )
+                )
+                continue
+            interval = f"± {sure[name]:.2g}" if name in sure else ""
+            told = f"{bounds}: at a bound" if name in hit else bounds
+            rows.append((name, row.symbol, f"{value:.6g}", interval, row.unit, told, row.meaning))
+    note = "Single ARX coefficients are not identifiable, poles and zeros nearly cancel: judge G by its response."
+    return Table(
+        "Parameters",
+        ("name", "symbol", "value", "95 %", "unit", "bounds", "meaning"),
+        tuple(rows),
+        note if "arx" in model else "",
+        frozenset({2, 3, 5}),
+    )
+
+
+def correlation_table(fit: Fit) -> Table | None:
+    """Pairs of fitted numbers whose estimates move together, the strongest first; ARX coefficients left out."""
+    sure = fit.standard_errors
+    names = [n for n in fit.names if sure[n] > 0.0 and not n.startswith(("arx.a", "arx.b"))]
+    pairs = [(a, b, fit.correlation(a, b)) for i, a in enumerate(names) for b in names[:i]]
+    strong = sorted((p for p in pairs if abs(p[2]) > ALIKE), key=lambda p: -abs(p[2]))
+    if not strong:
+        return None
+    return Table(
+        f"Correlations above {ALIKE:g}",
+        ("one", "other", "correlation"),
+        tuple((a, b, f"{c:+.3f}") for a, b, c in strong),
+        "The data determine a combination of the two better than each alone.",
+        frozenset({2}),
+    )

@@ -1,0 +1,61 @@
+"""Tables of the data: what was recorded, and what was noticed about it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...record import Experiment, Record
+from ...recording.checks.lag import lag_of
+from ..words import duration
+from .table import Table
+
+_NOTE = "Lag: of the displacement at the turning points of the drive (in samples); dynamics, or a late channel."
+
+
+def record_table(experiment: Experiment, noise: np.ndarray) -> Table:
+    """Every record: period, length, ranges, noise.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        The data.
+    noise : (r,) ndarray
+        Noise of every record [m].
+    """
+    rows = []
+    for record, sigma in zip(experiment, noise, strict=True):
+        start = "continues" if record.continues else f"from {record.settled_voltage:.3g} V"
+        rows.append(
+            (
+                record.phase,
+                f"{record.size}",
+                duration(record.sample_period),
+                duration(record.duration),
+                f"{record.voltage.min():.3g} … {record.voltage.max():.3g}",
+                f"{1e6 * record.displacement.min():.4g} … {1e6 * record.displacement.max():.4g}",
+                f"{1e9 * sigma:.2g}",
+                _lag(record),
+                "truncated" if record.truncated else start,
+            )
+        )
+    header = ("phase", "samples", "period", "length", "drive [V]", "displacement [µm]", "noise [nm]", "lag", "start")
+    return Table("What was recorded", header, tuple(rows), _NOTE, frozenset(range(1, 8)))
+
+
+def _lag(record: Record) -> str:
+    lag = lag_of(record)
+    if lag is None:
+        return ""
+    return f"{'-' if lag.time < 0 else ''}{duration(abs(lag.time))} ({lag.time / record.sample_period:.2g})"
+
+
+def notice_table(experiment: Experiment) -> Table | None:
+    """What was noticed on reading, the severe first."""
+    if not experiment.notices:
+        return None
+    ordered = sorted(experiment.notices, key=lambda n: not n.severe)
+    return Table(
+        "What was noticed",
+        ("kind", "phase", "finding", "weight"),
+        tuple((n.kind, n.phase or "all", n.message, "severe" if n.severe else "minor") for n in ordered),
+    )
