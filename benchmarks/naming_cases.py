@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.independent_plant import Plant
-from benchmarks.naming_experiments import Layout, PackagedPlant, poor, rich
+from benchmarks.naming_experiments import PackagedPlant, ProtocolVariant, poor, rich
 from piezo_hysteresis.effects import BY_NAME, CATALOGUE, Effect
 from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.stage.hidden import hidden_effect
@@ -39,7 +39,7 @@ class Case:
         Of the stroke, rms per sample.
     plant : str
         ``independent``, ``thorough`` (the same with full dynamics in slow phases) or ``packaged``.
-    layout : Layout
+    layout : ProtocolVariant
         Of the experiment.
     without : tuple of str
         Families taken out of the library.
@@ -52,7 +52,7 @@ class Case:
     seed: int
     noise: float
     plant: str = "independent"
-    layout: Layout = field(default_factory=Layout)
+    layout: ProtocolVariant = field(default_factory=ProtocolVariant)
     without: tuple[str, ...] = ()
     extra: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
@@ -111,7 +111,12 @@ def cases(groups: tuple[str, ...], seeds: int, noises: tuple[float, ...] = NOISE
         yield from makers[group](seeds, noises)
 
 
-LAYOUTS = (Layout(), Layout(shift=-4.0), Layout(slowest=0.1), Layout(hold=10.0, with_steps=False))
+LAYOUTS = (
+    ProtocolVariant(),
+    ProtocolVariant(shift=-4.0),
+    ProtocolVariant(slowest=0.1),
+    ProtocolVariant(hold=10.0, with_steps=False),
+)
 
 
 def _effect_free(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:

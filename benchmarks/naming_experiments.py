@@ -46,7 +46,7 @@ class PackagedPlant:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ProtocolVariant:
     """Habits of a laboratory.
 
     Parameters
@@ -108,9 +108,9 @@ def corners(levels, dt, duration=4.0):
     return np.interp(np.arange(0, duration, dt), np.linspace(0, duration, len(levels)), levels)
 
 
-def rich(plant: Player, seed: int, layout: Layout | None = None) -> Experiment:
+def rich(plant: Player, seed: int, layout: ProtocolVariant | None = None) -> Experiment:
     """Step, noise at two levels, triangles, sines, multisines, trapezoids, staircase, minor loops, rests, triangle."""
-    layout = layout or Layout()
+    layout = layout or ProtocolVariant()
     rng = np.random.default_rng(seed)
     records: list[Record] = []
     clock = 0.0

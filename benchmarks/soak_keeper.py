@@ -18,10 +18,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 
 from benchmarks.soak_processes import NAMESPACE
+from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.errors import PiezoError
 from piezo_hysteresis.nodes.messages.cloud import from_cloud
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
-from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, SampleBlock, samples_from_cloud
+from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, samples_from_cloud
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS
 from piezo_hysteresis.recording import Bag
 

@@ -108,3 +108,36 @@ class Parameter:
     def with_value(self, value: Value) -> Parameter:
         """The same row with another value."""
         return replace(self, value=value)
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A setting that is no physical quantity: a word, a path, a switch, a number of something.
+
+    Parameters
+    ----------
+    name : str
+        Name of the setting.
+    value : str, bool or int
+        Default.
+    meaning : str
+        One line for its description.
+    choices : tuple of str
+        The words that are accepted; any where empty.
+    """
+
+    name: str
+    value: str | bool | int
+    meaning: str
+    choices: tuple[str, ...] = ()
+
+    def check(self, value: object, prefix: str = "") -> str | bool | int:
+        """Return `value` if it is one of the choices and of the type of the default; ParameterError otherwise."""
+        if type(value) is not type(self.value):
+            raise ParameterError(f"{prefix}{self.name}: got {value!r}, expected a {type(self.value).__name__}")
+        if self.choices and value not in self.choices:
+            raise ParameterError(f"{prefix}{self.name}: got {value!r}, expected one of {', '.join(self.choices)}")
+        return value
+
+
+Row = Parameter | Setting

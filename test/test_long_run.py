@@ -11,7 +11,7 @@ from piezo_hysteresis.acquisition.time_base import TimeBase
 from piezo_hysteresis.effects import Arx, BoucWen, MainsHum, ThermalDrift
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.online.predictor import Predictor
-from piezo_hysteresis.online.sequence_check import Continuity
+from piezo_hysteresis.online.sequence_check import SequenceCheck
 
 DAY = 86_400.0
 EFFECTS = (
@@ -75,7 +75,7 @@ def test_a_day_of_predictions_is_exact_and_memory_stays_flat(period):
 
 @given(st.integers(10**9, 2**38), st.integers(1, 5000), st.integers(0, 10**6))
 def test_a_thousand_million_samples_are_counted_to_the_last(count, size, lost):
-    continuity, clock = Continuity(2e-5), TimeBase(2e-5)
+    continuity, clock = SequenceCheck(2e-5), TimeBase(2e-5)
     clock.anchor(0, 0.0, 0)
     for first in (count, count + size + lost):
         arrival = continuity.join(first % 2**32, clock.stamp(first), size)

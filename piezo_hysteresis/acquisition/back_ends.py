@@ -10,8 +10,7 @@ from typing import Any
 import yaml
 
 from ..errors import ParameterError, RecordingError, StageError
-from ..nodes.runtime.parameters import Row, Setting
-from ..parameter import Parameter
+from ..parameter import Parameter, Row, Setting
 from ..stage.hidden import hidden_effect
 from ..stage.plant import PlantParameters
 from ..stage.replay import ReplayStage

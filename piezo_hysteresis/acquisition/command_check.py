@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from sensor_msgs.msg import PointCloud2
-
 from ..errors import StageError
-from ..nodes.messages.conversions import from_stamp, waveform_from_cloud
 from ..stage.stage import Description, Samples
 
 
@@ -30,28 +27,28 @@ class CommandCheck:
     sample_period: float
     max_age: float
 
-    def waveform(self, cloud: PointCloud2, now: int) -> Samples:
+    def waveform(self, voltage: Samples, stamp: int, now: int) -> Samples:
         """Waveform of a command [V], shape (n,), checked but for its first step.
 
         Parameters
         ----------
-        cloud : sensor_msgs.msg.PointCloud2
-            Message of `command`.
+        voltage : (n,) ndarray of float64
+            Drive voltage [V].
+        stamp : int
+            When the command was sent [ns]; 0 where its age does not matter.
         now : int
             The driver's clock [ns].
 
         Raises
         ------
-        StageError, RecordError
+        StageError
             With the reason for the refusal.
         """
         self._require_drivable()
-        stamp = from_stamp(cloud.header.stamp)
         age = (now - stamp) / 1e9
         if stamp and abs(age) > self.max_age:
             when = f"{age:.3g} s old" if age > 0 else f"{-age:.3g} s in the future"
             raise StageError(f"stamp is {when}, expected within {self.max_age:g} s; recorded commands move no stage")
-        voltage = waveform_from_cloud(cloud, self.sample_period)
         return self.limits.check_voltage(voltage, float(voltage[0]), self.sample_period)
 
     def first_step(self, waveform: Samples, present_voltage: float) -> None:

@@ -6,8 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ..nodes.runtime.parameters import Row, Setting
-from ..parameter import Parameter
+from ..parameter import Parameter, Row, Setting
 from ..stage.daqmx.setup import DaqmxSetup
 from ..stage.daqmx.stage import DaqmxStage
 from ..stage.gcs2.setup import Gcs2Setup

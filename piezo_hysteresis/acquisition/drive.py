@@ -36,7 +36,7 @@ class Phase:
         return f"{self.number} {self.name}"
 
 
-class Happening(Enum):
+class EventKind(Enum):
     """What can happen to a phase within a block."""
 
     BEGAN = "began"
@@ -49,7 +49,7 @@ class Event:
     """A phase began, was played to its end, or was stopped, before sample `offset` of the block."""
 
     offset: int
-    happening: Happening
+    happening: EventKind
     phase: Phase
 
 

@@ -1,4 +1,4 @@
-"""`LateDrive`: labels of a drive that wait until its samples come back from a stage with latency. No ROS."""
+"""`LatencyBuffer`: labels of a drive that wait until its samples come back from a stage with latency. No ROS."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from .drive import Drive, Event
 
 
-class LateDrive:
+class LatencyBuffer:
     """Delays phases and events by the latency of a streaming stage.
 
     Parameters

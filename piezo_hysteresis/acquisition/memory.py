@@ -9,11 +9,11 @@ import numpy as np
 
 from ..stage.stage import Acquired, MemoryStage
 from .playback import Playback
-from .streaming import Acquisition
+from .streaming import StreamingAcquisition
 
 
-class MemoryAcquisition(Acquisition):
-    """As `Acquisition`, for a `MemoryStage`.
+class MemoryAcquisition(StreamingAcquisition):
+    """As `StreamingAcquisition`, for a `MemoryStage`.
 
     Waveforms and ramps are uploaded in blocks as long as the memory; while a voltage is held, single samples are read
     on the slow path. The index follows the clock: time in which nothing was measured is a jump of the index, told by

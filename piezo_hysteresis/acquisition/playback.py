@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from ..errors import StageError
-from .drive import Drive, Event, Happening, Phase, Samples
+from .drive import Drive, Event, EventKind, Phase, Samples
 
 _ENDLESS = 1 << 62
 
@@ -48,7 +48,7 @@ class Playback:
         self._played = 0
         self._target = self.voltage
         self._stopping = False
-        self._events: list[tuple[Happening, Phase]] = [(Happening.BEGAN, self.phase)]
+        self._events: list[tuple[EventKind, Phase]] = [(EventKind.BEGAN, self.phase)]
 
     @property
     def is_playing(self) -> bool:
@@ -95,7 +95,7 @@ class Playback:
         stopped = self.phase
         if self.is_playing:
             self._waveform = None
-            self._events.append((Happening.STOPPED, stopped))
+            self._events.append((EventKind.STOPPED, stopped))
         self._hold()
         self._target, self._stopping = self._safe_voltage, True
         return stopped
@@ -103,7 +103,7 @@ class Playback:
     def jump(self, voltage: float) -> None:
         """Take over the voltage [V] to which a device went by itself; it is held."""
         if self.is_playing:
-            self._events.append((Happening.STOPPED, self.phase))
+            self._events.append((EventKind.STOPPED, self.phase))
         self._waveform, self._stopping = None, False
         self.voltage = self._target = float(voltage)
         self._hold()
@@ -131,8 +131,8 @@ class Playback:
             voltage[at : at + stretch.size] = stretch
             phase[at : at + stretch.size] = number
             at += stretch.size
-        events += [Event(count, *event) for event in self._events if event[0] is not Happening.BEGAN]
-        self._events = [event for event in self._events if event[0] is Happening.BEGAN]
+        events += [Event(count, *event) for event in self._events if event[0] is not EventKind.BEGAN]
+        self._events = [event for event in self._events if event[0] is EventKind.BEGAN]
         return Drive(voltage, phase, tuple(events))
 
     def _advance(self, count: int) -> Samples:
@@ -143,7 +143,7 @@ class Playback:
             self.voltage = float(stretch[-1])
             if self._played == self._waveform.size:
                 self._waveform = None
-                self._events.append((Happening.DONE, self.phase))
+                self._events.append((EventKind.DONE, self.phase))
                 self._hold()
             return stretch
         if self.pending:
@@ -169,7 +169,7 @@ class Playback:
 
     def _begin(self, name: str, commanded: bool = False, stamp: int = 0) -> Phase:
         self.phase = Phase((self.phase.number + 1) % (1 << 32), name, commanded, stamp)
-        self._events.append((Happening.BEGAN, self.phase))
+        self._events.append((EventKind.BEGAN, self.phase))
         return self.phase
 
     def require_free(self, name: str) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import StageError
 from ..record import Record
-from .drive import Drive, Event, Happening, Phase
+from .drive import Drive, Event, EventKind, Phase
 
 
 class RecordedPlayback:
@@ -41,7 +41,7 @@ class RecordedPlayback:
         while at < count:
             if not self._left:
                 self._open()
-                events.append(Event(at, Happening.BEGAN, self.phase))
+                events.append(Event(at, EventKind.BEGAN, self.phase))
             stretch = int(min(count - at, self._left))
             phase[at : at + stretch] = self.phase.number
             self._left -= stretch

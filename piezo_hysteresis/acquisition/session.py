@@ -15,7 +15,7 @@ from .playback import Playback
 from .recorded_playback import RecordedPlayback
 from .settings import DriverSettings
 from .stage_lock import StageLock
-from .streaming import Acquisition, Delivery, Source
+from .streaming import Delivery, Source, StreamingAcquisition
 from .time_base import TimeBase
 
 
@@ -54,10 +54,10 @@ class DriverSession:
             raise
         self.sample_period = self.stage.sample_period
         self.check = CommandCheck(self.limits, self.sample_period, settings.command_max_age)
-        self._acquisition: Acquisition | None = None
+        self._acquisition: StreamingAcquisition | None = None
 
     @property
-    def streaming(self) -> Acquisition:
+    def streaming(self) -> StreamingAcquisition:
         """The acquisition under way; StageError while nothing streams."""
         if self._acquisition is None:
             raise StageError("the driver is not active; activate it")
@@ -69,8 +69,8 @@ class DriverSession:
         deliver: Callable[[Delivery], None],
         fail: Callable[[PiezoError], None],
         subscribers: Callable[[], int],
-    ) -> Acquisition:
-        """Stream from the voltage in force on; see `Acquisition` for the parameters."""
+    ) -> StreamingAcquisition:
+        """Stream from the voltage in force on; see `StreamingAcquisition` for the parameters."""
         settings = self.settings
         wanted = self._values.get("subscribers", 0)
         arguments = (
@@ -84,7 +84,7 @@ class DriverSession:
             lambda: subscribers() >= wanted,
         )
         if self.limits.streaming:
-            acquisition = Acquisition(*arguments)
+            acquisition = StreamingAcquisition(*arguments)
         else:
             acquisition = MemoryAcquisition(*arguments, rest_period=1 / settings.live_rate)
         acquisition.start()

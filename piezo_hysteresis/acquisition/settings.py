@@ -8,8 +8,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from ..errors import ParameterError
-from ..nodes.runtime.parameters import Row, Setting
-from ..parameter import Parameter
+from ..parameter import Parameter, Row, Setting
 from ..stage.stage import Description
 from .back_ends import BACK_ENDS
 

@@ -1,4 +1,4 @@
-"""`Acquisition`: the thread that exchanges blocks with a streaming stage at the pace of the steady clock. No ROS."""
+"""`StreamingAcquisition`: the thread that exchanges blocks with a streaming stage at the pace of the steady clock."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import cast
 import numpy as np
 
 from ..errors import PiezoError, StageError
-from ..nodes.messages.samples import SampleBlock
 from ..stage.stage import Acquired, Samples, Stage, StreamingStage
 from .device_clock import DeviceClock
 from .drive import Drive, Event, Phase
-from .latency_buffer import LateDrive
+from .latency_buffer import LatencyBuffer
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
+from .sample_block import SampleBlock
 from .time_base import TimeBase, read_together
 
 Source = Playback | RecordedPlayback
@@ -55,7 +55,7 @@ class Tally:
     clock_drift: float = 0.0
 
 
-class Acquisition:
+class StreamingAcquisition:
     """Blocks to and from a stage, one after the other, in a thread of its own.
 
     Parameters
@@ -96,7 +96,7 @@ class Acquisition:
         self.block_size, self.index = block_size, 0
         self._time_base, self._node_clock = time_base, node_clock
         self._deliver, self._fail, self._ready = deliver, fail, ready
-        self._late = LateDrive(round(stage.description.latency / time_base.sample_period), playback.phase.number)
+        self._late = LatencyBuffer(round(stage.description.latency / time_base.sample_period), playback.phase.number)
         self._device_clock = DeviceClock(time_base) if stage.description.latency else None
         self._access = threading.Lock()
         self._halting = threading.Event()

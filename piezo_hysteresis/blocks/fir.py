@@ -1,4 +1,4 @@
-"""`TapsBlock`: a delay as a few taps beside the direct path."""
+"""`FirBlock`: a delay as a few taps beside the direct path."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .block import Array, State
 from .linear import AddedBlock
 
 
-class TapsBlock(AddedBlock):
+class FirBlock(AddedBlock):
     """y_i = Σ_k taps_k x_(i − first − k), with Σ taps = 1.
 
     Parameters

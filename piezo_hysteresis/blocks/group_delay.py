@@ -1,4 +1,4 @@
-"""`LagBlock`: how fast linear dynamics act on slow samples, as dc gain plus group delay."""
+"""`GroupDelayBlock`: how fast linear dynamics act on slow samples, as dc gain plus group delay."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .block import Array, State
 from .linear import LinearBlock
 
 
-class LagBlock(LinearBlock):
+class GroupDelayBlock(LinearBlock):
     """y(t) = K·x(t − τ) for x linear between samples.
 
     Parameters

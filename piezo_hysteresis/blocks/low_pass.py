@@ -1,4 +1,4 @@
-"""`PoleBlock`: equal poles in a row, exact for an input that is linear between samples."""
+"""`LowPassBlock`: equal poles in a row, exact for an input that is linear between samples."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def poles_by_tau(u, left, lead, back, left_slope, lead_slope, back_slope, z, dz,
         dy[i] = dx
 
 
-class PoleBlock(AddedBlock):
+class LowPassBlock(AddedBlock):
     """`count` poles with time constant τ; its lag near dc is count·τ at every sample period, and τ = 0 is no pole.
 
     Parameters

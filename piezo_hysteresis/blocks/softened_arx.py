@@ -12,7 +12,7 @@ import numpy as np
 
 from .arx import ArxBlock
 from .block import Array, Block, MemorylessBlock, SeriesBlock, State
-from .group_delay import LagBlock
+from .group_delay import GroupDelayBlock
 from .kernel import kernel
 from .mode_path import Path
 
@@ -122,7 +122,7 @@ class StaticSoftening(MemorylessBlock):
         return -self.slope(x) * np.vstack((np.abs(at) * at, at * at * at))
 
 
-class SoftenedBlock(Block):
+class SoftenedArxBlock(Block):
     """State: of the ARX; w and x at rest; of mode and ξ; of the path."""
 
     def __init__(self, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
@@ -186,7 +186,7 @@ class SoftenedBlock(Block):
 class SlowSoftenedBlock(SeriesBlock):
     """The static softening of one mode in a sum, and the lag of G behind it, for records slower than the model."""
 
-    def __init__(self, lag: LagBlock, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
+    def __init__(self, lag: GroupDelayBlock, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
         ratio = path.share / arx.gain
         super().__init__((_Shared(settled, ratio), lag))
         self.ratio_slopes = (path.share_slopes - ratio * arx.gain_slopes()) / arx.gain

@@ -9,7 +9,7 @@ from __future__ import annotations
 from .diagnose import diagnose
 from .diagnosis import Diagnosis, Verdict
 from .gap import Gap, measure_gap
-from .residual.localise import Place, localise
+from .residual.localise import ResidualShare, localise
 from .residual.noise_floor import floors, noise_floors, stroke
 from .search.selection import select
 from .search.selection_result import Selection
@@ -17,7 +17,7 @@ from .search.selection_result import Selection
 __all__ = [
     "Diagnosis",
     "Gap",
-    "Place",
+    "ResidualShare",
     "Selection",
     "Verdict",
     "diagnose",

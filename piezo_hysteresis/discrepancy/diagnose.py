@@ -17,19 +17,19 @@ from ..identification.records.roles import CARRYING
 from ..model.model import Model
 from ..record import Experiment, Notice
 from .diagnosis import Diagnosis, Verdict
-from .excitation_check import beyond_reach
+from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap
 from .next_experiment import decide
 from .residual.explicit_step import KIND, is_stepped, without_steps
-from .residual.localise import Place, localise
+from .residual.localise import ResidualShare, localise
 from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
-from .search.baseline_setup import Ground, lay_ground
+from .search.baseline_setup import BaselineSetup, prepare_baseline
 from .search.cross_validation import ADEQUATE
 from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection import select
 from .search.selection_result import Selection
 from .search.single_record import diagnose_few
-from .search.training_data import Evidence
+from .search.training_data import TrainingData
 from .verdict import FEWEST, is_explained, is_makeshift, verdict_of
 
 Array = NDArray[np.float64]
@@ -104,7 +104,7 @@ def _diagnosed(
 
     told = {n.kind for n in experiment.notices}
     sharpens, may_be_stepped = VOLTAGE_NOISE not in told, KIND not in told
-    ground = lay_ground(experiment.records, usable, model, known, sharpens, tell)
+    ground = prepare_baseline(experiment.records, usable, model, known, sharpens, tell)
     baseline = ground.baseline.model
     found_wanting = ground.score.excess > ADEQUATE
     if found_wanting and may_be_stepped and is_stepped(baseline, ground.evidence, leaves=STEPS_LEAVE):
@@ -112,7 +112,7 @@ def _diagnosed(
     where = _where(ground, tell)
     stepped = False
 
-    def is_in_vain(model: Model, evidence: Evidence) -> bool:
+    def is_in_vain(model: Model, evidence: TrainingData) -> bool:
         nonlocal stepped
         stepped = may_be_stepped and is_stepped(model, evidence)
         return stepped
@@ -134,7 +134,7 @@ def _diagnosed(
     return _concluded(experiment, ground, where, selection, tell)
 
 
-def _where(ground: Ground, tell: Progress) -> tuple[Place, ...]:
+def _where(ground: BaselineSetup, tell: Progress) -> tuple[ResidualShare, ...]:
     tell("where", 0.35)
     left = residuals(ground.baseline.model, ground.records, ground.evidence.nuisance)
     usable = ground.usable
@@ -142,7 +142,11 @@ def _where(ground: Ground, tell: Progress) -> tuple[Place, ...]:
 
 
 def _concluded(
-    experiment: Experiment, ground: Ground, where: tuple[Place, ...], selection: Selection, tell: Progress
+    experiment: Experiment,
+    ground: BaselineSetup,
+    where: tuple[ResidualShare, ...],
+    selection: Selection,
+    tell: Progress,
 ) -> Diagnosis:
     """The last fits, the gap on records set aside, and what follows."""
     records, least, evidence = ground.records, ground.least, ground.evidence
@@ -175,7 +179,7 @@ def _concluded(
         where=where,
         gap=gap,
         next_experiment=decide(selection, evidence),
-        experiment=experiment.noting(*beyond_reach([records[i] for i in ground.usable])),
+        experiment=experiment.noting(*missing_excitation([records[i] for i in ground.usable])),
     )
 
 
@@ -186,7 +190,7 @@ def _quieted(experiment: Experiment, noise: Array) -> Experiment:
     return replace(experiment, records=records).noting(Notice(VOLTAGE_NOISE, told))
 
 
-def _finished(selection: Selection, evidence: Evidence, null: float) -> Fit:
+def _finished(selection: Selection, evidence: TrainingData, null: float) -> Fit:
     """The last fit, on all samples, begun anew behind new dynamics while that helps."""
     final = joint(selection.model, evidence, LAST, PRECISE)
     last = selection.accepted[-1].best

@@ -11,7 +11,7 @@ from ..model.model import Model
 from ..record import Experiment
 from .gap import Gap
 from .next_experiment import NextExperiment
-from .residual.localise import Place
+from .residual.localise import ResidualShare
 from .search.selection_result import Rejection, Selection
 
 SCHEMA = 1
@@ -43,7 +43,7 @@ class Diagnosis:
         Every turn of the search; None where the data did not allow one.
     fit : Fit or None
         Last joint fit, with uncertainties.
-    where : tuple of Place
+    where : tuple of ResidualShare
         Where the baseline disagrees with the measurement.
     gap : Gap or None
         Before and after.
@@ -60,7 +60,7 @@ class Diagnosis:
     baseline: Model | None
     selection: Selection | None
     fit: Fit | None
-    where: tuple[Place, ...]
+    where: tuple[ResidualShare, ...]
     gap: Gap | None
     next_experiment: NextExperiment | None
     experiment: Experiment

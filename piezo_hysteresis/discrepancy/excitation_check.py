@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..identification.records.excitation_content import SLOW, content_of
+from ..identification.records.excitation_content import SLOW, excitation_content
 from ..record import Notice, Record
 
 HOLD = 1.0
@@ -17,7 +17,7 @@ DISTINCT = 0.8
 """Ratio of two amplitudes below which they count as different."""
 
 
-def beyond_reach(records: Sequence[Record]) -> tuple[Notice, ...]:
+def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
     """Kinds of effect that the drive of the records hardly shows, each with what is not there.
 
     Parameters
@@ -29,7 +29,7 @@ def beyond_reach(records: Sequence[Record]) -> tuple[Notice, ...]:
     missing = []
     if not any(_longest_hold(r, MOVED * span) >= HOLD for r in records):
         missing.append(("creep", "no level is held for a second or more after it was changed"))
-    contents = [content_of(r) for r in records]
+    contents = [excitation_content(r) for r in records]
     kinds = ["slow loops" if c.is_slow else r.phase.split("_")[0] for r, c in zip(records, contents, strict=True)]
     if len(set(kinds)) == len(kinds):
         missing.append(("thermal_drift and gain_drift", "no kind of phase is there twice"))

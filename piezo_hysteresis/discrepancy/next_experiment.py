@@ -15,7 +15,7 @@ from ..model.model import Model
 from ..record import Record
 from .search.candidates import free_numbers, weighted_sum
 from .search.selection_result import Selection
-from .search.training_data import Evidence
+from .search.training_data import TrainingData
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class NextExperiment:
     power: float
 
 
-def menu(evidence: Evidence, model: Model) -> dict[str, Record]:
+def menu(evidence: TrainingData, model: Model) -> dict[str, Record]:
     """Phases to choose from, inside the drive range that was recorded; their displacement, not yet measured, is 0."""
     extent, period = evidence.extent, model.sample_period
     fast = DriveLimits(
@@ -81,7 +81,7 @@ def menu(evidence: Evidence, model: Model) -> dict[str, Record]:
     }
 
 
-def propose(first: Model, second: Model, names: tuple[str, str], evidence: Evidence) -> NextExperiment:
+def propose(first: Model, second: Model, names: tuple[str, str], evidence: TrainingData) -> NextExperiment:
     """Phase of the menu on which two fitted models differ most, beyond what either can still adjust.
 
     Parameters
@@ -114,7 +114,7 @@ def propose(first: Model, second: Model, names: tuple[str, str], evidence: Evide
     return best
 
 
-def decide(selection: Selection, evidence: Evidence) -> NextExperiment | None:
+def decide(selection: Selection, evidence: TrainingData) -> NextExperiment | None:
     """What would decide between the first accepted effect that has a rival, and that rival; None where none has.
 
     Parameters

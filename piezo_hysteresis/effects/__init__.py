@@ -16,7 +16,7 @@ from .dynamics.extra_delay import ExtraDelay
 from .dynamics.extra_resonance import ExtraResonance
 from .dynamics.softening import Softening
 from .dynamics.softening_of_one_mode import SofteningOfOneMode
-from .effect import Effect, Place, Setting, Term
+from .effect import ChainPosition, Discretisation, Effect, Term
 from .environment.axis_coupling import AxisCoupling
 from .environment.mains_hum import MainsHum
 from .environment.thermal_drift import ThermalDrift
@@ -117,12 +117,12 @@ __all__ = [
     "InitialState",
     "MainsHum",
     "Offset",
-    "Place",
+    "ChainPosition",
     "PublishedBoucWen",
     "RateDependentHysteresis",
     "SensorBandwidth",
     "SensorNonlinearity",
-    "Setting",
+    "Discretisation",
     "Softening",
     "SofteningOfOneMode",
     "Term",

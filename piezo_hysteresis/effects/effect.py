@@ -20,7 +20,7 @@ from ..parameter import Parameter, Value
 from .extent import Extent
 
 
-class Place(IntEnum):
+class ChainPosition(IntEnum):
     """Where along u → v → w → x → y an effect acts; the chain is sorted by it."""
 
     DRIVE = 0
@@ -38,7 +38,7 @@ class Place(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class Discretisation:
     """What an effect must know to become coefficients.
 
     Parameters
@@ -80,7 +80,7 @@ class Effect(ABC):
 
     name: ClassVar[str]
     family: ClassVar[str]
-    place: ClassVar[Place]
+    place: ClassVar[ChainPosition]
     entry: ClassVar[str] = ""
     """Entry of the catalogue that this is another law of (`creep_exponential` of ``creep``); empty for its own."""
     host: ClassVar[str | None] = None
@@ -179,12 +179,12 @@ class Effect(ABC):
         return None
 
     @abstractmethod
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         """Coefficients and kernels for one sample period.
 
         Parameters
         ----------
-        setting : Setting
+        setting : Discretisation
             Sample periods and scales.
         terms : tuple of Effect
             Effects hosted by this one, for hosts.
@@ -206,5 +206,5 @@ class Term(Effect):
 
     host: ClassVar[str]
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         raise ModelError(f"'{self.name}' has no block of its own: it is a term of '{self.host}'; give it to that block")

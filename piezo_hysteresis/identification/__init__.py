@@ -10,7 +10,7 @@ from .fit.fit import Fit, fit
 from .identification import Identification
 from .identify import identify
 from .protocol.drive_limits import DriveLimits
-from .protocol.protocol import Phase, Protocol, paper, rich, short
+from .protocol.protocol import Protocol, ProtocolPhase, paper, rich, short
 from .steps.delay import Delay, identify_delay
 from .steps.dynamics import Dynamics, compare_orders, identify_arx
 from .steps.frequency_response import FrequencyResponse, periodic, welch
@@ -19,7 +19,7 @@ from .steps.three_steps import ThreeSteps, three_steps
 
 __all__ = [
     "DriveLimits",
-    "Phase",
+    "ProtocolPhase",
     "Protocol",
     "paper",
     "short",

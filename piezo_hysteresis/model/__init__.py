@@ -1,1 +1,1 @@
-"""TODO."""
+"""The chain of effects with its scales, and its file."""

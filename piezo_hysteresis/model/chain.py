@@ -16,7 +16,7 @@ from ..blocks.block import Block, State, SumBlock
 from ..blocks.channel import ChannelBlock
 from ..blocks.samples import not_finite
 from ..blocks.scaling import ChangeOfUnit, hand_out, take_in
-from ..effects import Effect, Place, Setting
+from ..effects import ChainPosition, Discretisation, Effect
 from ..errors import DivergenceError
 
 Array = NDArray[np.float64]
@@ -55,32 +55,32 @@ class Chain:
     ----------
     effects : tuple of Effect
         In chain order.
-    setting : Setting
+    setting : Discretisation
         Sample periods and scales.
     """
 
-    def __init__(self, effects: tuple[Effect, ...], setting: Setting) -> None:
+    def __init__(self, effects: tuple[Effect, ...], setting: Discretisation) -> None:
         self.setting = setting
         hosted: dict[str, tuple[Effect, ...]] = {
             e.name: tuple(t for t in effects if t.host == e.name) for e in effects if e.host is None
         }
 
-        def blocks(place: Place) -> list[tuple[str, Block]]:
+        def blocks(place: ChainPosition) -> list[tuple[str, Block]]:
             here = [e for e in effects if e.place is place and e.host is None]
             return [(e.name, e.block(setting, hosted[e.name])) for e in here]
 
-        hysteresis = blocks(Place.HYSTERESIS)
+        hysteresis = blocks(ChainPosition.HYSTERESIS)
         if len(hysteresis) > 1:
             hysteresis = [(hysteresis[0][0], SumBlock(tuple(b for _, b in hysteresis)))]
         parts = [
-            *blocks(Place.DRIVE),
+            *blocks(ChainPosition.DRIVE),
             ("voltage_scale", ChangeOfUnit(1.0 / setting.voltage_scale)),
             *hysteresis,
-            *blocks(Place.MATERIAL),
-            *blocks(Place.DYNAMICS),
-            *blocks(Place.SENSOR),
+            *blocks(ChainPosition.MATERIAL),
+            *blocks(ChainPosition.DYNAMICS),
+            *blocks(ChainPosition.SENSOR),
             ("displacement_scale", ChangeOfUnit(setting.displacement_scale)),
-            *blocks(Place.ENVIRONMENT),
+            *blocks(ChainPosition.ENVIRONMENT),
         ]
         self.labels = tuple(label for label, _ in parts)
         self.blocks = tuple(block for _, block in parts)

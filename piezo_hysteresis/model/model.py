@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..blocks.samples import row
-from ..effects import CHAIN, Effect, Offset, Setting
+from ..effects import CHAIN, Discretisation, Effect, Offset
 from ..errors import ModelError
 from ..parameter import Parameter, Value
 from ..record import Record
@@ -145,7 +145,7 @@ class Model:
             )
         kept = self._chains
         if sample_period not in kept:
-            setting = Setting(sample_period, self.sample_period, self.voltage_scale, self.displacement_scale)
+            setting = Discretisation(sample_period, self.sample_period, self.voltage_scale, self.displacement_scale)
             kept[sample_period] = Chain(self.effects, setting)
         return kept[sample_period]
 

@@ -12,8 +12,8 @@ from ..errors import DivergenceError, RecordError
 from ..model.chain import Chain, ChainState
 from ..model.model import Model
 from .running_rms import RunningRms
-from .sensor_offset import SensorZero
-from .sequence_check import LONGEST_SILENCE, Continuity
+from .sensor_offset import SensorOffset
+from .sequence_check import LONGEST_SILENCE, SequenceCheck
 from .voltage_history import FULL_SAMPLES, VoltageHistory, is_held
 from .warmup import Warmup, chain_at
 
@@ -105,7 +105,7 @@ class Predictor:
                 f"sample period: got {sample_period:g} s, expected {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
             )
         self.sample_period = sample_period
-        self.continuity = Continuity(sample_period)
+        self.continuity = SequenceCheck(sample_period)
         self.model: Model | None = None
         self._chain: Chain | None = None
         self._warmup: Warmup | None = None
@@ -237,7 +237,7 @@ class Predictor:
             self.swap(newest)
 
     def _zero_from(self, start: int, at_rest: bool = False) -> None:
-        self._zero = SensorZero(start, self._window, at_rest)
+        self._zero = SensorOffset(start, self._window, at_rest)
         self._rms.clear()
 
     def _bridge(self, missing: int, never_measured: bool) -> None:

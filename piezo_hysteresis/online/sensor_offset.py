@@ -1,4 +1,4 @@
-"""`SensorZero`: the offset between a sensor, whose zero is arbitrary, and a model."""
+"""`SensorOffset`: the offset between a sensor, whose zero is arbitrary, and a model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class SensorZero:
+class SensorOffset:
     """Mean of measured minus modelled displacement over a window of the stream.
 
     Parameters

@@ -1,4 +1,4 @@
-"""`Continuity`: the running index of a stream of blocks, checked for loss, repetition and new starts."""
+"""`SequenceCheck`: the running index of a stream of blocks, checked for loss, repetition and new starts."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Arrival:
     restarted: bool = False
 
 
-class Continuity:
+class SequenceCheck:
     """Follows the index, which wraps at 2³², and counts what went wrong.
 
     Parameters

@@ -11,7 +11,7 @@ from ..effects import BY_NAME, CHAIN
 from ..errors import PiezoError
 from ..model.chain import Chain, ChainState
 from ..model.model import Model
-from .sensor_offset import SensorZero
+from .sensor_offset import SensorOffset
 from .voltage_history import VoltageHistory
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ class Warmup:
         Model to bring up to date.
     history : VoltageHistory
         May grow meanwhile.
-    zero : SensorZero
+    zero : SensorOffset
         Samples of the stream whose mean prediction is wanted.
 
     Attributes
@@ -52,7 +52,7 @@ class Warmup:
         If the stream is faster than the model.
     """
 
-    def __init__(self, model: Model, history: VoltageHistory, zero: SensorZero) -> None:
+    def __init__(self, model: Model, history: VoltageHistory, zero: SensorOffset) -> None:
         self.model, self.chain = model, chain_at(model, history.sample_period)
         self.zero, self._history = zero, history
         self._slow = model.at(history.factor * history.sample_period) if history.factor > 1 else self.chain

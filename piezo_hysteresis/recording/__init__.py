@@ -46,10 +46,10 @@ from .formats.gcs_array import GcsArray
 from .formats.mat import Mat
 from .formats.npz import Npz
 from .segmentation.decimation import load_decimation
-from .table.read_options import Column, Layout
+from .table.read_options import Column, ReadOptions
 
 __all__ = [
-    "FORMATS", "Bag", "BagWriter", "Csv", "Format", "GcsArray", "Layout", "Mat", "Npz", "Rosbag2",
+    "FORMATS", "Bag", "BagWriter", "Csv", "Format", "GcsArray", "Mat", "Npz", "ReadOptions", "Rosbag2",
     "inspect", "read", "recorded_model", "write",
 ]  # fmt: skip
 
@@ -86,7 +86,7 @@ def read(
     format : str, optional
         Key of `FORMATS`; default what the path looks like.
     axis, columns, units, sample_period, initial_voltage, rows, phases, include, average
-        What the file does not say: see `Layout`.
+        What the file does not say: see `ReadOptions`.
     decimate : mapping of str to int, optional
         Phase name to the number of samples that are averaged into one on reading (`Record.decimate`); default what the
         identification node left in the folder of its bag, or nothing.
@@ -105,7 +105,9 @@ def read(
     """
     if not paths:
         raise RecordingError("read: got no path, expected a recording")
-    layout = Layout(axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include, average)
+    layout = ReadOptions(
+        axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include, average
+    )
     records: list[Record] = []
     notices: list[Notice] = []
     for path in paths:
@@ -123,7 +125,7 @@ def read(
     return experiment.noting(*notices, *inspect(experiment))
 
 
-def _one(place: Path, chosen: Format, layout: Layout) -> Experiment:
+def _one(place: Path, chosen: Format, layout: ReadOptions) -> Experiment:
     """The experiment of one path, what its records claim about their beginning checked."""
     experiment = chosen.read(place, layout)
     records = experiment.records

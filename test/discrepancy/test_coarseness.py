@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from piezo_hysteresis.discrepancy.residual.intersample_error import coarseness, sharp_drive
+from piezo_hysteresis.discrepancy.residual.intersample_error import intersample_error, sharp_drive
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -38,7 +38,7 @@ def averaged(drive, factor):
 )
 def test_most_of_what_averages_miss_is_made_good(drive, factor):
     slow = averaged(drive, factor)
-    (change,), (point,) = coarseness(STAGE, [slow]), STAGE.simulate([slow])
+    (change,), (point,) = intersample_error(STAGE, [slow]), STAGE.simulate([slow])
     missed = np.std(slow.displacement - point)
     assert missed > 2e-4 * np.ptp(slow.displacement)
     assert np.std(slow.displacement - point - change) < 0.4 * missed
@@ -49,7 +49,7 @@ def test_a_curve_loses_nothing_even_by_a_model_of_slow_dynamics():
     drive = 5.0 * (1.0 - np.cos(2.0 * np.pi * 10.0 * time))
     slow = averaged(drive, 10)
     wrong = STAGE.with_effect(Arx(a=(-0.995,), b=(0.005,), delay=1.0))
-    (change,) = coarseness(wrong, [slow])
+    (change,) = intersample_error(wrong, [slow])
     assert not change.any()
 
 
@@ -65,7 +65,7 @@ def test_the_ringing_after_a_kink_is_made_good(factor, noise):
     (displacement,) = RINGING.simulate([Record(drive, np.zeros(drive.size), PERIOD)])
     displacement += noise * np.ptp(displacement) * np.random.default_rng(1).normal(size=displacement.size)
     slow = Record(drive, displacement, PERIOD).decimate(factor)
-    (change,), (point,) = coarseness(RINGING, [slow]), RINGING.simulate([slow])
+    (change,), (point,) = intersample_error(RINGING, [slow]), RINGING.simulate([slow])
     floor = noise * np.ptp(displacement) / np.sqrt(factor)
     missed = np.sqrt(max(np.var(slow.displacement - point) - floor**2, 0.0))
     left = np.sqrt(max(np.var(slow.displacement - point - change) - floor**2, 0.0))
@@ -78,13 +78,13 @@ def test_what_a_residual_does_not_hold_is_not_taken_out():
     drive = 10.0 * (1.0 - np.abs(2.0 * np.mod(8.0 * time, 1.0) - 1.0))
     (displacement,) = STAGE.simulate([Record(drive, np.zeros(drive.size), PERIOD)])
     slow = Record(drive, displacement, PERIOD).decimate(4)
-    assert np.std(coarseness(RINGING, [slow])[0]) < 1e-4 * np.ptp(displacement)
+    assert np.std(intersample_error(RINGING, [slow])[0]) < 1e-4 * np.ptp(displacement)
 
 
 def test_records_that_are_not_slow_are_left_alone():
     drive = np.random.default_rng(0).normal(size=500)
     record = Record(drive, 1e-6 * drive, PERIOD)
-    assert not coarseness(STAGE, [record])[0].any()
+    assert not intersample_error(STAGE, [record])[0].any()
 
 
 @given(

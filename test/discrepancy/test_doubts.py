@@ -6,7 +6,7 @@ import pytest
 from piezo_hysteresis.discrepancy.search.acceptance_tests import bends_all_along, may_be_off
 from piezo_hysteresis.discrepancy.search.candidates import Candidate
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
-from piezo_hysteresis.discrepancy.search.training_data import Evidence
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, GainDrift, HysteresisMemory
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import Fit
@@ -19,7 +19,7 @@ EXTENT = Extent(0.0, 10.0, 1e3, 10.0, 1e-5, 2e-5, 100.0, 10.0)
 def fitted(effect, names, covariance):
     model = Model((BoucWen(A=0.5, beta=3.0, gamma=0.5, p1=0.0, p2=1.0), effect), 2e-5, 10.0, 1e-5)
     result = Fit(model, names, np.asarray(covariance), 1.0, (), (), (), True, 3)
-    evidence = Evidence((), np.array([]), Nuisance(), EXTENT)
+    evidence = TrainingData((), np.array([]), Nuisance(), EXTENT)
     return Candidate(effect, evidence, Score(np.ones(3), np.zeros(len(names))), result)
 
 

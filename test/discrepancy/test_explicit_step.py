@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.residual.explicit_step import KIND, is_stepped, step_changes, without_steps
-from piezo_hysteresis.discrepancy.search.training_data import Evidence, extent_of
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
 from piezo_hysteresis.effects import Arx, BoucWen, PublishedBoucWen
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
@@ -36,7 +36,7 @@ def answered(kind):
 
 def evidence(records):
     floors = np.full(len(records), 3.0 * NOISE)
-    return Evidence(records, floors, Nuisance(), extent_of(records, model(BoucWen)))
+    return TrainingData(records, floors, Nuisance(), extent_of(records, model(BoucWen)))
 
 
 @pytest.mark.parametrize("height", [0.01, 0.1, 0.4])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from piezo_hysteresis.discrepancy.excitation_check import beyond_reach
+from piezo_hysteresis.discrepancy.excitation_check import missing_excitation
 from piezo_hysteresis.record import Record
 
 TIME = 1e-3 * np.arange(2000)
@@ -17,7 +17,7 @@ def loops(*peaks):
 
 
 def told(*records):
-    return " ".join(n.message for n in beyond_reach(records))
+    return " ".join(n.message for n in missing_excitation(records))
 
 
 def test_one_triangle_of_one_amplitude_leaves_most_open():

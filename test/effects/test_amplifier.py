@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from piezo_hysteresis.effects import AmplifierSaturation, AmplifierSlewLimit, Effect, Setting
+from piezo_hysteresis.effects import AmplifierSaturation, AmplifierSlewLimit, Discretisation, Effect
 from piezo_hysteresis.errors import ParameterError
 
 PERIOD = 2e-5
 
 
 def run(effect: Effect, x: np.ndarray) -> np.ndarray:
-    block = effect.block(Setting(PERIOD, PERIOD))
+    block = effect.block(Discretisation(PERIOD, PERIOD))
     return block.run(x, block.rest(x[0], 0.0))[0]
 
 

@@ -11,7 +11,7 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 
 from piezo_hysteresis.blocks.mode_path import share_of_mode, split
-from piezo_hysteresis.effects import Arx, Setting, Softening, SofteningOfOneMode
+from piezo_hysteresis.effects import Arx, Discretisation, Softening, SofteningOfOneMode
 from piezo_hysteresis.errors import ModelError, ParameterError
 
 PAPER = {
@@ -19,10 +19,10 @@ PAPER = {
     "b": [0.004481, 0.04629, 0.1320, 0.1154, -0.02198, -0.06236, -0.0007691, 0.01408],
     "delay": 3,
 }
-FAST = Setting(2e-5, 2e-5)
+FAST = Discretisation(2e-5, 2e-5)
 
 
-def run(effect: Arx, x: np.ndarray, setting: Setting = FAST, *terms: Softening) -> np.ndarray:
+def run(effect: Arx, x: np.ndarray, setting: Discretisation = FAST, *terms: Softening) -> np.ndarray:
     block = effect.block(setting, terms)
     return block.run(x, block.rest(x[0], 0.0))[0]
 
@@ -62,7 +62,7 @@ def test_a_fractional_delay_moves_a_slow_sine_by_that_time(delay: float) -> None
 def test_a_slow_ramp_comes_out_with_dc_gain_and_group_delay(ratio: float) -> None:
     arx = Arx(**PAPER)
     x = np.arange(60.0)
-    y = run(arx, x, Setting(2e-5 * ratio, 2e-5))
+    y = run(arx, x, Discretisation(2e-5 * ratio, 2e-5))
     np.testing.assert_allclose(y[10:], arx.dc_gain * (x[10:] - arx.group_delay / ratio), rtol=1e-9)
 
 
@@ -71,7 +71,7 @@ def test_a_slow_sine_is_the_decimated_fast_one() -> None:
     t = np.arange(40000) * 2e-5
     x = np.sin(2 * np.pi * 5.0 * t)
     fast = run(arx, x)[::factor]
-    slow = run(arx, x[::factor].copy(), Setting(2e-5 * factor, 2e-5))
+    slow = run(arx, x[::factor].copy(), Discretisation(2e-5 * factor, 2e-5))
     np.testing.assert_allclose(slow[100:], fast[100:], atol=1e-4 * arx.dc_gain)
 
 
@@ -96,7 +96,7 @@ def test_a_softened_stage_settles_on_its_static_curve() -> None:
     x = np.concatenate((np.zeros(5), np.full(20000, 0.8)))
     (deflection,) = [r.real for r in np.roots([k3, k2, 1.0, -0.8]) if abs(r.imag) < 1e-12 and 0 < r.real < 1]
     arx = Arx(**PAPER)
-    for setting in (FAST, Setting(1e-3, 2e-5)):
+    for setting in (FAST, Discretisation(1e-3, 2e-5)):
         y = run(arx, x, setting, Softening(k2=k2, k3=k3))
         assert y[-1] == pytest.approx(arx.dc_gain * deflection, rel=1e-9)
 
@@ -107,14 +107,14 @@ def test_the_softened_mode_is_a_duffing_oscillator() -> None:
     a = np.poly([poles, poles.conjugate()])[1:]
     arx = Arx(a=a, b=[1.0 + a.sum()], delay=1)
     n = 40000
-    y = run(arx, np.append(0.0, np.full(n, 0.6)), Setting(period, period), Softening(k3=k3))
+    y = run(arx, np.append(0.0, np.full(n, 0.6)), Discretisation(period, period), Softening(k3=k3))
 
     def motion(t: float, z: np.ndarray) -> list[float]:
         return [z[1], rate**2 * (0.6 - z[0] - k3 * z[0] ** 3) - 2 * zeta * rate * z[1]]
 
     times = np.arange(n + 1) * period
     expected = solve_ivp(motion, (0.0, times[-1]), [0.0, 0.0], t_eval=times, rtol=1e-9, atol=1e-12).y[0]
-    linear = run(arx, np.append(0.0, np.full(n, 0.6)), Setting(period, period))
+    linear = run(arx, np.append(0.0, np.full(n, 0.6)), Discretisation(period, period))
     assert np.abs(y - expected).max() < 0.02 * np.abs(linear - expected).max()
 
 
@@ -146,7 +146,7 @@ def test_softening_of_one_mode_leaves_the_other_as_it_is(k3: float) -> None:
         x[i] = first.sum() * (w[i] - k3 * before**3) - first[1] * before - first[2] * earlier
     z = signal.lfilter([second.sum()], second, w)
     expected = np.concatenate((np.zeros(2), (share * x + (1.0 - share) * z)[:-2]))
-    y = run(arx, w, Setting(period, period), SofteningOfOneMode(k3=k3))
+    y = run(arx, w, Discretisation(period, period), SofteningOfOneMode(k3=k3))
     np.testing.assert_allclose(y, expected, atol=1e-9)
 
 
@@ -155,7 +155,7 @@ def test_one_softened_mode_of_two_settles_with_its_share() -> None:
     arx, _ = two_modes(period, share)
     x = np.concatenate((np.zeros(5), np.full(60000, 0.8)))
     (deflection,) = [r.real for r in np.roots([k3, 0.0, 1.0, -0.8]) if abs(r.imag) < 1e-12 and 0 < r.real < 1]
-    for setting in (Setting(period, period), Setting(1e-3, period)):
+    for setting in (Discretisation(period, period), Discretisation(1e-3, period)):
         y = run(arx, x, setting, SofteningOfOneMode(k3=k3))
         assert y[-1] == pytest.approx(share * deflection + (1.0 - share) * 0.8, rel=1e-7)
 

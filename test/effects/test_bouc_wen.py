@@ -12,17 +12,17 @@ from piezo_hysteresis.blocks.bouc_wen_kernel import run_general, run_plain
 from piezo_hysteresis.effects import (
     AsymmetricHysteresis,
     BoucWen,
+    Discretisation,
     HysteresisExponent,
     InitialState,
     PublishedBoucWen,
     RateDependentHysteresis,
-    Setting,
     Term,
 )
 from piezo_hysteresis.errors import ModelError, ParameterError
 
 PERIOD = 1e-3
-SETTING = Setting(PERIOD, PERIOD)
+SETTING = Discretisation(PERIOD, PERIOD)
 TURNS = np.array([0.0, 0.6, 0.2, 0.5, -0.4, 0.3])
 
 
@@ -197,10 +197,10 @@ def test_a_term_has_no_block_of_its_own() -> None:
 
 
 def test_a_change_in_one_slow_sample_is_a_jump_or_a_ramp_as_the_rate_law_is_told() -> None:
-    slow, own = Setting(1e-2, 2e-5), Setting(1e-2, 1e-2)
+    slow, own = Discretisation(1e-2, 2e-5), Discretisation(1e-2, 1e-2)
     stairs = np.repeat([0.0, 0.2, 0.4, 0.1], 50)
 
-    def loop(setting: Setting, jumps: float) -> np.ndarray:
+    def loop(setting: Discretisation, jumps: float) -> np.ndarray:
         effect = BoucWen(A=0.4, beta=3.0, gamma=0.5, p1=0.0, p2=1.0)
         block = effect.block(setting, (RateDependentHysteresis(k=0.05, a=0.2, jumps=jumps),))
         return block.run(stairs, block.rest(0.0, 0.0))[0]

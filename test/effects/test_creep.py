@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from piezo_hysteresis.effects import Creep, CreepExponential, CreepFractional, Effect, Setting
+from piezo_hysteresis.effects import Creep, CreepExponential, CreepFractional, Discretisation, Effect
 from piezo_hysteresis.errors import ParameterError
 
 
 def run(effect: Effect, x: np.ndarray, period: float) -> np.ndarray:
-    block = effect.block(Setting(period, period))
+    block = effect.block(Discretisation(period, period))
     return block.run(x, block.rest(0.0, 0.0))[0]
 
 
@@ -25,7 +25,7 @@ def test_a_step_follows_the_logarithmic_law(period: float) -> None:
 
 
 def test_the_response_after_0_1_s_does_not_change_with_gamma() -> None:
-    block = Creep(gamma=0.1).block(Setting(1e-3, 1e-3))
+    block = Creep(gamma=0.1).block(Discretisation(1e-3, 1e-3))
     y, _ = block.run(np.ones(400), block.rest(0.0, 0.0))
     assert y[100] == pytest.approx(1.0 + 0.1 * np.log10(0.1005 / 0.1), abs=1e-6)
 
@@ -62,7 +62,7 @@ def test_exponential_creep_is_the_transfer_function_of_scipy() -> None:
     "effect", [Creep(gamma=0.05, tau_min=1e-4), CreepExponential(c=[0.05], tau=[0.02])], ids=lambda e: e.name
 )
 def test_the_memory_passes_to_another_sample_period(effect: Effect) -> None:
-    fine, coarse = effect.block(Setting(1e-3, 1e-3)), effect.block(Setting(5e-3, 1e-3))
+    fine, coarse = effect.block(Discretisation(1e-3, 1e-3)), effect.block(Discretisation(5e-3, 1e-3))
     turns = np.interp(np.arange(2001), [0, 500, 900, 2000], [0.0, 1.0, 0.2, 0.7])
     whole, _ = fine.run(turns, fine.rest(0.3, 0.0))
     first, state = fine.run(turns[:501].copy(), fine.rest(0.3, 0.0))

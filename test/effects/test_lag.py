@@ -6,14 +6,21 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from piezo_hysteresis.effects import AmplifierBandwidth, Effect, ExtraDelay, ExtraResonance, SensorBandwidth, Setting
+from piezo_hysteresis.effects import (
+    AmplifierBandwidth,
+    Discretisation,
+    Effect,
+    ExtraDelay,
+    ExtraResonance,
+    SensorBandwidth,
+)
 from piezo_hysteresis.errors import ParameterError
 
 PERIOD = 2e-5
 
 
 def run(effect: Effect, x: np.ndarray, period: float = PERIOD) -> np.ndarray:
-    block = effect.block(Setting(period, PERIOD))
+    block = effect.block(Discretisation(period, PERIOD))
     return block.run(x, block.rest(x[0], 0.0))[0]
 
 

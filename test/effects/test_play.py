@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from piezo_hysteresis.effects import Backlash, Effect, HysteresisMemory, Setting
+from piezo_hysteresis.effects import Backlash, Discretisation, Effect, HysteresisMemory
 from piezo_hysteresis.errors import ParameterError
 
-SETTING = Setting(1e-3, 1e-3)
+SETTING = Discretisation(1e-3, 1e-3)
 
 
 def run(effect: Effect, x: np.ndarray) -> np.ndarray:

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 from sensor_msgs.msg import PointCloud2
 
+from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.nodes.messages.cloud import from_cloud
-from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, SAMPLES, SampleBlock, samples_to_cloud
+from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, SAMPLES, samples_to_cloud
 
 PERIOD, SIZE = 1e-4, 100
 MODEL = Model((BoucWen(), Arx(a=[-0.8], b=[0.05])), PERIOD, displacement_scale=1e-4)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.identification.records.excitation_content import content_of
+from piezo_hysteresis.identification.records.excitation_content import excitation_content
 from piezo_hysteresis.record import Record
 
 
 def content(voltage, period, **options):
-    return content_of(Record(voltage, 1e-6 * voltage, period, **options))
+    return excitation_content(Record(voltage, 1e-6 * voltage, period, **options))
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from piezo_hysteresis.effects import Arx, BoucWen, Setting
+from piezo_hysteresis.effects import Arx, BoucWen, Discretisation
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.identification.protocol import excitation
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
@@ -18,7 +18,7 @@ V = np.concatenate([excitation.triangle(LIMITS, (1.0, 0.75, 0.5, 0.25), 1.0)]) /
 
 
 def run(effect, v):
-    block = effect.block(Setting(1e-3, 1e-3))
+    block = effect.block(Discretisation(1e-3, 1e-3))
     w, _ = block.run(v, block.rest(float(v[0]), 0.0))
     return w
 

@@ -173,7 +173,7 @@ def test_a_record_that_begins_in_the_middle_counts_from_its_first_full_loop():
     measured += NOISE * np.random.default_rng(0).standard_normal(time.size)
     cut = Record(voltage[2300:], measured[2300:], 1e-3, "sine_1hz", truncated=True)
     found = identify(Experiment((cut,)))
-    assert any(n.kind == "lead_in" for n in found.notices)
+    assert any(n.kind == "conditioning_length" for n in found.notices)
     assert found.free_run_error == pytest.approx(NOISE, rel=0.1)
 
 

@@ -25,8 +25,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 
+from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
-from piezo_hysteresis.nodes.messages.samples import SampleBlock, samples_from_cloud
+from piezo_hysteresis.nodes.messages.samples import samples_from_cloud
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS, LATCHED
 
 PATIENCE = 60.0

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from piezo_hysteresis.acquisition.drive import Happening
+from piezo_hysteresis.acquisition.drive import EventKind
 from piezo_hysteresis.acquisition.memory import MemoryAcquisition
 from piezo_hysteresis.acquisition.playback import Playback
-from piezo_hysteresis.acquisition.streaming import Acquisition
+from piezo_hysteresis.acquisition.streaming import StreamingAcquisition
 from piezo_hysteresis.acquisition.time_base import TimeBase
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.stage.simulated import SimulatedMemoryStage
@@ -48,7 +48,7 @@ class Listener:
         return [e.phase.name for d in self.deliveries for e in d.events if e.happening is happening]
 
 
-def started(stage, kind=Acquisition, rate=10.0, **named):
+def started(stage, kind=StreamingAcquisition, rate=10.0, **named):
     listener = Listener()
     playback = Playback(stage.voltage, 0.0, PERIOD, RAMP_RATE)
     acquisition = kind(
@@ -66,7 +66,7 @@ def play(acquisition, waveform, name):
 def test_make_safe_ramps_down_and_tells_every_sample_of_it():
     acquisition, listener = started(Witness(PERIOD, RAMP_RATE))
     play(acquisition, np.linspace(0, 5, 300), "up")
-    listener.wait(lambda heard: "up" in heard.events(Happening.DONE))
+    listener.wait(lambda heard: "up" in heard.events(EventKind.DONE))
     assert acquisition.make_safe(30.0)
     voltage = listener.joined("voltage")
     assert voltage.max() == 5.0
@@ -185,7 +185,7 @@ def test_stop_breaks_off_what_plays_from_memory(playing):
     acquisition.stop()
     assert acquisition.make_safe(30.0)
     assert stage.voltage == 0.0
-    assert listener.events(Happening.STOPPED) == (["long"] if playing else [])
+    assert listener.events(EventKind.STOPPED) == (["long"] if playing else [])
     voltage = listener.joined("voltage")
     assert voltage[-1] == 0.0
     index = listener.joined("index").astype(np.int64)

@@ -7,9 +7,9 @@ import pytest
 
 from piezo_hysteresis.acquisition import back_ends
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.identification.protocol.protocol import Phase, Protocol
+from piezo_hysteresis.identification.protocol.protocol import Protocol, ProtocolPhase
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
-from piezo_hysteresis.nodes.identification.driver_client import DriverLink
+from piezo_hysteresis.nodes.identification.driver_client import DriverClient
 from piezo_hysteresis.nodes.identification.protocol_runner import campaign
 from piezo_hysteresis.recording import read
 
@@ -32,9 +32,9 @@ def begun(lab, voltage, before=lambda link: None):
     """The campaign of one phase with a driver, as a function that calls `before`, carries it on and returns its end."""
     node = lab.add(DriverNode, discovery_time=0.0)
     lab.do(node.begin)
-    link = lab.do(lambda: DriverLink(lab.node, "driver_node"))
+    link = lab.do(lambda: DriverClient(lab.node, "driver_node"))
     lab.wait(lambda: not link.missing, "the driver")
-    phase, path = Phase("long", voltage, PERIOD), lab.folder / "run"
+    phase, path = ProtocolPhase("long", voltage, PERIOD), lab.folder / "run"
     job = campaign(lab.node, link, lambda limits: Protocol("long", limits, (phase,)), path)
 
     def step():

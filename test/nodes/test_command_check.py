@@ -5,7 +5,7 @@ import pytest
 
 from piezo_hysteresis.acquisition.command_check import CommandCheck
 from piezo_hysteresis.errors import PiezoError, StageError
-from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, to_stamp
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, from_stamp, to_stamp, waveform_from_cloud
 from piezo_hysteresis.stage.stage import Description
 
 NOW = 1_700_000_000_000_000_000
@@ -17,9 +17,14 @@ def cloud(voltage, period=1e-3, age=0.0):
     return command_to_cloud(voltage, period, "step", to_stamp(NOW - round(age * 1e9)))
 
 
+def checked(check, message):
+    voltage = waveform_from_cloud(message, check.sample_period)
+    return check.waveform(voltage, from_stamp(message.header.stamp), NOW)
+
+
 def test_a_good_command_passes_unchanged():
     wave = np.linspace(0, 10, 50)
-    assert np.array_equal(CHECK.waveform(cloud(wave, age=1.9), NOW), wave)
+    assert np.array_equal(checked(CHECK, cloud(wave, age=1.9)), wave)
 
 
 @pytest.mark.parametrize(
@@ -38,12 +43,12 @@ def test_a_good_command_passes_unchanged():
 )
 def test_refusals(voltage, period, age, reason):
     with pytest.raises(PiezoError, match=reason) as refusal:
-        CHECK.waveform(cloud(voltage, period, age), NOW)
+        checked(CHECK, cloud(voltage, period, age))
     assert "\n" not in str(refusal.value)
 
 
 def test_a_command_without_stamp_has_no_age():
-    assert CHECK.waveform(command_to_cloud([1.0], 1e-3, "step"), NOW).tolist() == [1.0]
+    assert checked(CHECK, command_to_cloud([1.0], 1e-3, "step")).tolist() == [1.0]
 
 
 def test_first_step_counts_from_the_voltage_in_force():
@@ -60,6 +65,6 @@ def test_set_points_outside_are_refused(voltage):
 
 def test_a_replayed_stage_cannot_be_driven():
     check = CommandCheck(Description("replay", True, 1.0, 1.0, 0.0, 1.0, ignores_drive=True), 1.0, 2.0)
-    for ask in (lambda: check.set_point(0.5), lambda: check.waveform(cloud([0.0], 1.0), NOW)):
+    for ask in (lambda: check.set_point(0.5), lambda: checked(check, cloud([0.0], 1.0))):
         with pytest.raises(StageError, match="cannot be driven"):
             ask()

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import PointCloud2
 
-from piezo_hysteresis.identification.protocol.protocol import Phase
+from piezo_hysteresis.identification.protocol.protocol import ProtocolPhase
 from piezo_hysteresis.nodes.identification.command_sender import CommandSender
-from piezo_hysteresis.nodes.identification.driver_client import DriverLink
+from piezo_hysteresis.nodes.identification.driver_client import DriverClient
 
 pytestmark = pytest.mark.nodes
 
@@ -35,7 +35,7 @@ def link(shared_lab):
     lab = shared_lab
     lab.driver(simulated__electronics__dac_bits=0.0, command_max_age=MAX_AGE)
     lab.streaming()
-    link = lab.do(lambda: DriverLink(lab.node, "driver_node"))
+    link = lab.do(lambda: DriverClient(lab.node, "driver_node"))
     link.seen = []
     lab.node.create_timer(0.005, lambda: link.seen.append(link.state))
     lab.wait(lambda: not link.missing, "the driver")
@@ -46,7 +46,7 @@ def test_a_waveform_that_is_long_in_packing_keeps_nobody_waiting_and_is_not_too_
     lab = shared_lab
     samples = lab.samples()
     wave = np.linspace(0, 1, 2000)
-    lab.do(lambda: link.send(Phase("slow", SlowToPack(wave, 1.05 * MAX_AGE), PERIOD)))
+    lab.do(lambda: link.send(ProtocolPhase("slow", SlowToPack(wave, 1.05 * MAX_AGE), PERIOD)))
     lab.wait(lambda: link.state in ("done", "refused"), "the end of the phase")
     assert (link.state, link.reason) == ("done", "done")
     assert link.seen.count("sending") > 10, "the node went on meanwhile"
@@ -55,7 +55,7 @@ def test_a_waveform_that_is_long_in_packing_keeps_nobody_waiting_and_is_not_too_
 
 def test_eighty_seconds_of_drive_in_one_message(shared_lab, link):
     lab = shared_lab
-    lab.do(lambda: link.send(Phase("staircase", np.zeros(4_000_000), PERIOD)))
+    lab.do(lambda: link.send(ProtocolPhase("staircase", np.zeros(4_000_000), PERIOD)))
     lab.wait(lambda: link.state in ("playing", "refused"), "the phase")
     assert link.state == "playing", link.reason
     statuses = lab.statuses()
@@ -67,7 +67,7 @@ def test_what_is_called_off_while_it_is_packed_never_leaves(shared_lab, link):
     lab = shared_lab
     statuses = lab.statuses()
     slow = SlowToPack(np.full(2000, 1.0), 0.5)
-    lab.do(lambda: link.send(Phase("called_off", slow, PERIOD)))
+    lab.do(lambda: link.send(ProtocolPhase("called_off", slow, PERIOD)))
     assert slow.begun.wait(30.0)
     lab.do(link.stop)
     sent = []

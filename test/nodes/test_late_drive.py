@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.acquisition.drive import Drive, Event, Happening, Phase
-from piezo_hysteresis.acquisition.latency_buffer import LateDrive
+from piezo_hysteresis.acquisition.drive import Drive, Event, EventKind, Phase
+from piezo_hysteresis.acquisition.latency_buffer import LatencyBuffer
 
 
 @given(
@@ -16,8 +16,8 @@ from piezo_hysteresis.acquisition.latency_buffer import LateDrive
 def test_phases_and_events_are_those_of_the_stream_so_much_later(latency, sizes, marks):
     total = sum(sizes)
     phase = np.arange(total, dtype=np.uint32)
-    events = [(m, Event(m, Happening.BEGAN, Phase(m, "p"))) for m in sorted(marks) if m < total]
-    late, first, got_phase, got_events = LateDrive(latency, 7), 0, [], []
+    events = [(m, Event(m, EventKind.BEGAN, Phase(m, "p"))) for m in sorted(marks) if m < total]
+    late, first, got_phase, got_events = LatencyBuffer(latency, 7), 0, [], []
     for size in sizes:
         mine = tuple(Event(m - first, e.happening, e.phase) for m, e in events if first <= m < first + size)
         answer = late.follow(Drive(np.zeros(size), phase[first : first + size], mine))

@@ -12,13 +12,14 @@ from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
+from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_file import dumps, save
 from piezo_hysteresis.model.model_parameters import hash_number, model_hash
 from piezo_hysteresis.nodes.messages.cloud import from_cloud
 from piezo_hysteresis.nodes.messages.conversions import values_of
-from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, SampleBlock, samples_to_cloud
+from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, samples_to_cloud
 from piezo_hysteresis.nodes.runtime.qos import LATCHED, SAMPLES
 from piezo_hysteresis.online.predictor import Predictor
 

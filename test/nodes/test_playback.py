@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.acquisition.drive import Happening
+from piezo_hysteresis.acquisition.drive import EventKind
 from piezo_hysteresis.acquisition.playback import Playback
 from piezo_hysteresis.acquisition.recorded_playback import RecordedPlayback
 from piezo_hysteresis.errors import StageError
@@ -31,7 +31,7 @@ def test_idle_holds_the_voltage_in_force():
     voltage, phase, events = taken(playback(3.0), 5, 5)
     assert voltage.tolist() == [3.0] * 10
     assert phase.tolist() == [0] * 10
-    assert events == [(0, Happening.BEGAN, "0 idle")]
+    assert events == [(0, EventKind.BEGAN, "0 idle")]
 
 
 def test_waveform_is_played_exactly_and_then_held():
@@ -41,13 +41,13 @@ def test_waveform_is_played_exactly_and_then_held():
     voltage, phase, events = taken(p, 2, 4)
     assert voltage.tolist() == [0.0, 1.0, 2.0, 2.0, 2.0, 2.0]
     assert phase.tolist() == [1, 1, 1, 2, 2, 2]
-    assert events == [(0, Happening.BEGAN, "1 step"), (3, Happening.DONE, "1 step"), (3, Happening.BEGAN, "2 hold")]
+    assert events == [(0, EventKind.BEGAN, "1 step"), (3, EventKind.DONE, "1 step"), (3, EventKind.BEGAN, "2 hold")]
 
 
 def test_done_is_told_with_the_block_that_ends_it():
     p = playback()
     p.play(np.zeros(4), "rest")
-    assert [e.happening for e in p.take(4).events if e.phase.name == "rest"] == [Happening.BEGAN, Happening.DONE]
+    assert [e.happening for e in p.take(4).events if e.phase.name == "rest"] == [EventKind.BEGAN, EventKind.DONE]
     assert [str(e.phase) for e in p.take(1).events] == ["2 hold"]
 
 
@@ -79,7 +79,7 @@ def test_stop_leaves_the_waveform_at_the_ramp_rate():
         p.play(np.zeros(3), "next")
     voltage, _, events = taken(p, 3, 2)
     assert np.allclose(voltage, [0.4, 0.3, 0.2, 0.1, 0.0], rtol=0, atol=1e-12)
-    assert events[0] == (0, Happening.STOPPED, "1 sine")
+    assert events[0] == (0, EventKind.STOPPED, "1 sine")
     assert p.is_safe
     assert not p.is_stopping
     p.play(np.zeros(3), "next")
@@ -126,7 +126,7 @@ def test_jump_ends_what_was_played():
     p.jump(0.0)
     voltage, _, events = taken(p, 5)
     assert voltage.tolist() == [0.0] * 5
-    assert events[0][1:] == (Happening.STOPPED, "1 step")
+    assert events[0][1:] == (EventKind.STOPPED, "1 step")
     assert not p.is_playing
 
 

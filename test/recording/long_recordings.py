@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from piezo_hysteresis.recording import BagWriter
-from piezo_hysteresis.recording.bag.block_message import TYPE, Block
+from piezo_hysteresis.recording.bag.block_message import TYPE, BlockMessage
 
 PERIOD = 1e-4
 PIECE = 200_000
@@ -88,7 +88,7 @@ def _bag(path, pieces):
             part = slice(first % PIECE, first % PIECE + BLOCK)
             channels = {"voltage": VOLTAGE[part], "displacement": DISPLACEMENT[part]}
             index = (first + np.arange(BLOCK)).astype(np.uint32)
-            bag.write("/samples", stamp, Block(stamp, channels, phase, time, index).to_cdr())
+            bag.write("/samples", stamp, BlockMessage(stamp, channels, phase, time, index).to_cdr())
 
 
 _READER = """

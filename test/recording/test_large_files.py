@@ -12,7 +12,7 @@ from scipy import io
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.recording import read
 from piezo_hysteresis.recording.segmentation import decimating_buffer as intake
-from piezo_hysteresis.recording.segmentation.decimating_buffer import Intake, shared_averages
+from piezo_hysteresis.recording.segmentation.decimating_buffer import DecimatingBuffer, shared_averages
 from piezo_hysteresis.recording.table import column
 from test.recording import long_recordings
 
@@ -96,7 +96,7 @@ def test_pieces_of_any_size_come_to_the_same_as_all_at_once(sizes, average, star
     stop = None if length is None else start + length
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(intake, "ENOUGH", 16)
-        taken = Intake(2, start, stop, average)
+        taken = DecimatingBuffer(2, start, stop, average)
         for part in np.split(values, np.cumsum(sizes)[:-1] if sizes else []):
             taken.add(part)
     kept = values[start:stop]

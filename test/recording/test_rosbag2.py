@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 from piezo_hysteresis.errors import PiezoError, RecordingError
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import BagWriter, read, recorded_model, write
-from piezo_hysteresis.recording.bag.block_message import TYPE, Block
+from piezo_hysteresis.recording.bag.block_message import TYPE, BlockMessage
 from piezo_hysteresis.recording.bag.phase_topic import STRING, PhaseNames
 
 PERIOD = 2e-5
@@ -33,7 +33,7 @@ class Driver:
 
     def block(self, voltage=None, n=SIZE):
         voltage = self.random.normal(size=n) if voltage is None else np.full(n, float(voltage))
-        return Block(
+        return BlockMessage(
             self.clock_ns,
             {"voltage": voltage, "displacement": self.random.normal(size=n) * 1e-6},
             np.full(n, self.number, np.uint32),

@@ -1,1 +1,1 @@
-"""TODO."""
+"""What a model leaves: residual, noise floor, and where the residual sits."""

@@ -19,7 +19,7 @@ from ...errors import DivergenceError
 from ...model.model import Model
 from ...record import Experiment, Notice, Record
 from ..search.refit import joint
-from ..search.training_data import Evidence
+from ..search.training_data import TrainingData
 from .sampling import at_period, less
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
     return [b - a if r.sample_period < own else np.zeros(r.size) for r, a, b in pairs]
 
 
-def is_stepped(model: Model, evidence: Evidence, leaves: float = np.inf) -> bool:
+def is_stepped(model: Model, evidence: TrainingData, leaves: float = np.inf) -> bool:
     """Whether the loop behind the data takes the explicit step: they fit best with the whole of its changes taken out.
 
     Parameters

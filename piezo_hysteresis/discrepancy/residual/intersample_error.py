@@ -28,7 +28,7 @@ ITS_SIZE = (0.7, 1.3)
 """Multiple of a change that the residual holds, where the change is what it lacks."""
 
 
-def coarseness(model: Model, records: Sequence[Record]) -> list[Array]:
+def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
     """Change of the simulation where slow drives turn within their samples, and averages are compared [m].
 
     Whether a drive ran or jumped to the next level is not in its averages: every record is taken as its displacement

@@ -20,7 +20,7 @@ EDGES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ResidualShare:
     """How unevenly the residual lies along one axis.
 
     Parameters
@@ -42,7 +42,9 @@ class Place:
     bins: tuple[tuple[str, float], ...]
 
 
-def localise(records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]) -> tuple[Place, ...]:
+def localise(
+    records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]
+) -> tuple[ResidualShare, ...]:
     """Shares of the residual along every axis, the most telling axis first.
 
     Parameters
@@ -56,7 +58,7 @@ def localise(records: Sequence[Record], residuals: Sequence[Array], floors: Sequ
 
     Returns
     -------
-    tuple of Place
+    tuple of ResidualShare
         Ordered by how much more the residual concentrates than evenly spread power would.
     """
     power = [e * e / (f * f * e.size) for e, f in zip(residuals, floors, strict=True)]
@@ -82,7 +84,9 @@ def localise(records: Sequence[Record], residuals: Sequence[Array], floors: Sequ
     return tuple(sorted((p for p, _ in places), key=lambda p: -concentrations[p.axis]))
 
 
-def _gather(axis: str, bins: Sequence[Bins], power: Sequence[Array], labels: Sequence[str]) -> tuple[Place, float]:
+def _gather(
+    axis: str, bins: Sequence[Bins], power: Sequence[Array], labels: Sequence[str]
+) -> tuple[ResidualShare, float]:
     held = np.zeros(len(labels))
     room = np.zeros(len(labels))
     for index, p in zip(bins, power, strict=True):
@@ -92,7 +96,7 @@ def _gather(axis: str, bins: Sequence[Bins], power: Sequence[Array], labels: Seq
     return _place(axis, held, room, labels)
 
 
-def _place(axis: str, held: Array, room: Array, labels: Sequence[str]) -> tuple[Place, float]:
+def _place(axis: str, held: Array, room: Array, labels: Sequence[str]) -> tuple[ResidualShare, float]:
     shares = held / max(held.sum(), 1e-300)
     even = room / max(room.sum(), 1e-300)
     excess = shares - even
@@ -101,10 +105,12 @@ def _place(axis: str, held: Array, room: Array, labels: Sequence[str]) -> tuple[
     told = ", ".join(f"{labels[k]} ({100 * shares[k]:.0f} %)" for k in chosen)
     # concentration: how far the shares are from where the samples are
     concentration = float(np.abs(excess).sum() / 2.0)
-    return Place(axis, share, told, tuple((n, float(s)) for n, s in zip(labels, shares, strict=True))), concentration
+    return ResidualShare(
+        axis, share, told, tuple((n, float(s)) for n, s in zip(labels, shares, strict=True))
+    ), concentration
 
 
-def _phases(records: Sequence[Record], power: Sequence[Array]) -> tuple[Place, float]:
+def _phases(records: Sequence[Record], power: Sequence[Array]) -> tuple[ResidualShare, float]:
     names = list(dict.fromkeys(r.phase for r in records))
     held, room = np.zeros(len(names)), np.zeros(len(names))
     for record, p in zip(records, power, strict=True):
@@ -113,7 +119,9 @@ def _phases(records: Sequence[Record], power: Sequence[Array]) -> tuple[Place, f
     return _place("phase", held, room, names)
 
 
-def _frequencies(records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]) -> tuple[Place, float]:
+def _frequencies(
+    records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]
+) -> tuple[ResidualShare, float]:
     edges = EDGES["frequency"]
     labels = [f"{a:g} to {b:g} Hz" for a, b in zip(edges, edges[1:], strict=False)]
     held, room = np.zeros(len(labels)), np.zeros(len(labels))

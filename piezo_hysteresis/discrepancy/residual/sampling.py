@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from ...effects.drive.backlash import run_play
-from ...identification.records.excitation_content import content_of, noise_on_motion
+from ...identification.records.excitation_content import excitation_content, noise_on_motion
 from ...record import Record
 
 Array = NDArray[np.float64]
@@ -131,7 +131,7 @@ def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
 
 
 def _thinned(record: Record, most: int) -> Record:
-    return _averaged(record, record.size // most) if content_of(record).is_slow else record
+    return _averaged(record, record.size // most) if excitation_content(record).is_slow else record
 
 
 def _is_alike(record: Record, most: int) -> bool:
@@ -150,7 +150,7 @@ def _is_alike(record: Record, most: int) -> bool:
 
 def common_period(records: Sequence[Record]) -> float:
     """The sample period for the dynamics [s]: that of the fastest record that determines them, else of the fastest."""
-    broadband = [r.sample_period for r in records if r.size > 64 and content_of(r).is_broadband]
+    broadband = [r.sample_period for r in records if r.size > 64 and excitation_content(r).is_broadband]
     return min(broadband or [r.sample_period for r in records])
 
 
@@ -161,7 +161,12 @@ def at_period(record: Record, period: float) -> Record:
         whole = abs(factor * record.sample_period - period) < 1e-3 * period and record.size >= factor
         return replace(record.decimate(factor), sample_period=period) if whole else _interpolated(record, period)
     slower = record.sample_period > 1.001 * period and record.size > 64
-    if not slower or record.duration > MOST * period or content_of(record).is_slow or not _is_smooth(record.voltage):
+    if (
+        not slower
+        or record.duration > MOST * period
+        or excitation_content(record).is_slow
+        or not _is_smooth(record.voltage)
+    ):
         return record
     return _interpolated(record, period)
 

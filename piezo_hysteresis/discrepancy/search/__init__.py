@@ -1,1 +1,1 @@
-"""TODO."""
+"""The search for the missing effect: candidates, joint refits, scores on records left out, acceptance."""

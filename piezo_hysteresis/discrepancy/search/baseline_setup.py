@@ -14,7 +14,7 @@ from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.conditioning import select as select_records
 from ...model.model import Model
 from ...record import Record
-from ..residual.intersample_error import coarseness
+from ..residual.intersample_error import intersample_error
 from ..residual.noise_floor import floors, noise_floors, stroke
 from ..residual.sampling import at_period, common_period, less, shortened, slowed
 from .baseline import exact, modal_models, start_models
@@ -23,7 +23,7 @@ from .cross_validation import ADEQUATE, Score
 from .refit import FAILURES, LAST, PRECISE, clearly_better, joint, renewed
 from .selection_result import Selection
 from .test_records import reporting
-from .training_data import Evidence, extent_of
+from .training_data import TrainingData, extent_of
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ UNSURE = 0.3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Ground:
+class BaselineSetup:
     """What a search for effects begins from.
 
     Parameters
@@ -49,7 +49,7 @@ class Ground:
         Range of the displacement [m].
     usable, fitted, spared : sequence of int
         Records that tell something; of these those for fitting and choosing, and those set aside for the gap.
-    evidence : Evidence
+    evidence : TrainingData
         The records that are fitted, shortened.
     baseline : Fit
         The model without further effects.
@@ -66,7 +66,7 @@ class Ground:
     usable: Sequence[int]
     fitted: Sequence[int]
     spared: Sequence[int]
-    evidence: Evidence
+    evidence: TrainingData
     baseline: Fit
     score: Score
 
@@ -82,18 +82,18 @@ class Ground:
 
     def is_coarse(self, model: Model) -> bool:
         """Whether by this model slow samples have lost something else, by more than the floor of a record."""
-        again = coarseness(model, self.given)
+        again = intersample_error(model, self.given)
         return any(np.std(a - b) > f for a, b, f in zip(again, self.lost, self.least, strict=True))
 
 
-def lay_ground(
+def prepare_baseline(
     given: Sequence[Record],
     usable: Sequence[int],
     model: Model | None,
     known: Selection | None,
     sharpens: bool,
     tell: Progress,
-) -> Ground:
+) -> BaselineSetup:
     """Floors, records to fit and to set aside, and the baseline.
 
     Parameters
@@ -130,16 +130,16 @@ def lay_ground(
     start = exact(next(starts))
     extent = extent_of([records[i] for i in usable], start)
 
-    def gathered(records: Sequence[Record], least: Array) -> Evidence:
+    def gathered(records: Sequence[Record], least: Array) -> TrainingData:
         kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
-        return Evidence(tuple(kept), np.array(sizes), Nuisance(), extent)
+        return TrainingData(tuple(kept), np.array(sizes), Nuisance(), extent)
 
     evidence = gathered(records, least)
     tell("baseline, jointly", 0.2)
     baseline = joint(start, evidence, LAST, PRECISE)
     lost = [np.zeros(r.size) for r in records]
     if sharpens:
-        lost = coarseness(known.model if known is not None else baseline.model, records)
+        lost = intersample_error(known.model if known is not None else baseline.model, records)
     if any(c.any() for c in lost):
         records = less(records, lost)
         least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
@@ -153,10 +153,10 @@ def lay_ground(
         for modal in modal_models(baseline.model, records, fitted):
             baseline, score = clearly_better(modal, baseline, score, evidence) or (baseline, score)
         baseline, score = renewed(baseline, score, evidence)
-    return Ground(straight, records, lost, noise, least, span, usable, fitted, spared, evidence, baseline, score)
+    return BaselineSetup(straight, records, lost, noise, least, span, usable, fitted, spared, evidence, baseline, score)
 
 
-def _best(found: Fit, score: Score, starts: Iterator[Model], evidence: Evidence) -> tuple[Fit, Score]:
+def _best(found: Fit, score: Score, starts: Iterator[Model], evidence: TrainingData) -> tuple[Fit, Score]:
     """The fit and its score, or those from another start: one that records left out prefer, and that fits better."""
     with suppress(*FAILURES):
         for start in map(exact, starts):

@@ -1,11 +1,11 @@
-"""`contest`: joint refits of candidates against one another, the longer the better they stand."""
+"""`refit_candidates`: joint refits of candidates against one another, the longer the better they stand."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ...effects.effect import Place
+from ...effects.effect import ChainPosition
 from ...identification.fit.fit import Progress
 from ...model.model import Model
 from .candidates import Candidate
@@ -31,7 +31,7 @@ FINER = 0.05
 """Gain from which the finer form of an effect is taken."""
 
 
-def contest(model: Model, candidates: Sequence[Candidate], before: Score, tell: Progress) -> list[Candidate]:
+def refit_candidates(model: Model, candidates: Sequence[Candidate], before: Score, tell: Progress) -> list[Candidate]:
     """Joint refits, best first: a few linearisations of all, dynamics anew for the leaders, the best to the end."""
     refits: list[Candidate] = []
     for k, candidate in enumerate(candidates):
@@ -59,7 +59,7 @@ def contest(model: Model, candidates: Sequence[Candidate], before: Score, tell: 
 
 def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
     """Refits of effects of the drive: dynamics have taken them up, so that no score test sees them."""
-    return _settled_from_all_starts(model, [c for c in candidates if c.effect.place is Place.DRIVE], before)
+    return _settled_from_all_starts(model, [c for c in candidates if c.effect.place is ChainPosition.DRIVE], before)
 
 
 def refits_of_twins(model: Model, candidates: Sequence[Candidate], best: Candidate, before: Score) -> list[Candidate]:
@@ -78,7 +78,7 @@ def _anew(candidate: Candidate) -> Candidate:
     if candidate.score.cost <= LEAST_GAIN:  # less is left than counts as a gain
         return candidate
     anew = restart(candidate, FIRST)
-    if anew.effect.place is not Place.DRIVE or anew.score.excess <= ADEQUATE:
+    if anew.effect.place is not ChainPosition.DRIVE or anew.score.excess <= ADEQUATE:
         return anew
     assert anew.fit is not None
     return better(from_all_starts(anew.fit.model.without(anew.name), anew, FIRST), anew)
@@ -92,7 +92,12 @@ def _from_elsewhere(best: Candidate, before: Score) -> Candidate:
     assert best.fit is not None
     starts = type(best.effect).starts(best.evidence.extent)
     in_vain = before.cost - best.score.cost < LEAST_GAIN
-    if best.score.excess <= ADEQUATE or in_vain or best.effect.place is Place.DRIVE or len(starts) < FEWEST_STARTS:
+    if (
+        best.score.excess <= ADEQUATE
+        or in_vain
+        or best.effect.place is ChainPosition.DRIVE
+        or len(starts) < FEWEST_STARTS
+    ):
         return best
     anew = from_all_starts(best.fit.model.without(best.name), best, FIRST)
     return best if anew is None else better(settled(anew, before), best)

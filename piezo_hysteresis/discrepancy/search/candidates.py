@@ -19,7 +19,7 @@ from ...identification.fit.fit import Fit, gauge
 from ...identification.fit.normal_equations import Gram, grams
 from ...model.model import Model
 from .cross_validation import Score, held_out, indispensable
-from .training_data import Evidence
+from .training_data import TrainingData
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Candidate:
     """
 
     effect: Effect
-    evidence: Evidence
+    evidence: TrainingData
     score: Score
     fit: Fit | None = None
 
@@ -49,7 +49,7 @@ class Candidate:
         return self.effect.name
 
 
-def free_numbers(model: Model, evidence: Evidence) -> list[str]:
+def free_numbers(model: Model, evidence: TrainingData) -> list[str]:
     """Numbers of a model that a joint fit adjusts: all but the chosen ones, the delay and what is free per record.
 
     Settling where no two records begin at different levels is no number of the evidence.
@@ -82,24 +82,24 @@ def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
     return columns
 
 
-def score_model(model: Model, evidence: Evidence) -> Score:
+def score_model(model: Model, evidence: TrainingData) -> Score:
     """Score of a fitted model on records left out."""
     return held_out(*_products(model, evidence), evidence.alone)
 
 
-def score_baseline(model: Model, evidence: Evidence) -> tuple[Evidence, Score]:
+def score_baseline(model: Model, evidence: TrainingData) -> tuple[TrainingData, Score]:
     """The evidence, of which records that alone tell a number of the model are never left out, and the score."""
     products = _products(model, evidence)
     alone = indispensable(*products)
     return replace(evidence, alone=alone), held_out(*products, alone)
 
 
-def _products(model: Model, evidence: Evidence) -> tuple[list[Gram], Array, Array]:
+def _products(model: Model, evidence: TrainingData) -> tuple[list[Gram], Array, Array]:
     names = free_numbers(model, evidence)
     return grams(model, evidence.records, names, evidence.nuisance), evidence.floors, directions(model, names)
 
 
-def screen(model: Model, evidence: Evidence, effects: Iterable[type[Effect]]) -> list[Candidate]:
+def screen(model: Model, evidence: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:
     """Score test of every effect of the catalogue at every start it proposes, best first.
 
     Effects that are off at their start share one pass over the data; a finite start enters by the change it makes.
@@ -125,12 +125,12 @@ def screen(model: Model, evidence: Evidence, effects: Iterable[type[Effect]]) ->
     return sorted(best.values(), key=lambda c: c.score.cost)
 
 
-def _fits(model: Model, evidence: Evidence, effect: type[Effect]) -> bool:
+def _fits(model: Model, evidence: TrainingData, effect: type[Effect]) -> bool:
     has_channel = effect.channel is None or any(getattr(r, effect.channel) is not None for r in evidence.records)
     return effect.name not in model and has_channel and (effect.host is None or effect.host in model)
 
 
-def _screen_off(model: Model, evidence: Evidence, base: list[str], members: list[Effect]) -> list[Candidate]:
+def _screen_off(model: Model, evidence: TrainingData, base: list[str], members: list[Effect]) -> list[Candidate]:
     extended = model
     for effect in list(members):
         try:
@@ -152,7 +152,7 @@ def _screen_off(model: Model, evidence: Evidence, base: list[str], members: list
     return found
 
 
-def _screen_moves(model: Model, evidence: Evidence, base: list[str], moves: list[Effect]) -> list[Candidate]:
+def _screen_moves(model: Model, evidence: TrainingData, base: list[str], moves: list[Effect]) -> list[Candidate]:
     now = model.simulate(evidence.records)
     usable, rows = [], []
     for effect in moves:

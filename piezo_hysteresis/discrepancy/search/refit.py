@@ -19,7 +19,7 @@ from ...identification.steps.modes import identify_modes
 from ...model.model import Model
 from .candidates import Candidate, free_numbers, score_model
 from .cross_validation import Score
-from .training_data import Evidence
+from .training_data import TrainingData
 
 LINEAR = ("lag", "dynamics")
 """Families that dynamics of an order high enough can hold."""
@@ -44,7 +44,7 @@ class Fitted:
     score: Score
 
 
-def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
+def joint(model: Model, evidence: TrainingData, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
     """All free numbers of a model fitted to the evidence at once.
 
     Parameters
@@ -74,7 +74,7 @@ def joint(model: Model, evidence: Evidence, max_iterations: int, tolerance: floa
     )
 
 
-def clearly_better(start: Model, found: Fit, score: Score, evidence: Evidence) -> tuple[Fit, Score] | None:
+def clearly_better(start: Model, found: Fit, score: Score, evidence: TrainingData) -> tuple[Fit, Score] | None:
     """The fit from another start, and its score, where records left out prefer it clearly; None elsewhere.
 
     They judge the start first, after one linear step: one that is no better then has not become clearly better.
@@ -89,7 +89,7 @@ def clearly_better(start: Model, found: Fit, score: Score, evidence: Evidence) -
     return None
 
 
-def renewed(found: Fit, score: Score, evidence: Evidence) -> tuple[Fit, Score]:
+def renewed(found: Fit, score: Score, evidence: TrainingData) -> tuple[Fit, Score]:
     """A baseline and its score, begun anew behind dynamics found anew, while that helps.
 
     Dynamics are found behind the hysteresis of the model before, which was fitted without them.
@@ -152,7 +152,7 @@ def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> 
 
 
 def _behind_anew(
-    model: Model, evidence: Evidence, choices: Sequence[int] = (FEW_ITERATIONS, ITERATIONS)
+    model: Model, evidence: TrainingData, choices: Sequence[int] = (FEW_ITERATIONS, ITERATIONS)
 ) -> Fitted | None:
     """The model with dynamics found anew; None where the records do not tell them.
 
@@ -207,7 +207,7 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
     return min(found, key=lambda f: f.score.cost, default=None)
 
 
-def _absorbed(model: Model, extended: Model, evidence: Evidence) -> Model | None:
+def _absorbed(model: Model, extended: Model, evidence: TrainingData) -> Model | None:
     """The model with dynamics that imitate those of `extended`, which has one more linear effect; None without records.
 
     A joint fit may have stopped before its G held a mode that it has room for: what G can hold is no missing effect.

@@ -20,8 +20,8 @@ from .candidate_refits import (
     FIRST,
     LATER,
     LEAST_GAIN,
-    contest,
     finest,
+    refit_candidates,
     refits_of_the_drive,
     refits_of_twins,
     settled,
@@ -31,7 +31,7 @@ from .candidates import Candidate, alikeness, screen
 from .cross_validation import ADEQUATE, Score
 from .refit import Fitted, refit, restart, without
 from .selection_result import MANY, Rejection, Selection, Step, typical
-from .training_data import Evidence
+from .training_data import TrainingData
 
 ALONE = 4.0
 """Residual in floors up to which one record alone asks for no further effect."""
@@ -53,12 +53,12 @@ ALIKE = 0.97
 
 def select(
     model: Model,
-    evidence: Evidence,
+    evidence: TrainingData,
     score: Score,
     null: float,
     effects: Collection[type[Effect]] = CATALOGUE,
     progress: Progress | None = None,
-    is_in_vain: Callable[[Model, Evidence], bool] = lambda model, evidence: False,
+    is_in_vain: Callable[[Model, TrainingData], bool] = lambda model, evidence: False,
 ) -> Selection:
     """Add effects while records left out ask for them.
 
@@ -131,7 +131,7 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
 
 def _turn(
     model: Model,
-    evidence: Evidence,
+    evidence: TrainingData,
     before: Score,
     null: float,
     effects: Collection[type[Effect]],
@@ -151,7 +151,7 @@ def _turn(
         if (k < REFITS or c.effect.public_name() == screened[0].effect.public_name())
         and (k < 2 or before.cost - c.score.cost > HOPELESS)
     ]
-    refits = contest(model, likely, before, tell)
+    refits = refit_candidates(model, likely, before, tell)
     if not refits:
         return None
     if refits[0].score.excess > ADEQUATE and (others := refits_of_twins(model, screened, refits[0], before)):

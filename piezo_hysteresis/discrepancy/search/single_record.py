@@ -19,7 +19,7 @@ from ...identification.records.leading_step import step_length
 from ...model.model import Model
 from ...record import Experiment, Record
 from ..diagnosis import Diagnosis, Verdict
-from ..excitation_check import beyond_reach
+from ..excitation_check import missing_excitation
 from ..gap import measure_gap
 from ..next_experiment import decide
 from ..residual.localise import localise
@@ -30,7 +30,7 @@ from .cross_validation import ADEQUATE
 from .refit import joint
 from .selection import select
 from .selection_result import Selection, Step, explained
-from .training_data import Evidence, extent_of
+from .training_data import TrainingData, extent_of
 
 BLOCKS = 16
 """Blocks into which the records are cut, about."""
@@ -74,7 +74,7 @@ def diagnose_few(
     runs = sum(not r.continues for r in records)
     jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
     span = extent_of([records[i] for i in used], start)
-    evidence = Evidence(tuple(blocks), weights, Nuisance(offset=runs > 1), span, jumps)
+    evidence = TrainingData(tuple(blocks), weights, Nuisance(offset=runs > 1), span, jumps)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in used]))
     baseline = joint(with_zero(state), evidence, LAST, PRECISE)
     before = score_model(baseline.model, evidence)
@@ -106,7 +106,7 @@ def diagnose_few(
     )
     names = [s.best.effect.public_name() for s in selection.accepted]
     closed = explained(before.excess, selection.score.excess, null)
-    lacking = beyond_reach([records[i] for i in used])
+    lacking = missing_excitation([records[i] for i in used])
     if before.excess <= ADEQUATE:
         told = "the published model describes it down to the floor, so that it speaks for no effect and against none"
     elif names:

@@ -1,4 +1,4 @@
-"""`Evidence`: the records that fit and choose, and what they span."""
+"""`TrainingData`: the records that fit and choose, and what they span."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...effects import MainsHum
 from ...effects.extent import ROOM, Extent
 from ...identification.fit.normal_equations import Nuisance
-from ...identification.records.excitation_content import content_of
+from ...identification.records.excitation_content import excitation_content
 from ...model.model import Model
 from ...record import Record
 
@@ -24,7 +24,7 @@ MOVES = 30.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Evidence:
+class TrainingData:
     """Records that fit and choose, with their floors, and what is free in each of them.
 
     Parameters
@@ -58,20 +58,22 @@ class Evidence:
         return [
             i
             for i, (r, f) in enumerate(zip(self.records, self.floors, strict=True))
-            if np.isfinite(f) and r.sample_period < 1.001 * self.extent.fastest_period and content_of(r).is_broadband
+            if np.isfinite(f)
+            and r.sample_period < 1.001 * self.extent.fastest_period
+            and excitation_content(r).is_broadband
         ]
 
-    def with_peaks(self, left: Sequence[Array]) -> Evidence:
+    def with_peaks(self, left: Sequence[Array]) -> TrainingData:
         """With the frequencies at which the residuals `left` of the records stand out."""
         counted = [i for i, floor in enumerate(self.floors) if np.isfinite(floor)]
         peaks = peaks_of([self.records[i] for i in counted], [left[i] for i in counted])
         return replace(self, extent=replace(self.extent, peaks=peaks))
 
-    def with_hum(self, frequency: float) -> Evidence:
+    def with_hum(self, frequency: float) -> TrainingData:
         """With mains hum of its own amplitude and phase in every record."""
         return replace(self, nuisance=replace(self.nuisance, hum_frequency=frequency))
 
-    def without(self, effect: str) -> Evidence:
+    def without(self, effect: str) -> TrainingData:
         """Where `effect` is no part of the model: hum, free in every record, is then not free either."""
         return replace(self, nuisance=replace(self.nuisance, hum_frequency=None)) if effect == MainsHum.name else self
 

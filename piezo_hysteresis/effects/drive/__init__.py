@@ -1,1 +1,1 @@
-"""TODO."""
+"""Effects between the drive voltage and the actuator."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Self
 
 from ...blocks.block import Block
-from ...blocks.low_pass import PoleBlock
+from ...blocks.low_pass import LowPassBlock
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 FOUND_BY = (1e-5, 2e-5, 5e-5, 1.5e-4)
@@ -25,7 +25,7 @@ class AmplifierBandwidth(Effect):
 
     name = "amplifier_bandwidth"
     family = "lag"
-    place = Place.DRIVE
+    place = ChainPosition.DRIVE
     equation = "τ ẏ + y = x"
     signature = "lag growing with frequency at every amplitude; below one sample not separable from the other lags"
     source = "R·C of amplifier and actuator, 15–60 µs"
@@ -36,5 +36,5 @@ class AmplifierBandwidth(Effect):
         """Off, and of several sizes: what stands behind the pole is no linear system."""
         return cls(), *(cls(tau=tau) for tau in FOUND_BY)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
-        return PoleBlock("amplifier_bandwidth.tau", self["tau"], 1, setting.sample_period)
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
+        return LowPassBlock("amplifier_bandwidth.tau", self["tau"], 1, setting.sample_period)

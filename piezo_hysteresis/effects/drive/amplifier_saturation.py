@@ -9,7 +9,7 @@ import numpy as np
 from ...blocks.block import Array, Block, MemorylessBlock
 from ...errors import ParameterError
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 UNLIMITED = 1e9
@@ -28,7 +28,7 @@ class AmplifierSaturation(Effect):
 
     name = "amplifier_saturation"
     family = "amplifier"
-    place = Place.DRIVE
+    place = ChainPosition.DRIVE
     equation = "y = x − ramp(x − upper) + ramp(lower − x),  ramp(e) = (e + c)²/(4c) inside |e| < c, max(e, 0) outside"
     signature = "one-sided flattening at the end of the range"
     source = "output limits of high-voltage amplifiers"
@@ -52,7 +52,7 @@ class AmplifierSaturation(Effect):
                 "expected lower < upper"
             )
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return AmplifierSaturationBlock(self["lower"], self["upper"], self["corner"])
 
 

@@ -10,7 +10,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.held import HeldBlock
 from ...blocks.kernel import kernel
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 UNLIMITED = 1e9
@@ -27,7 +27,7 @@ class AmplifierSlewLimit(Effect):
 
     name = "amplifier_slew_limit"
     family = "amplifier"
-    place = Place.DRIVE
+    place = ChainPosition.DRIVE
     equation = "|dy/dt| ≤ S = I_max/C"
     signature = "triangles instead of fast large signals"
     source = "0.5 A into 20 µF: 25 V/ms behind the amplifier"
@@ -40,7 +40,7 @@ class AmplifierSlewLimit(Effect):
         slopes = extent.max_slew / 2.0 ** np.arange(1.0, 12.0, 0.5)  # a noise has a valley for every half octave
         return tuple(cls(S=float(slope)) for slope in slopes if slope > extent.span)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return AmplifierSlewLimitBlock(self["S"], setting.sample_period)
 
 

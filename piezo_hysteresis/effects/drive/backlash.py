@@ -8,7 +8,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.held import HeldBlock
 from ...blocks.kernel import kernel
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 FOUND_BY = (0.001, 0.002, 0.005, 0.01)
@@ -26,7 +26,7 @@ class Backlash(Effect):
 
     name = "backlash"
     family = "hysteresis"
-    place = Place.DRIVE
+    place = ChainPosition.DRIVE
     equation = "y_i = max(x_i − b, min(x_i + b, y_(i−1)))"
     signature = "a small-signal gain that drops below b; ARX fits at two noise amplitudes disagree"
     source = "play operator; 0.1–1 % of range"
@@ -37,7 +37,7 @@ class Backlash(Effect):
         """Off, and of several widths: a play wider than the steps of a noise does not act as its slope at 0 tells."""
         return cls(), *(cls(b=share * extent.span) for share in FOUND_BY)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return BacklashBlock(self["b"])
 
 

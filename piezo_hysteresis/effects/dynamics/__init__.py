@@ -1,1 +1,1 @@
-"""TODO."""
+"""Effects from w to the position of the stage."""

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from ...blocks.arx import ArxBlock, dc_gain_slopes
 from ...blocks.block import Array, Block
-from ...blocks.group_delay import LagBlock
-from ...blocks.softened_arx import SlowSoftenedBlock, SoftenedBlock, StaticSoftening
+from ...blocks.group_delay import GroupDelayBlock
+from ...blocks.softened_arx import SlowSoftenedBlock, SoftenedArxBlock, StaticSoftening
 from ...errors import ModelError, ParameterError
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from .softening import Softening
 
 LONGEST_DELAY = 1e6
@@ -48,7 +48,7 @@ class Arx(Effect):
 
     name = "arx"
     family = "dynamics"
-    place = Place.DYNAMICS
+    place = ChainPosition.DYNAMICS
     equation = "G(z) = z^(−d) (b1 + b2 z⁻¹ + …)/(1 + a1 z⁻¹ + …)"
     signature = "linear resonances and lag, the same at every amplitude"
     source = "paper, Eq. (4), (5)"
@@ -90,7 +90,7 @@ class Arx(Effect):
         denominator = np.polyval(np.concatenate(([1.0], self.array("a")))[::-1], z)
         return np.asarray(numerator / denominator * z ** self["delay"])
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         names = tuple(f"{self.name}.{n}" for n in self.free_names())
         softening = [t for t in terms if isinstance(t, Softening)]
         if len(softening) > 1:
@@ -103,9 +103,9 @@ class Arx(Effect):
             return fast
         (term,) = softening
         settled, path = StaticSoftening(term.name, term["k2"], term["k3"]), term.path(fast, self["delay"])
-        return SoftenedBlock(fast, settled, path) if slow is None else SlowSoftenedBlock(slow, fast, settled, path)
+        return SoftenedArxBlock(fast, settled, path) if slow is None else SlowSoftenedBlock(slow, fast, settled, path)
 
-    def _lag(self, names: tuple[str, ...], setting: Setting) -> LagBlock:
+    def _lag(self, names: tuple[str, ...], setting: Discretisation) -> GroupDelayBlock:
         """G in records slower than the model."""
         a, b, ratio = self.array("a"), self.array("b"), setting.model_period / setting.sample_period
         at_a, at_b = 1.0 + a.sum(), b.sum()
@@ -118,4 +118,4 @@ class Arx(Effect):
                 f"{LONGEST_DELAY:g}; B(1) or A(1) all but vanishes"
             )
         lag = max(0.0, ratio * self.group_delay)
-        return LagBlock(names, self.dc_gain, lag, dc_gain_slopes(a, b), lag_slopes)
+        return GroupDelayBlock(names, self.dc_gain, lag, dc_gain_slopes(a, b), lag_slopes)

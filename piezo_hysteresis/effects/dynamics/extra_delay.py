@@ -6,9 +6,9 @@ import numpy as np
 
 from ...blocks.arx import lagrange
 from ...blocks.block import Block
-from ...blocks.fir import TapsBlock
+from ...blocks.fir import FirBlock
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 
 
 class ExtraDelay(Effect):
@@ -28,13 +28,13 @@ class ExtraDelay(Effect):
 
     name = "extra_delay"
     family = "lag"
-    place = Place.DYNAMICS
+    place = ChainPosition.DYNAMICS
     equation = "y(t) = x(t − τ)"
     signature = "phase linear in frequency at every amplitude; below one sample not separable from the other lags"
     source = "Lagrange interpolation; conversion and transport times"
     parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-2, "dead time", "converters", 0.0, 2e-5),)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         samples = self["tau"] / setting.sample_period
         if setting.is_slow:
             first = int(samples)
@@ -43,4 +43,4 @@ class ExtraDelay(Effect):
         else:
             first = max(0, int(samples) - 1)
             taps, slopes = lagrange(samples - first - 1.0)
-        return TapsBlock(("extra_delay.tau",), first, taps, slopes[None, :] / setting.sample_period)
+        return FirBlock(("extra_delay.tau",), first, taps, slopes[None, :] / setting.sample_period)

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.linalg import expm, expm_frechet
 
 from ...blocks.block import Array, Block, State
-from ...blocks.fir import TapsBlock
+from ...blocks.fir import FirBlock
 from ...blocks.kernel import kernel
 from ...blocks.linear import AddedBlock
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 RESOLVED = 0.25
@@ -38,7 +38,7 @@ class ExtraResonance(Effect):
 
     name = "extra_resonance"
     family = "dynamics"
-    place = Place.DYNAMICS
+    place = ChainPosition.DYNAMICS
     equation = "y = x + r (q − x),  q̈/ω0² + 2 ζ q̇/ω0 + q = x,  ω0 = 2π f0"
     signature = "ringing at one frequency after steps, a peak in error over response"
     source = "modes of the structure, ζ 0.005–0.03"
@@ -52,14 +52,14 @@ class ExtraResonance(Effect):
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         return tuple(cls(f0=peak, zeta=0.02) for peak in extent.peaks)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         if self["f0"] * setting.sample_period <= RESOLVED:
             return ModeBlock(self["r"], self["f0"], self["zeta"], setting.sample_period)
         unit = 1.0 / (np.pi * self["f0"] * setting.sample_period)
         lag = self["r"] * self["zeta"] * unit
         by = (self["zeta"] * unit, -lag / self["f0"], self["r"] * unit)
         names = tuple(f"{self.name}.{p.name}" for p in self.parameters)
-        return TapsBlock(names, 0, np.array([1.0 - lag, lag]), np.outer(by, [-1.0, 1.0]))
+        return FirBlock(names, 0, np.array([1.0 - lag, lag]), np.outer(by, [-1.0, 1.0]))
 
 
 def oscillator(f0: float, zeta: float, sample_period: float) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 
 from ...blocks.mode_path import Path, WholePath
 from ...parameter import Parameter
-from ..effect import Place, Term
+from ..effect import ChainPosition, Term
 from ..extent import Extent
 
 FOUND_BY = (0.01, 0.03, 0.1)
@@ -31,7 +31,7 @@ class Softening(Term):
 
     name = "softening"
     family = "dynamics"
-    place = Place.DYNAMICS
+    place = ChainPosition.DYNAMICS
     host = "arx"
     twin = "sensor_nonlinearity"
     path: ClassVar[type[Path]] = WholePath

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Effects that add to the displacement from outside."""

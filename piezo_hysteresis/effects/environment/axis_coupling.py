@@ -7,7 +7,7 @@ import numpy as np
 from ...blocks.block import Array, Block
 from ...blocks.channel import ChannelBlock
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 
 
 class AxisCoupling(Effect):
@@ -27,7 +27,7 @@ class AxisCoupling(Effect):
 
     name = "axis_coupling"
     family = "disturbance"
-    place = Place.ENVIRONMENT
+    place = ChainPosition.ENVIRONMENT
     channel = "other_displacement"
     equation = "y = x + (κ0 + κ1 q) q"
     signature = "coherent with the displacement of the other axis, whatever this axis is driven with"
@@ -37,7 +37,7 @@ class AxisCoupling(Effect):
         Parameter("kappa1", "κ1", "1/m", 0.0, -1e5, 1e5, "change of coupling with position", "XY stages", 0.0, 100.0),
     )
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return AxisCouplingBlock(self["kappa0"], self["kappa1"])
 
 

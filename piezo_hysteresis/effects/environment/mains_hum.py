@@ -10,7 +10,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.time import TimeBlock
 from ...errors import ParameterError
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 
@@ -32,7 +32,7 @@ class MainsHum(Effect):
 
     name = "mains_hum"
     family = "disturbance"
-    place = Place.ENVIRONMENT
+    place = ChainPosition.ENVIRONMENT
     equation = "y = x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)]"
     signature = "a line that is unrelated to the drive and present at rest"
     source = "pick-up of the mains, 50 or 60 Hz and harmonics"
@@ -67,7 +67,7 @@ class MainsHum(Effect):
                 "expected equally many"
             )
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         names = tuple(f"mains_hum.{n}" for n in self.free_names())
         return MainsHumBlock(names, self["f"], self.array("cosine"), self.array("sine"), setting.sample_period)
 

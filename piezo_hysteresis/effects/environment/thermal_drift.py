@@ -9,7 +9,7 @@ import numpy as np
 from ...blocks.block import Array, Block
 from ...blocks.time import TimeBlock
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 
@@ -30,7 +30,7 @@ class ThermalDrift(Effect):
 
     name = "thermal_drift"
     family = "drift"
-    place = Place.ENVIRONMENT
+    place = ChainPosition.ENVIRONMENT
     equation = "y = x + D (1 − e^(−t/τ))"
     signature = "a function of absolute time only, the same in rest phases and under drive"
     source = "first-order warm-up of the stage; 0.1–1 µm/K, 1–60 min"
@@ -43,7 +43,7 @@ class ThermalDrift(Effect):
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         return tuple(cls(tau=max(1.0, share * extent.duration)) for share in (0.1, 0.4, 1.5))
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return ThermalDriftBlock(self["D"], self["tau"], setting.sample_period)
 
 

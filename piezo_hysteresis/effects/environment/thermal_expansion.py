@@ -9,7 +9,7 @@ import numpy as np
 from ...blocks.block import Array, Block
 from ...blocks.channel import ChannelBlock
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 
@@ -31,7 +31,7 @@ class ThermalExpansion(Effect):
     name = "thermal_expansion"
     entry = "thermal_drift"
     family = "drift"
-    place = Place.ENVIRONMENT
+    place = ChainPosition.ENVIRONMENT
     channel = "temperature"
     equation = "y = x + κ (T − T0)"
     signature = "follows the temperature, whatever the drive does"
@@ -48,7 +48,7 @@ class ThermalExpansion(Effect):
         """Switched off, about the mean temperature: far from it the expansion would be one with the sensor zero."""
         return (cls(T0=extent.temperature),)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return ThermalExpansionBlock(self["kappa"], self["T0"])
 
 

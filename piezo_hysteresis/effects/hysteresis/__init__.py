@@ -1,1 +1,1 @@
-"""TODO."""
+"""Effects from the actuator input v to the hysteresis output w."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...parameter import Parameter
-from ..effect import Place, Term
+from ..effect import ChainPosition, Term
 
 
 class AsymmetricHysteresis(Term):
@@ -23,7 +23,7 @@ class AsymmetricHysteresis(Term):
 
     name = "asymmetric_hysteresis"
     family = "hysteresis"
-    place = Place.HYSTERESIS
+    place = ChainPosition.HYSTERESIS
     host = "bouc_wen"
     equation = "dh = (dh of bouc_wen) + φ1 dv·h + φ2 |dv|·|h|"
     signature = "different curvature of the rising and the falling branch, at several turning levels"

@@ -9,7 +9,7 @@ from ...blocks.bouc_wen_kernel import LOOP, run_general, run_plain
 from ...blocks.bouc_wen_sensitivities import START, linearise_general, linearise_plain
 from ...errors import ParameterError
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 
 LOOP_OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5])
 
@@ -50,7 +50,7 @@ class BoucWen(Effect):
     The loop opens: at the same voltage, up and down differ.
 
     >>> import numpy as np
-    >>> block = BoucWen().block(Setting(1e-3, 1e-3))
+    >>> block = BoucWen().block(Discretisation(1e-3, 1e-3))
     >>> w, state = block.run(np.array([0.1, 0.2, 0.3, 0.2, 0.1]), block.rest(0.0, 0.0))
     >>> bool(w[4] > w[0])
     True
@@ -58,7 +58,7 @@ class BoucWen(Effect):
 
     name = "bouc_wen"
     family = "hysteresis"
-    place = Place.HYSTERESIS
+    place = ChainPosition.HYSTERESIS
     equation = "w = p1 v³ + p2 v + h;  dh = A dv − β|dv|h − γ dv|h|"
     signature = "rate-independent loops with one memory state, saturating at |A|/(β + γ sgn A)"
     source = "paper, Eq. (2), (3), (6); exact step for n = 1"
@@ -67,7 +67,7 @@ class BoucWen(Effect):
     def check(self) -> None:
         check_bounded(self)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return BoucWenBlock(self, setting, terms)
 
 
@@ -76,7 +76,7 @@ class BoucWenBlock(Block):
 
     keeps_state = True
 
-    def __init__(self, effect: Effect, setting: Setting, terms: tuple[Effect, ...] = ()) -> None:
+    def __init__(self, effect: Effect, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> None:
         self.sample_period, self.jump_period = setting.sample_period, setting.model_period
         self.p1, self.p2 = effect["p1"], effect["p2"]
         self.loop = LOOP_OFF.copy()

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block, MemorylessBlock
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 
 
 class EvenInputPolynomial(Effect):
@@ -22,7 +22,7 @@ class EvenInputPolynomial(Effect):
 
     name = "even_input_polynomial"
     family = "static"
-    place = Place.HYSTERESIS
+    place = ChainPosition.HYSTERESIS
     equation = "w + p_e v² + p_4 v⁴"
     signature = "loops that differ between the two signs of a bipolar drive; invisible on unipolar drive"
     source = "completes the odd polynomial of paper, Eq. (3), as its text asks for symmetric drives"
@@ -31,7 +31,7 @@ class EvenInputPolynomial(Effect):
         Parameter("p_4", "p_4", "1", 0.0, -1e2, 1e2, "fourth-power term", "paper, Sec. 2", 0.0, 0.05),
     )
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return EvenInputPolynomialBlock(self["p_e"], self["p_4"])
 
 

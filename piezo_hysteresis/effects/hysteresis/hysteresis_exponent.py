@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Self
 
 from ...parameter import Parameter
-from ..effect import Place, Term
+from ..effect import ChainPosition, Term
 from ..extent import Extent
 
 FOUND_BY = (1.3, 1.7)
@@ -27,7 +27,7 @@ class HysteresisExponent(Term):
 
     name = "hysteresis_exponent"
     family = "hysteresis"
-    place = Place.HYSTERESIS
+    place = ChainPosition.HYSTERESIS
     host = "bouc_wen"
     equation = "dh = A dv − (β |dv| h + γ dv |h|)·|h/h_ref|^(n−1),  h_ref = 0.2"
     signature = "loop shape that changes with amplitude, at four amplitudes or more"

@@ -10,7 +10,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.kernel import kernel
 from ...errors import ParameterError
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 SPAN = 32.0
@@ -37,7 +37,7 @@ class HysteresisMemory(Effect):
 
     name = "hysteresis_memory"
     family = "hysteresis"
-    place = Place.HYSTERESIS
+    place = ChainPosition.HYSTERESIS
     equation = "w + Σ_j c_j p_j,  p_j = max(v − r_j, min(v + r_j, p_j before))"
     signature = "errors in nested and decaying minor loops: return to the point where a loop was left"
     source = "Prandtl-Ishlinskii operator; Gu et al. 2016"
@@ -69,7 +69,7 @@ class HysteresisMemory(Effect):
         """Half widths of the plays [normalised], shape (any,)."""
         return self["reach"] * SPAN ** np.linspace(-1.0, 0.0, self.array("c").size)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         names = tuple(f"hysteresis_memory.c[{j}]" for j in range(self.array("c").size))
         return HysteresisMemoryBlock(names, self.array("c"), self.radii, self["virgin"])
 

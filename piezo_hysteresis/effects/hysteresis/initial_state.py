@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...parameter import Parameter
-from ..effect import Place, Term
+from ..effect import ChainPosition, Term
 
 
 class InitialState(Term):
@@ -17,7 +17,7 @@ class InitialState(Term):
 
     name = "initial_state"
     family = "hysteresis"
-    place = Place.HYSTERESIS
+    place = ChainPosition.HYSTERESIS
     host = "bouc_wen"
     equation = "h(0) = h0"
     signature = "an error at the start of a record only, gone after the first large swing; demagnetise first"

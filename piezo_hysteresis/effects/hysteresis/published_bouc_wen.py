@@ -7,7 +7,7 @@ import numpy as np
 from ...blocks.block import Array, Block, State
 from ...blocks.kernel import fma, kernel
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from .bouc_wen import MODIFIED_BOUC_WEN, check_bounded
 
 
@@ -29,7 +29,7 @@ class PublishedBoucWen(Effect):
 
     name = "published_bouc_wen"
     family = "hysteresis"
-    place = Place.HYSTERESIS
+    place = ChainPosition.HYSTERESIS
     equation = "w_i = p1 v_i³ + p2 v_i + h_i;  h_i = h_(i−1) + A Δv − β|Δv||h|^(n−1)h − γ Δv|h|^n"
     signature = "as bouc_wen, but dependent on the sample rate"
     source = "paper, Eq. (6), (7); exponent of Eq. (2)"
@@ -43,7 +43,7 @@ class PublishedBoucWen(Effect):
     def check(self) -> None:
         check_bounded(self)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return PublishedBlock(self)
 
 

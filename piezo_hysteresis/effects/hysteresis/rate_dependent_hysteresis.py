@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Self
 
 from ...parameter import Parameter
-from ..effect import Place, Term
+from ..effect import ChainPosition, Term
 from ..extent import Extent
 
 FOUND_BY = (-0.03, 0.03)
@@ -33,7 +33,7 @@ class RateDependentHysteresis(Term):
 
     name = "rate_dependent_hysteresis"
     family = "hysteresis"
-    place = Place.HYSTERESIS
+    place = ChainPosition.HYSTERESIS
     host = "bouc_wen"
     equation = "A_eff = A [1 + k ((|v̇|/v0)^a − 1)/a]"
     signature = "an error of the sign of h that grows with frequency and amplitude, and collapses on |v̇|"

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Effects of the material on w: creep."""

@@ -10,7 +10,7 @@ from ...blocks.block import Array, Block
 from ...blocks.relaxation import RelaxationBlock
 from ...errors import ParameterError
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 REFERENCE_TIME = 0.1
@@ -39,7 +39,7 @@ class Creep(Effect):
     --------
     Ten times longer after a step, γ more:
 
-    >>> block = Creep(gamma=0.02).block(Setting(1e-2, 1e-2))
+    >>> block = Creep(gamma=0.02).block(Discretisation(1e-2, 1e-2))
     >>> y, _ = block.run(np.ones(1001), block.rest(0.0, 0.0))
     >>> round(float(y[1000] - y[100]), 4)
     0.02
@@ -47,7 +47,7 @@ class Creep(Effect):
 
     name = "creep"
     family = "creep"
-    place = Place.MATERIAL
+    place = ChainPosition.MATERIAL
     equation = "y = w + γ Σ_j ½ (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w;  after a step: 1 + γ log10(t/0.1 s)"
     signature = (
         "grows with log t after each change of level; on sines a gain falling linearly in log f at constant phase"
@@ -96,7 +96,7 @@ class Creep(Effect):
         decades = np.log10(self["tau_max"] / self["tau_min"])
         return self["tau_min"] * 10.0 ** (np.arange(int(PER_DECADE * decades + 1e-9) + 1) / PER_DECADE)
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         tau = self.tau
         weights = np.full(tau.size, 1.0 / PER_DECADE)
         by_gamma = settled_mix(tau, weights)

@@ -8,10 +8,10 @@ import numpy as np
 
 from ...blocks.block import Array, Block, State
 from ...blocks.linear import AddedBlock
-from ...blocks.low_pass import PoleBlock
+from ...blocks.low_pass import LowPassBlock
 from ...errors import ParameterError
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 FASTEST = 5e-3
@@ -32,7 +32,7 @@ class CreepExponential(Effect):
     name = "creep_exponential"
     entry = "creep"
     family = "creep"
-    place = Place.MATERIAL
+    place = ChainPosition.MATERIAL
     equation = "Y/W = 1 + Σ_k c_k/(1 + τ_k s)"
     signature = "grows after each change of level and ends after some τ, unlike logarithmic creep"
     source = "Croft, Shed, Devasia 2001, Kelvin-Voigt creep"
@@ -54,7 +54,7 @@ class CreepExponential(Effect):
                 "tau, expected equally many"
             )
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         names = tuple(f"creep_exponential.{n}" for n in self.free_names())
         return CreepExponentialBlock(names, self.array("c"), self.array("tau"), setting.sample_period)
 
@@ -66,7 +66,7 @@ class CreepExponentialBlock(AddedBlock):
 
     def __init__(self, names: tuple[str, ...], c: Array, tau: Array, sample_period: float) -> None:
         self.names, self.c = names, c
-        self.poles = tuple(PoleBlock("", float(t), 1, sample_period) for t in tau)
+        self.poles = tuple(LowPassBlock("", float(t), 1, sample_period) for t in tau)
         self.gain = float(c.sum())
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 from ...blocks.block import Block
 from ...blocks.relaxation import RelaxationBlock
 from ...parameter import Parameter
-from ..effect import Effect, Setting
+from ..effect import Discretisation, Effect
 from .creep import PER_DECADE, REFERENCE_TIME, Creep, settled_mix
 
 
@@ -31,7 +31,7 @@ class CreepFractional(Creep):
     --------
     >>> from .creep import Creep
     >>> u = np.ones(100)
-    >>> blocks = [e.block(Setting(1e-2, 1e-2)) for e in (Creep(gamma=0.02), CreepFractional(gamma=0.02))]
+    >>> blocks = [e.block(Discretisation(1e-2, 1e-2)) for e in (Creep(gamma=0.02), CreepFractional(gamma=0.02))]
     >>> log, power = (b.run(u, b.rest(0.0, 0.0))[0] for b in blocks)
     >>> bool(np.array_equal(log, power))
     True
@@ -61,7 +61,7 @@ class CreepFractional(Creep):
         *Creep.parameters[1:],
     )
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         tau = self.tau
         ratio = tau / REFERENCE_TIME
         weights = ratio ** self["exponent"] / PER_DECADE

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Effects of the displacement sensor."""

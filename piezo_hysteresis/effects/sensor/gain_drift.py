@@ -9,7 +9,7 @@ import numpy as np
 from ...blocks.block import Array, Block
 from ...blocks.time import TimeBlock
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 
 
@@ -30,7 +30,7 @@ class GainDrift(Effect):
 
     name = "gain_drift"
     family = "drift"
-    place = Place.SENSOR
+    place = ChainPosition.SENSOR
     equation = "y = x [1 + g (1 − e^(−t/τ))]"
     signature = "an error proportional to the displacement that grows with time: repeat the first triangle at the end"
     source = "first-order warm-up; 0.05–0.5 %/K"
@@ -43,7 +43,7 @@ class GainDrift(Effect):
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         return tuple(cls(tau=max(1.0, share * extent.duration)) for share in (0.1, 0.4, 1.5))
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return GainDriftBlock(self["g"], self["tau"], setting.sample_period)
 
 

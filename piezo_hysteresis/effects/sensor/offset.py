@@ -6,7 +6,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block, State
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 
 
 class Offset(Effect):
@@ -26,7 +26,7 @@ class Offset(Effect):
 
     Examples
     --------
-    >>> block = Offset(y0=1e-6, settling=0.1).block(Setting(1e-3, 1e-3))
+    >>> block = Offset(y0=1e-6, settling=0.1).block(Discretisation(1e-3, 1e-3))
     >>> y, _ = block.run(np.array([1e-5, 2e-5]), block.rest(1e-5, 0.0))
     >>> [round(float(v), 12) for v in y]
     [1.2e-05, 2.2e-05]
@@ -34,7 +34,7 @@ class Offset(Effect):
 
     name = "offset"
     family = "sensor"
-    place = Place.ENVIRONMENT
+    place = ChainPosition.ENVIRONMENT
     equation = "y = x + y0 + r x_rest"
     signature = "a constant in every record"
     source = "definition of the sensor's zero"
@@ -43,7 +43,7 @@ class Offset(Effect):
         Parameter("settling", "r", "1", 0.0, -0.5, 0.5, "settling at rest beyond the model", "definition", 0.0, 0.01),
     )
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return OffsetBlock(self["y0"], self["settling"])
 
 

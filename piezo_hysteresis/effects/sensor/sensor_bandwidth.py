@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from ...blocks.block import Block
-from ...blocks.low_pass import PoleBlock
+from ...blocks.low_pass import LowPassBlock
 from ...errors import ParameterError
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 
 
 class SensorBandwidth(Effect):
@@ -22,7 +22,7 @@ class SensorBandwidth(Effect):
 
     name = "sensor_bandwidth"
     family = "lag"
-    place = Place.SENSOR
+    place = ChainPosition.SENSOR
     equation = "Y/X = 1/(1 + τ s)^n"
     signature = "lag and roll-off of everything measured; below one sample not separable from the other lags"
     source = "bandwidth settings of capacitive sensors: 50 Hz, 500 Hz, 5 kHz"
@@ -35,5 +35,5 @@ class SensorBandwidth(Effect):
         if self["poles"] != int(self["poles"]):
             raise ParameterError(f"sensor_bandwidth.poles: got {self['poles']:g}, expected a whole number")
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
-        return PoleBlock("sensor_bandwidth.tau", self["tau"], int(self["poles"]), setting.sample_period)
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
+        return LowPassBlock("sensor_bandwidth.tau", self["tau"], int(self["poles"]), setting.sample_period)

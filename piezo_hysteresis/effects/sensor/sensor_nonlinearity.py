@@ -6,7 +6,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block, MemorylessBlock
 from ...parameter import Parameter
-from ..effect import Effect, Place, Setting
+from ..effect import ChainPosition, Discretisation, Effect
 
 
 class SensorNonlinearity(Effect):
@@ -27,7 +27,7 @@ class SensorNonlinearity(Effect):
 
     name = "sensor_nonlinearity"
     family = "static"
-    place = Place.SENSOR
+    place = ChainPosition.SENSOR
     equation = "y = x + s2 x² + s3 x³"
     signature = "harmonics of the position itself, also at the resonance; on unipolar drive absorbed by p1 and p2"
     source = "capacitive sensors 0.02–0.1 %, strain gauges 0.1–1 %"
@@ -36,7 +36,7 @@ class SensorNonlinearity(Effect):
         Parameter("s3", "s3", "1", 0.0, -1.0, 1.0, "cubic term", "sensor data sheets", 0.0, 0.01),
     )
 
-    def block(self, setting: Setting, terms: tuple[Effect, ...] = ()) -> Block:
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return SensorNonlinearityBlock(self["s2"], self["s3"])
 
 

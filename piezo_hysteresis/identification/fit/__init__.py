@@ -1,1 +1,1 @@
-"""TODO."""
+"""Least squares in free run: the joint fit and its covariance."""

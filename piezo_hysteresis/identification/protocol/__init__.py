@@ -1,1 +1,1 @@
-"""TODO."""
+"""What is played to a stage: waveforms, limits, phases."""

@@ -1,4 +1,4 @@
-"""`Phase` and `Protocol`: what will be played to a stage, in which order, and how it will be stored."""
+"""`ProtocolPhase` and `Protocol`: what will be played to a stage, in which order, and how it will be stored."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CORNERED = 1e-4
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Phase:
+class ProtocolPhase:
     """One waveform of a protocol.
 
     Parameters
@@ -99,7 +99,7 @@ class Protocol:
 
     name: str
     limits: DriveLimits
-    phases: tuple[Phase, ...]
+    phases: tuple[ProtocolPhase, ...]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "phases", tuple(self.phases))
@@ -108,7 +108,7 @@ class Protocol:
         for phase in self.phases:
             self.limits.check(phase.voltage, f"phase '{phase.name}'")
 
-    def __iter__(self) -> Iterator[Phase]:
+    def __iter__(self) -> Iterator[ProtocolPhase]:
         return iter(self.phases)
 
     def __len__(self) -> int:
@@ -131,12 +131,12 @@ class _Plan:
     """Collects phases made from the shapes of `excitation`."""
 
     def __init__(self, limits: DriveLimits, seed: int) -> None:
-        self.limits, self.seed, self.phases = limits, seed, list[Phase]()
+        self.limits, self.seed, self.phases = limits, seed, list[ProtocolPhase]()
 
     def add(self, name: str, body: Samples, stored_period: float = 0.0) -> None:
         """Append a phase, stored at most as slowly as `stored_period` [s]."""
         every = max(1, int(stored_period / self.limits.sample_period + 1e-9))
-        self.phases.append(Phase(name, self.limits.from_safe_to_safe(body), self.limits.sample_period, every))
+        self.phases.append(ProtocolPhase(name, self.limits.from_safe_to_safe(body), self.limits.sample_period, every))
 
     def next_seed(self) -> int:
         self.seed += 1

@@ -1,1 +1,1 @@
-"""TODO."""
+"""What each record of an experiment is good for."""

@@ -19,13 +19,13 @@ LONGEST = 0.5
 """Share of a record that may be given up for it."""
 
 
-def lead_in(record: Record) -> int:
+def conditioning_length(record: Record) -> int:
     """Samples until the drive has been at both ends of its range; 0 where too few would be left.
 
     Examples
     --------
     >>> drive = np.sin(2 * np.pi * np.arange(1000) / 200)
-    >>> 140 < lead_in(Record(drive, drive, 1e-3)) < 150
+    >>> 140 < conditioning_length(Record(drive, drive, 1e-3)) < 150
     True
     """
     u = record.voltage
@@ -44,16 +44,16 @@ def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice,
     experiment : Experiment
         The same samples.
     notices : tuple of Notice
-        ``lead_in`` where a record was cut.
+        ``conditioning_length`` where a record was cut.
     """
     records: list[Record] = []
     notices: list[Notice] = []
     for record in experiment:
-        samples = lead_in(record) if record.truncated and record.phase not in CARRYING else 0
+        samples = conditioning_length(record) if record.truncated and record.phase not in CARRYING else 0
         if samples:
             records.append(replace(record[:samples], phase=CARRYING[0]))
             record = replace(record[samples:], truncated=False, initial_voltage=None)
             told = f"begins in an unknown state: its first {samples} samples, up to a full loop, only carry the state"
-            notices.append(Notice("lead_in", told, record.phase))
+            notices.append(Notice("conditioning_length", told, record.phase))
         records.append(record)
     return replace(experiment, records=tuple(records)), tuple(notices)

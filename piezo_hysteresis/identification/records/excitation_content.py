@@ -1,4 +1,4 @@
-"""`Content`: what a record can teach, judged from its drive: loops, dynamics, noise."""
+"""`ExcitationContent`: what a record can teach, judged from its drive: loops, dynamics, noise."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ GAUSSIAN = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
-class Content:
+class ExcitationContent:
     """What the drive of a record excites, and how quiet its sensor is.
 
     Parameters
@@ -60,19 +60,19 @@ class Content:
         return self.bandwidth <= SLOW
 
 
-def content_of(record: Record) -> Content:
+def excitation_content(record: Record) -> ExcitationContent:
     """Judge a record by the spectrum of its dv/dt and the noise of its displacement."""
     span = float(np.ptp(np.append(record.voltage, record.settled_voltage)))
     spectrum = _excitation(np.diff(record.voltage), span)
     power = np.abs(spectrum) ** 2
     total = float(power.sum())
     if total == 0.0:
-        return Content(span, 0.0, 0, 0.0, noise_of(record))
+        return ExcitationContent(span, 0.0, 0, 0.0, noise_of(record))
     speed = np.fft.irfft(spectrum, record.size - 1)
     frequency = np.arange(power.size) / (speed.size * record.sample_period)
     bandwidth = float(frequency[np.searchsorted(np.cumsum(power), MARKED * total)])
     lines = int(np.searchsorted(np.cumsum(np.sort(power)[::-1]), MARKED * total)) + 1
-    return Content(span, bandwidth, lines, min(_spread(speed), _spread(np.diff(speed))), noise_of(record))
+    return ExcitationContent(span, bandwidth, lines, min(_spread(speed), _spread(np.diff(speed))), noise_of(record))
 
 
 def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:

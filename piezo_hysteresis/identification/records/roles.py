@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ...errors import RecordError
 from ...record import Experiment
-from .excitation_content import Content, content_of
+from .excitation_content import ExcitationContent, excitation_content
 
 HELD_OUT = ("validation",)
 """Phases that are not fitted, unless told otherwise."""
@@ -35,7 +35,7 @@ class Roles:
         Records at the fastest sample period whose drive determines linear dynamics.
     """
 
-    contents: tuple[Content, ...]
+    contents: tuple[ExcitationContent, ...]
     fitted: tuple[int, ...]
     held_out: tuple[int, ...]
     loops: tuple[int, ...]
@@ -61,7 +61,7 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
     for phase in held_out:
         if phase not in HELD_OUT and not experiment.named(phase):
             raise RecordError(f"held_out: got phase '{phase}', expected some of {names}")
-    contents = tuple(content_of(r) for r in experiment)
+    contents = tuple(excitation_content(r) for r in experiment)
     named = {phase: experiment.named(phase) for phase in (*held_out, *CARRYING)}
 
     def is_one_of(index: int, phases: Collection[str]) -> bool:

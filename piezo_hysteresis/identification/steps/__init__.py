@@ -1,1 +1,1 @@
-"""TODO."""
+"""The steps of the published method and what replaces them where data are missing."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.signal import lfilter
 
-from ...effects import Arx, Setting
+from ...effects import Arx, Discretisation
 from ...errors import IdentificationError, ParameterError
 from ...record import Notice, Samples
 from .regressors import Signals, triangle
@@ -65,7 +65,7 @@ class Dynamics:
 
     def simulate(self, u: Samples) -> Samples:
         """Free-run output for the input `u`, starting settled at its first value, shape (n,)."""
-        block = self.arx.block(Setting(self.sample_period, self.sample_period))
+        block = self.arx.block(Discretisation(self.sample_period, self.sample_period))
         y, _ = block.run(u, block.rest(float(u[0]), 0.0))
         return y
 

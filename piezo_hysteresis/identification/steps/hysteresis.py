@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 from scipy.optimize import least_squares
 
-from ...effects import Arx, BoucWen, PublishedBoucWen, Setting
+from ...effects import Arx, BoucWen, Discretisation, PublishedBoucWen
 from ...errors import IdentificationError
 from ...model.model import Model
 from ...record import Record, Samples
@@ -106,7 +106,7 @@ def _thinned(loop: Loop, points: int) -> Loop:
 
 def _state(loops: Sequence[Loop], beta: float, gamma: float) -> list[Samples]:
     """State g of every loop for A = 1."""
-    block = BoucWen(A=1.0, beta=beta, gamma=gamma, p1=0.0, p2=0.0).block(Setting(1.0, 1.0))
+    block = BoucWen(A=1.0, beta=beta, gamma=gamma, p1=0.0, p2=0.0).block(Discretisation(1.0, 1.0))
     state, result = None, []
     for loop in loops:
         if state is None or not loop.continues:

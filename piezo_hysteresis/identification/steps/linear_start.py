@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from ...effects import Arx, Place
+from ...effects import Arx, ChainPosition
 from ...errors import IdentificationError
 from ...model.model import Model
 from ...record import Record
@@ -26,7 +26,7 @@ FEW_ITERATIONS = 3
 
 def hysteresis_signals(model: Model, records: Sequence[Record], wanted: Collection[int]) -> Signals:
     """(w, y) of the records `wanted`: hysteresis output of the model, and normalised displacement."""
-    before = tuple(e for e in model.effects if e.place < Place.DYNAMICS)
+    before = tuple(e for e in model.effects if e.place < ChainPosition.DYNAMICS)
     alone = Model(before, model.sample_period, model.voltage_scale)
     kept = carried(records, wanted)
     outputs = dict(zip(kept, alone.simulate([records[i] for i in kept]), strict=True))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...record import Notice
 from ..fit.fit import Fit
-from ..records.excitation_content import Content
+from ..records.excitation_content import ExcitationContent
 from .linear_start import dynamics_of
 
 ONE_FREQUENCY = 4
@@ -31,7 +31,7 @@ def lag(fit: Fit) -> tuple[float, float]:
     return value, float(np.sqrt(max(variance, 0.0)))
 
 
-def lag_notices(fit: Fit, contents: Sequence[Content]) -> tuple[Notice, ...]:
+def lag_notices(fit: Fit, contents: Sequence[ExcitationContent]) -> tuple[Notice, ...]:
     """Notices ``lag_only``, and ``one_frequency`` where lag and hysteresis cannot be told apart.
 
     Parameters

@@ -1,1 +1,1 @@
-"""TODO."""
+"""The driver node."""

@@ -9,7 +9,7 @@ from std_srvs.srv import Trigger
 
 from ...acquisition.session import DriverSession
 from ...errors import PiezoError, StageError
-from ..messages.conversions import from_stamp
+from ..messages.conversions import from_stamp, waveform_from_cloud
 from ..messages.phase_text import phase_name
 from ..runtime.node_clock import now
 from ..runtime.qos import COMMAND
@@ -59,7 +59,8 @@ class DriverCommands:
             stamp = from_stamp(cloud.header.stamp)
             session, topics = self._stage()
             name = phase_name(cloud.header.frame_id)
-            waveform = session.check.waveform(cloud, now(self._node))
+            voltage = waveform_from_cloud(cloud, session.sample_period)
+            waveform = session.check.waveform(voltage, stamp, now(self._node))
             phase = session.streaming.play(waveform, name, stamp, session.check.first_step, topics.accepted)
         except PiezoError as error:
             self._refuse(name, stamp, error)

@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from ...acquisition.streaming import Acquisition
+from ...acquisition.streaming import StreamingAcquisition
 from ..messages.conversions import diagnostic
 from ..runtime.sending import send
 
@@ -27,7 +27,7 @@ class DriverDiagnostics:
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: stage"
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._state = (DiagnosticStatus.STALE, "not configured", "")
-        self._acquisition: Acquisition | None = None
+        self._acquisition: StreamingAcquisition | None = None
         self._target = 0.0
         self._seen = (time.monotonic(), 0, 0.0, 0.0)
         self.refused = 0
@@ -38,7 +38,7 @@ class DriverDiagnostics:
         self._state = (level, message, stage)
         self.publish()
 
-    def watch(self, acquisition: Acquisition | None, rate: float = 0.0) -> None:
+    def watch(self, acquisition: StreamingAcquisition | None, rate: float = 0.0) -> None:
         """Tell the figures of an acquisition that shall reach a rate [samples per s]; None ends it."""
         self._acquisition, self._target = acquisition, rate
         self._seen = (time.monotonic(), 0, 0.0, 0.0)

@@ -8,14 +8,15 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
 
-from ...acquisition.drive import Event, Happening, Phase
+from ...acquisition.drive import Event, EventKind, Phase
+from ...acquisition.sample_block import SampleBlock
 from ...acquisition.streaming import Delivery
 from ..messages.conversions import diagnostic, live, to_stamp
-from ..messages.samples import SampleBlock, SampleWriter
+from ..messages.samples import SampleWriter
 from ..runtime.qos import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
 from ..runtime.sending import is_heard, send
 
-_STATES = {Happening.BEGAN: "playing", Happening.DONE: "done", Happening.STOPPED: "stopped"}
+_STATES = {EventKind.BEGAN: "playing", EventKind.DONE: "done", EventKind.STOPPED: "stopped"}
 
 
 class DriverTopics:
@@ -62,8 +63,8 @@ class DriverTopics:
 
     def deliver(self, delivery: Delivery) -> None:
         """Publish a block: phases that begin in it first, commands that end in it last."""
-        begun = [e for e in delivery.events if e.happening is Happening.BEGAN]
-        ended = [e for e in delivery.events if e.happening is not Happening.BEGAN]
+        begun = [e for e in delivery.events if e.happening is EventKind.BEGAN]
+        ended = [e for e in delivery.events if e.happening is not EventKind.BEGAN]
         for event in begun:
             send(self._phase, String(data=str(event.phase)))
             self._tell(event, delivery.first)
@@ -93,9 +94,9 @@ class DriverTopics:
         phase = event.phase
         if not phase.commanded:
             return
-        if event.happening is Happening.BEGAN:
+        if event.happening is EventKind.BEGAN:
             self._first = {phase.number: first + event.offset}
-        level = DiagnosticStatus.WARN if event.happening is Happening.STOPPED else DiagnosticStatus.OK
+        level = DiagnosticStatus.WARN if event.happening is EventKind.STOPPED else DiagnosticStatus.OK
         state = _STATES[event.happening]
         began = self._first.get(phase.number, first + event.offset)
         self._publish_status(level, phase.name, state, state, phase.stamp, phase.number, began)

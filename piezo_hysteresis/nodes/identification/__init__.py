@@ -1,1 +1,1 @@
-"""TODO."""
+"""The identification node."""

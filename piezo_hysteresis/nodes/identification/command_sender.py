@@ -10,7 +10,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
-from ...identification.protocol.protocol import Phase
+from ...identification.protocol.protocol import ProtocolPhase
 from ..messages.conversions import command_to_cloud
 from ..runtime.qos import COMMAND
 from ..runtime.sending import is_taken_by, send
@@ -38,12 +38,12 @@ class CommandSender:
         """Whether the node `driver` of this namespace takes what is sent; a recorder alone plays nothing."""
         return is_taken_by(driver, self._node, self._publisher)
 
-    def send(self, phase: Phase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
+    def send(self, phase: ProtocolPhase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
         """Send a phase, stamped when it is packed and leaves: its age shall be that of its way.
 
         Parameters
         ----------
-        phase : Phase
+        phase : ProtocolPhase
         leaving : callable
             Called with the stamp before the message is published, in the thread.
         lost : callable
@@ -62,7 +62,7 @@ class CommandSender:
             self._publisher.wait_for_all_acked(Duration(seconds=_LONGEST_WAY))
             self._thread = None
 
-    def _send(self, phase: Phase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
+    def _send(self, phase: ProtocolPhase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
         cloud = command_to_cloud(phase.voltage, phase.sample_period, phase.name)
         if self._called_off.is_set():
             return

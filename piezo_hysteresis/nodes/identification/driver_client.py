@@ -1,4 +1,4 @@
-"""`DriverLink`: the driver as seen from the identification node: its limits, its voltage, commands and their fate."""
+"""`DriverClient`: the driver as seen from the identification node: its limits, its voltage, commands and their fate."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger
 
 from ...errors import PiezoError
 from ...identification.protocol.drive_limits import DriveLimits
-from ...identification.protocol.protocol import Phase
+from ...identification.protocol.protocol import ProtocolPhase
 from ..messages.conversions import values_of
 from ..runtime.qos import COMMAND, COMMAND_STATUS
 from .command_sender import CommandSender
@@ -27,7 +27,7 @@ _SAFE_WITHIN = 5e-3
 """Distance from the safe voltage that counts as there [V]: converters round, measured voltages are noisy."""
 
 
-class DriverLink:
+class DriverClient:
     """Asks the driver for what is in force, sends it phases, and follows what becomes of them.
 
     Parameters
@@ -82,7 +82,7 @@ class DriverLink:
             and abs(self._newest - self.limits.safe_voltage) <= _SAFE_WITHIN
         )
 
-    def send(self, phase: Phase) -> None:
+    def send(self, phase: ProtocolPhase) -> None:
         """Send a phase as a command, without waiting until it has left."""
         self._sent, self.state, self.reason = None, "sending", ""
 

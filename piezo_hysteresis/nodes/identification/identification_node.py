@@ -21,12 +21,13 @@ from ...identification.protocol.protocol import Protocol, paper, rich, short
 from ...model.model import Model
 from ...model.model_file import dumps, loads, save
 from ...model.model_parameters import PREFIX
+from ...parameter import Row, Setting
 from ...recording.segmentation.decimation import save_decimation
-from ..runtime.parameters import Row, Setting, declare, read
+from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..runtime.qos import LATCHED
 from ..runtime.sending import send
-from .driver_client import DriverLink
+from .driver_client import DriverClient
 from .fit_process import FitProcess, Job, diagnosis, identification
 from .protocol_runner import Progress, campaign
 from .served_model import ServedModel
@@ -58,7 +59,7 @@ class IdentificationNode(Node):
         super().__init__("identification_node", allow_undeclared_parameters=True)
         declare(self, IDENTIFICATION)
         self._status = IdentificationStatus(self)
-        self._driver = DriverLink(self, self._value("driver"))
+        self._driver = DriverClient(self, self._value("driver"))
         self._models = self.create_publisher(String, "model", LATCHED)
         self._job: Generator[Progress] | None = None
         self._last: Path | None = None

@@ -11,9 +11,9 @@ from rclpy.node import Node
 
 from ...errors import StageError
 from ...identification.protocol.drive_limits import DriveLimits
-from ...identification.protocol.protocol import Phase, Protocol
+from ...identification.protocol.protocol import Protocol, ProtocolPhase
 from .bag_recorder import BagRecorder
-from .driver_client import DriverLink
+from .driver_client import DriverClient
 
 PATIENCE = 30.0
 """Longest wait for the driver, for an answer, and for samples [s]."""
@@ -42,7 +42,7 @@ class Progress:
 
 
 def campaign(
-    node: Node, driver: DriverLink, plan: Callable[[DriveLimits], Protocol], path: Path
+    node: Node, driver: DriverClient, plan: Callable[[DriveLimits], Protocol], path: Path
 ) -> Generator[Progress]:
     """Play and record a protocol; to be resumed at short intervals until it ends.
 
@@ -52,7 +52,7 @@ def campaign(
     ----------
     node : rclpy.node.Node
         The identification node.
-    driver : DriverLink
+    driver : DriverClient
         The stage.
     plan : callable
         Makes the protocol for the limits of the driver.
@@ -107,7 +107,7 @@ def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Generat
         yield Progress("waiting", f"for {missing()}")
 
 
-def _play(driver: DriverLink, recorder: BagRecorder, phase: Phase, told: Progress) -> Generator[Progress]:
+def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, told: Progress) -> Generator[Progress]:
     driver.send(phase)
     # a device that plays from its memory is silent meanwhile
     longest_silence = PATIENCE + 2.0 * phase.duration

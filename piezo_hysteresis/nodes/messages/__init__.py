@@ -1,1 +1,1 @@
-"""TODO."""
+"""Arrays to ROS messages and back."""

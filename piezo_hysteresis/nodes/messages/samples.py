@@ -1,15 +1,14 @@
-"""`SampleBlock`: consecutive samples of a stage, and its way into and out of messages."""
+"""Messages of `samples` and `predicted_samples`: a `SampleBlock` on its way into and out of them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
+from ...acquisition.sample_block import SampleBlock
 from ...errors import RecordError
 from .cloud import to_cloud
 from .cloud_stream import CloudReader, CloudWriter, Columns, read_cloud
@@ -33,63 +32,6 @@ _END_OF_TIME = 2**31
 
 _LARGEST = {"voltage": 1e4, "displacement": 1.0}
 """What no piezo stage is driven with [V], and no piezo stage moves [m]."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class SampleBlock:
-    """Consecutive samples of a stage, as one message of `samples`.
-
-    Parameters
-    ----------
-    stamp : int
-        Time of the first sample on the driver's clock [ns].
-    time : (n,) ndarray of float64
-        Time of every sample since the stamp [s].
-    voltage : (n,) ndarray of float64
-        Drive voltage before the amplifier [V].
-    displacement : (n,) ndarray of float64
-        Measured displacement [m].
-    index : (n,) ndarray of uint32
-        Running number of the sample, modulo 2^32.
-    phase : (n,) ndarray of uint32
-        Number of the phase.
-    stage : str
-        Name of the stage.
-    follows_gap : bool
-        True where samples before the block were never measured (a device reading out its memory), as told by the
-        index; False where a jump of the index means lost messages.
-    """
-
-    stamp: int
-    time: Samples
-    voltage: Samples
-    displacement: Samples
-    index: NDArray[np.uint32]
-    phase: NDArray[np.uint32]
-    stage: str = ""
-    follows_gap: bool = False
-
-    @property
-    def size(self) -> int:
-        """Number of samples."""
-        return int(self.time.size)
-
-    @property
-    def columns(self) -> dict[str, NDArray]:
-        """Arrays by field name of `SAMPLES`."""
-        return {name: getattr(self, name) for name in SAMPLES}
-
-    def after(self, count: int) -> SampleBlock:
-        """Without its first samples."""
-        if count == 0:
-            return self
-        kept: dict[str, Any] = {name: values[count:] for name, values in self.columns.items()}
-        return replace(self, **kept)
-
-    @property
-    def sample_period(self) -> float | None:
-        """Time between samples [s]; None for a block of one."""
-        return float(self.time[-1] - self.time[0]) / (self.size - 1) if self.size > 1 else None
 
 
 def samples_to_cloud(block: SampleBlock) -> PointCloud2:

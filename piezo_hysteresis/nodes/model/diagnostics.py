@@ -9,11 +9,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from ...acquisition.sample_block import SampleBlock
 from ...model.model import Model
 from ...model.model_parameters import model_hash
 from ...online.predictor import Predictor
 from ..messages.conversions import diagnostic
-from ..messages.samples import SampleBlock
 from ..runtime.sending import send
 
 _LONGEST_REASON = 500

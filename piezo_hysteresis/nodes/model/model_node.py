@@ -13,16 +13,17 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from ...acquisition.sample_block import SampleBlock
 from ...errors import ModelError, PiezoError, RecordError
 from ...model.model import Model
 from ...model.model_file import load, loads
 from ...online.predictor import Predictor
 from ...online.warmup import compile_kernels
-from ...parameter import Parameter
+from ...parameter import Parameter, Row, Setting
 from ...recording.table.time_column import round_period
-from ..messages.samples import SampleBlock, SampleReader
+from ..messages.samples import SampleReader
 from ..runtime.node_clock import now
-from ..runtime.parameters import Row, Setting, declare, read
+from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..runtime.qos import DEEP, LATCHED
 from .diagnostics import ModelDiagnostics

@@ -7,11 +7,12 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64
 
+from ...acquisition.sample_block import SampleBlock
 from ...model.model import Model
 from ...model.model_parameters import hash_number
 from ...online.predictor import Prediction, Predictor
 from ..messages.conversions import live, to_stamp
-from ..messages.samples import PredictionWriter, SampleBlock
+from ..messages.samples import PredictionWriter
 from ..runtime.qos import COMMAND, SAMPLES
 from ..runtime.sending import is_heard, send
 

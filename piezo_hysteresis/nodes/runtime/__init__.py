@@ -1,1 +1,1 @@
-"""TODO."""
+"""What every node process needs: parameters, quality of service, executor, life of the process."""

@@ -4,47 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.node import Node
 
-from ...errors import ParameterError
-from ...parameter import Parameter
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """A ROS parameter that is no physical quantity: a word, a path, a switch, a number of something.
-
-    Parameters
-    ----------
-    name : str
-        Name of the ROS parameter.
-    value : str, bool or int
-        Default.
-    meaning : str
-        One line for its description.
-    choices : tuple of str
-        The words that are accepted; any where empty.
-    """
-
-    name: str
-    value: str | bool | int
-    meaning: str
-    choices: tuple[str, ...] = ()
-
-    def check(self, value: object, prefix: str = "") -> str | bool | int:
-        """Return `value` if it is one of the choices and of the type of the default; ParameterError otherwise."""
-        if type(value) is not type(self.value):
-            raise ParameterError(f"{prefix}{self.name}: got {value!r}, expected a {type(self.value).__name__}")
-        if self.choices and value not in self.choices:
-            raise ParameterError(f"{prefix}{self.name}: got {value!r}, expected one of {', '.join(self.choices)}")
-        return value
-
-
-Row = Parameter | Setting
+from ...parameter import Row, Setting
 
 
 def declare(node: Node, rows: Iterable[Row], prefix: str = "") -> None:

@@ -1,1 +1,1 @@
-"""TODO."""
+"""rosbag2 recordings of the nodes and of other software."""

@@ -1,4 +1,4 @@
-"""`Block`: one message of the topic `samples`, as arrays."""
+"""`BlockMessage`: one message of the topic `samples`, as arrays."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def typestore() -> Typestore:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Block:
+class BlockMessage:
     """Consecutive samples of a stage.
 
     Parameters
@@ -66,7 +66,7 @@ class Block:
     follows_pause: bool = False
 
     @classmethod
-    def from_cdr(cls, raw: bytes) -> Block:
+    def from_cdr(cls, raw: bytes) -> BlockMessage:
         """Decode a serialised PointCloud2 by the names and offsets of its fields.
 
         Parameters

@@ -13,18 +13,18 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from ...errors import RecordingError
 from ...record import Notice, Record, Samples
-from ..checks.split_at_gaps import finite_records
-from ..segmentation.decimating_buffer import PIECE, Intake, averaged_notice
+from ..checks.split_at_gaps import split_at_gaps
+from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer, averaged_notice
 from ..segmentation.phases import labelled
 from ..table.column import Column
-from ..table.read_options import CHANNELS, Layout
-from ..table.time_column import TimeBase
+from ..table.read_options import CHANNELS, ReadOptions
+from ..table.time_column import TimeColumn
 from .bag import Bag
 
 _PLACE = re.compile(r"(?P<topic>/[^.\[\]]+)(\.(?P<fields>[\w.]+))?(\[(?P<element>\d{1,9})\])?")
 
 
-class Place(NamedTuple):
+class TopicField(NamedTuple):
     """Where in a bag a channel is."""
 
     topic: str
@@ -32,11 +32,11 @@ class Place(NamedTuple):
     element: int | None
 
     @classmethod
-    def parse(cls, text: str) -> Place:
+    def parse(cls, text: str) -> TopicField:
         """``"/sensor.position[1]"``: topic, field (default `data`) and element, counted from 0 as in ROS.
 
-        >>> Place.parse("/sensor.position[1]")
-        Place(topic='/sensor', fields=('position',), element=1)
+        >>> TopicField.parse("/sensor.position[1]")
+        TopicField(topic='/sensor', fields=('position',), element=1)
         """
         match = _PLACE.fullmatch(text)
         if match is None:
@@ -67,12 +67,12 @@ class _Series:
         return self.times.array(), self.values.array()
 
 
-def read_topics(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]:
-    """The record that `Layout.columns` describes.
+def read_topics(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Notice]]:
+    """The record that `ReadOptions.columns` describes.
 
     Samples are those of the displacement's topic. A channel of another topic has, at each of them, its newest value: a
     drive that is held between its messages. Times are the stamps in the messages' headers, or else those of reception.
-    A message may carry an array of samples; then `Layout.sample_period` is needed.
+    A message may carry an array of samples; then `ReadOptions.sample_period` is needed.
 
     Raises
     ------
@@ -80,7 +80,9 @@ def read_topics(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]:
         If a topic or field is not there, or voltage or displacement is not mapped.
     """
     places = {
-        name: Place.parse(str(text)) for name, text in layout.columns.items() if name in CHANNELS and name != "time"
+        name: TopicField.parse(str(text))
+        for name, text in layout.columns.items()
+        if name in CHANNELS and name != "time"
     }
     if not {"voltage", "displacement"} <= places.keys():
         raise RecordingError(f"columns: got {', '.join(layout.columns)}, expected voltage and displacement")
@@ -97,12 +99,12 @@ def read_topics(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]:
     return records, notices
 
 
-def _paired(series: dict[str, _Series], places: dict[str, Place], layout: Layout) -> Intake:
+def _paired(series: dict[str, _Series], places: dict[str, TopicField], layout: ReadOptions) -> DecimatingBuffer:
     """The times of the displacement, and the newest value of every channel then, in columns."""
     arrays = {name: own.arrays() for name, own in series.items()}
     time = arrays["displacement"][0]
     begun = max(float(times[0]) for times, _ in arrays.values())
-    intake = Intake.of(1 + len(arrays), layout)
+    intake = DecimatingBuffer.of(1 + len(arrays), layout)
     for first in range(0, time.size, PIECE):
         part = np.arange(first, min(first + PIECE, time.size))
         part = part[time[part] >= begun]
@@ -114,7 +116,7 @@ def _paired(series: dict[str, _Series], places: dict[str, Place], layout: Layout
     return intake
 
 
-def _series(bag: Bag, places: dict[str, Place], period: float) -> tuple[dict[str, _Series], bool]:
+def _series(bag: Bag, places: dict[str, TopicField], period: float) -> tuple[dict[str, _Series], bool]:
     store = get_typestore(Stores.ROS2_KILTED)
     series = {name: _Series() for name in places}
     seen: set[str] = set()
@@ -147,13 +149,13 @@ def _series(bag: Bag, places: dict[str, Place], period: float) -> tuple[dict[str
 
 
 def _records(
-    channels: dict[str, Samples], time: Samples, held: bool, stamped: bool, layout: Layout, truncated: bool
+    channels: dict[str, Samples], time: Samples, held: bool, stamped: bool, layout: ReadOptions, truncated: bool
 ) -> tuple[list[Record], list[Notice]]:
     if time.size < 2:
         raise RecordingError(f"got {time.size} samples after the first value of every channel, expected two or more")
     part = layout.part(time.size)
     channels = {name: values[part] for name, values in channels.items()}
-    base = TimeBase.of(time[part])
+    base = TimeColumn.of(time[part])
     notices = base.notices()
     if held:
         notices.append(
@@ -162,6 +164,6 @@ def _records(
     if not stamped:
         notices.append(Notice("time_base", "messages carry no stamps: their times of reception are used"))
     breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
-    parts, told = finite_records(channels, layout.sample_period or base.period, breaks, truncated=truncated)
+    parts, told = split_at_gaps(channels, layout.sample_period or base.period, breaks, truncated=truncated)
     records, proposed = labelled(parts, layout.phases)
     return records, [*notices, *told, *proposed]

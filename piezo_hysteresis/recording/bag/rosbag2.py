@@ -10,21 +10,21 @@ import numpy as np
 from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
-from ..checks.split_at_gaps import finite_records
+from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.decimating_buffer import averaged_notice, shared_averages
 from ..segmentation.phases import labelled
-from ..segmentation.segment import Stretch
+from ..segmentation.segment import Segment
 from ..segmentation.waveform import phase_name
-from ..table.read_options import Layout
+from ..table.read_options import ReadOptions
 from .bag import STORAGES, Bag
 from .bag_writer import BagWriter
-from .block_message import TYPE, Block, typestore
+from .block_message import TYPE, BlockMessage, typestore
 from .foreign_topics import read_topics
 from .phase_topic import STRING, PhaseNames
 from .sample_stream import SampleStream
 
 IDLE, HOLD = "idle", "hold"
-"""What the stage does before the first and after every phase; left out unless `Layout.include` names it."""
+"""What the stage does before the first and after every phase; left out unless `ReadOptions.include` names it."""
 
 _MOVED = 0.01
 _SEVERE_SHARE = 0.05
@@ -47,7 +47,7 @@ class Rosbag2:
         files = [path] if path.is_file() else path.iterdir()
         return any(f.suffix in (*STORAGES, ".zstd") or f.name == "metadata.yaml" for f in files)
 
-    def read(self, path: Path, layout: Layout) -> Experiment:
+    def read(self, path: Path, layout: ReadOptions) -> Experiment:
         """The phases of one stage in the order in which they were recorded."""
         with naming(path, "a rosbag2 bag"):
             bag = Bag(path)
@@ -124,7 +124,7 @@ def _space(topic: str, name: str) -> str | None:
     return _absolute(space) if last == name else None
 
 
-def _read_samples(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]:
+def _read_samples(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Notice]]:
     streams: dict[str, SampleStream] = {}
     names: dict[str, PhaseNames] = {}
     damaged = 0
@@ -135,7 +135,7 @@ def _read_samples(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]
         try:
             if message.type == TYPE:
                 streams.setdefault(space, SampleStream(layout.sample_period)).add(
-                    Block.from_cdr(message.raw), message.time_ns
+                    BlockMessage.from_cdr(message.raw), message.time_ns
                 )
             elif message.type == STRING:
                 names.setdefault(space, PhaseNames()).add(message.raw, message.time_ns)
@@ -158,13 +158,13 @@ def _read_samples(bag: Bag, layout: Layout) -> tuple[list[Record], list[Notice]]
 
 
 def _records(
-    stretches: list[Stretch], averages: list[int], names: PhaseNames, layout: Layout
+    stretches: list[Segment], averages: list[int], names: PhaseNames, layout: ReadOptions
 ) -> tuple[list[Record], list[Notice]]:
     unlabelled = layout.phases is not None or (not names and all(s.phase == 0 for s in stretches))
     records: list[Record] = []
     notices: list[Notice] = []
     moving = _MOVED * max(_travel(stretch) for stretch in stretches)
-    before: Stretch | None = None
+    before: Segment | None = None
     kept = excited = False
     for stretch, average in zip(stretches, averages, strict=True):
         if stretch.first:
@@ -194,7 +194,7 @@ def _records(
                 continue
             if layout.average is None and average > 1:
                 notices.append(averaged_notice(average, slow.sample_period, name))
-            parts, told = finite_records(
+            parts, told = split_at_gaps(
                 slow.channels,
                 slow.sample_period,
                 slow.breaks,
@@ -222,13 +222,13 @@ def _records(
     return records, notices
 
 
-def _travel(stretch: Stretch) -> float:
+def _travel(stretch: Segment) -> float:
     """Range of the drive [V]."""
     voltage = stretch.channels["voltage"]
     return float(np.ptp(voltage)) if np.isfinite(voltage).all() else 0.0
 
 
-def _name(stretch: Stretch, names: PhaseNames, notices: list[Notice]) -> str:
+def _name(stretch: Segment, names: PhaseNames, notices: list[Notice]) -> str:
     """Recorded name of a stretch, or a proposed one."""
     name = names.at(stretch.phase, stretch.received_ns) or (IDLE if stretch.phase == 0 else "")
     if not name:
@@ -245,7 +245,7 @@ def _write_blocks(bag: BagWriter, record: Record, number: int, clock_ns: int, in
     for a in range(0, record.size, longest):
         part = slice(a, a + longest)
         n = record.voltage[part].size
-        block = Block(
+        block = BlockMessage(
             clock_ns,
             {"voltage": record.voltage[part], "displacement": record.displacement[part]},
             np.full(n, number, np.uint32),

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from ...errors import RecordError
 from ...record import Notice
-from ..segmentation.segment import Stretch
+from ..segmentation.segment import Segment
 from ..table.column import Column, changes
 from ..table.time_column import round_period
-from .block_message import Block
+from .block_message import BlockMessage
 
 PERIOD_TOLERANCE = 0.01
 """Blocks whose sample periods differ by more than this share do not belong together."""
@@ -67,7 +67,7 @@ class SampleStream:
         """Number of samples received."""
         return len(self._index)
 
-    def add(self, block: Block, received_ns: int) -> None:
+    def add(self, block: BlockMessage, received_ns: int) -> None:
         """Append a block in the order of arrival; channels that other blocks have are filled with NaN."""
         begin, n = self.size, block.phase.size
         follows = (self._next + np.arange(n, dtype=np.int64)).astype(np.uint32)
@@ -93,7 +93,7 @@ class SampleStream:
         self._periods.append(period if period > 0 else np.nan)
         self._received_ns.append(received_ns)
 
-    def stretches(self, split_phases: bool = True) -> tuple[list[Stretch], list[Notice]]:
+    def stretches(self, split_phases: bool = True) -> tuple[list[Segment], list[Notice]]:
         """Everything received, in order of the index.
 
         Parameters
@@ -112,7 +112,7 @@ class SampleStream:
         RecordError
             If nothing tells the sample period.
         """
-        stretches: list[Stretch] = []
+        stretches: list[Segment] = []
         notices: list[Notice] = []
         if self._uneven:
             text = f"times within {self._uneven} of {len(self._starts)} blocks are uneven: taken as uniform"
@@ -173,7 +173,7 @@ class SampleStream:
         elapsed = (self._time_ns(arrival, period) - self._time_ns(arrival - 1, period)) * 1e-9
         return elapsed > 0 if step < 0 else step * period > 10 * max(elapsed, 0.0) + LONGEST_SILENCE
 
-    def _cut(self, run: _Run, begin: float, split_phases: bool, notices: list[Notice]) -> Iterator[Stretch]:
+    def _cut(self, run: _Run, begin: float, split_phases: bool, notices: list[Notice]) -> Iterator[Segment]:
         pieces, repeated = _swept(run.pieces)
         if repeated:
             notices.append(Notice("duplicate", f"{repeated} samples came more than once: the first ones count"))
@@ -194,7 +194,7 @@ class SampleStream:
             gaps = {offsets[p] - i: p for p in inside if lost[p]} | ({} if within or not lost[piece] else {0: piece})
             pauses = {at: lost[p] for at, p in gaps.items() if pieces[p][1] in pausing}
             breaks = {at: lost[p] for at, p in gaps.items() if at not in pauses}
-            yield Stretch(
+            yield Segment(
                 {name: values[i:j] for name, values in channels.items()},
                 run.period,
                 int(phase[i]),

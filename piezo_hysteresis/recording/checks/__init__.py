@@ -1,1 +1,1 @@
-"""TODO."""
+"""What may be wrong with the data of an experiment."""

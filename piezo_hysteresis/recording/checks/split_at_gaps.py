@@ -32,7 +32,7 @@ def stretches(good: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def finite_records(
+def split_at_gaps(
     channels: Mapping[str, Samples],
     sample_period: float,
     breaks: Mapping[int, int] | None = None,

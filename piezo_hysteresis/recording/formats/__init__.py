@@ -1,1 +1,1 @@
-"""TODO."""
+"""File formats other than bags."""

@@ -10,10 +10,10 @@ from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
-from ..table.read_options import CHANNELS, LABELS, Layout
+from ..table.read_options import CHANNELS, LABELS, ReadOptions
 from ..table.table import resolve, table_records
 from ..table.text_cells import Dialect, read_cells
-from ..table.time_column import TimeBase
+from ..table.time_column import TimeColumn
 
 _ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _ROWS = 1 << 15
@@ -34,7 +34,7 @@ class Csv:
         """True for the endings of text tables, and for any text with rows of numbers."""
         return path.is_file() and (path.suffix.lower() in _ENDINGS or _is_table(path))
 
-    def read(self, path: Path, layout: Layout) -> Experiment:
+    def read(self, path: Path, layout: ReadOptions) -> Experiment:
         """The table as phases: labelled ones, or else what the drive looks like."""
         with naming(path, "a text table"):
             dialect = Dialect.sniff(path)
@@ -100,7 +100,7 @@ def _labels(experiment: Experiment) -> list[str]:
         labels.append("truncated")
     if any(r.initial_voltage is not None for r in experiment):
         labels.append("initial_voltage")
-    if any(r.size < 2 or TimeBase.of(r.time).period != r.sample_period for r in experiment):
+    if any(r.size < 2 or TimeColumn.of(r.time).period != r.sample_period for r in experiment):
         labels.append("sample_period")
     return labels
 

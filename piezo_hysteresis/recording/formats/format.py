@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from ...record import Experiment
-from ..table.read_options import Layout
+from ..table.read_options import ReadOptions
 
 
 class Format(Protocol):
@@ -15,7 +15,7 @@ class Format(Protocol):
     def recognises(self, path: Path) -> bool:
         """True if the file or folder looks like this format."""
 
-    def read(self, path: Path, layout: Layout) -> Experiment:
+    def read(self, path: Path, layout: ReadOptions) -> Experiment:
         """The experiment at `path`, in SI units, with notices about what was found."""
 
 

@@ -9,7 +9,7 @@ from ...errors import RecordingError
 from ...record import Experiment, Notice
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
-from ..table.read_options import CHANNELS, Layout
+from ..table.read_options import CHANNELS, ReadOptions
 from ..table.table import resolve, table_records
 from ..table.text_cells import BLOCK_BYTES, Dialect, decoded, read_cells
 
@@ -30,17 +30,17 @@ class GcsArray:
         with path.open("rb") as file:
             return _END.encode() in file.read(BLOCK_BYTES // 16)
 
-    def read(self, path: Path, layout: Layout) -> Experiment:
-        """The array as phases named by what the drive looks like, unless `Layout.phases` says otherwise."""
+    def read(self, path: Path, layout: ReadOptions) -> Experiment:
+        """The array as phases named by what the drive looks like, unless `ReadOptions.phases` says otherwise."""
         with naming(path, "a GCS array"):
             header, skipped = _header(path)
             width = int(header.get("DIM", "0"))
             titles = [header.get(f"NAME{i}", f"column {i + 1}") for i in range(min(width, 1000))]
             if width < 2 or width > 1000:
                 raise RecordingError(f"got DIM = {width}, expected two to 1000 columns")
-            guessed = {"voltage": _first(titles, "volt"), "displacement": _first(titles, "position|displacement")}
-            columns = {c: at for c, at in guessed.items() if at} | dict(layout.columns)
-            places = resolve(titles, width, Layout(columns=columns, sample_period=1.0)).columns
+            inferred = {"voltage": _first(titles, "volt"), "displacement": _first(titles, "position|displacement")}
+            columns = {c: at for c, at in inferred.items() if at} | dict(layout.columns)
+            places = resolve(titles, width, ReadOptions(columns=columns, sample_period=1.0)).columns
             separator = int(header.get("SEPARATOR", "32"))
             dialect = Dialect(None if separator in (9, 32) else chr(separator), False, skipped, (), width)
             numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}

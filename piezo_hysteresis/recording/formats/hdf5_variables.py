@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import RecordingError
-from ..segmentation.decimating_buffer import PIECE, Intake
-from ..table.read_options import Layout
+from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
+from ..table.read_options import ReadOptions
 from .mat_variables import MatVariables
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -62,12 +62,12 @@ class Hdf5Variables(MatVariables):
     def __iter__(self) -> Iterator[str]:
         return (name.replace("/", ".") for name in self._names if not name.startswith("#"))
 
-    def samples(self, name: str, column: int | None, layout: Layout) -> Intake:
+    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
         dataset = self._numbers(name)
         shape = tuple(dataset.shape[::-1])  # as in MATLAB
         self.check_column(name, shape, column)
         along = dataset.ndim - 1 if column is not None else int(np.argmax(dataset.shape))
-        intake = Intake.of(1, layout)
+        intake = DecimatingBuffer.of(1, layout)
         for first in range(0, dataset.shape[along], PIECE):
             index: list[int | slice] = [column or 0] * dataset.ndim
             index[along] = slice(first, first + PIECE)

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
-from ..segmentation.decimating_buffer import Intake, averaged_notice
-from ..table.column_inference import guess_notice, guessed, guessed_period, unit_in
-from ..table.read_options import CHANNELS, LABELS, Layout
+from ..segmentation.decimating_buffer import DecimatingBuffer, averaged_notice
+from ..table.column_inference import inference_notice, inferred_columns, inferred_period, unit_in
+from ..table.read_options import CHANNELS, LABELS, ReadOptions
 from ..table.table import table_records
 from .hdf5_variables import Hdf5Variables, is_hdf5
 from .mat5_variables import Mat5Variables
@@ -28,15 +28,15 @@ class Mat:
     """One struct per record, ``phase_01``, ``phase_02``, …, or the variables of a foreign file.
 
     Fields and variables are called as the channels (`voltage` [V], `displacement` [m], `time` [s], …) and labels
-    (`phase`, `sample_period`, `continues`, …). `Layout.columns` names others: ``"u"``, ``"data.position"`` for a field
-    of a struct, ``"y[2]"`` for a column of a matrix, counted from 1 as in MATLAB.
+    (`phase`, `sample_period`, `continues`, …). `ReadOptions.columns` names others: ``"u"``,
+    ``"data.position"`` for a field of a struct, ``"y[2]"`` for a column of a matrix, counted from 1 as in MATLAB.
     """
 
     def recognises(self, path: Path) -> bool:
         """True for the ending .mat."""
         return path.is_file() and path.suffix.lower() == ".mat"
 
-    def read(self, path: Path, layout: Layout) -> Experiment:
+    def read(self, path: Path, layout: ReadOptions) -> Experiment:
         """The structs in order of their numbers, or the variables as one record."""
         with naming(path, "a MAT file"), (Hdf5Variables if is_hdf5(path) else Mat5Variables)(path) as variables:
             structs = sorted({name.partition(".")[0] for name in variables if re.match(_STRUCT + r"\d+\.", name)})
@@ -73,18 +73,18 @@ class Mat:
 
 
 def _records(
-    variables: MatVariables, prefix: str, layout: Layout, before: Sequence[Record]
+    variables: MatVariables, prefix: str, layout: ReadOptions, before: Sequence[Record]
 ) -> tuple[list[Record], list[Notice]]:
     given = {c: str(layout.columns.get(c, prefix + c)) for c in (*CHANNELS, *LABELS)}
     places = {c: place for c, place in given.items() if c in layout.columns or place in variables}
     labels = {name: _label(variables[places[name]], places[name]) for name in LABELS if name in places}
-    if layout.sample_period is None and "sample_period" not in places and (found := guessed_period(variables)):
+    if layout.sample_period is None and "sample_period" not in places and (found := inferred_period(variables)):
         value = float(_label(variables[found[0]], found[0]))
         labels["sample_period"] = repr(1.0 / value if found[1] else value)
     timed = layout.sample_period is not None or "sample_period" in labels
     names = [name for name in variables if name not in places.values()]
     wanted = [c for c in ("time", "voltage", "displacement") if c not in places and not (c == "time" and timed)]
-    guess = {c: names[at] for c, at in guessed([n.rpartition(".")[2] for n in names], (), wanted).items()}
+    guess = {c: names[at] for c, at in inferred_columns([n.rpartition(".")[2] for n in names], (), wanted).items()}
     places |= guess
     for channel in ("voltage", "displacement"):
         if channel not in places:
@@ -100,10 +100,10 @@ def _records(
     records, notices = table_records(columns, [(0, labels)], rest, before, truncated=layout.passes_over)
     if layout.average is None and average > 1:
         notices.append(averaged_notice(average, records[0].sample_period, labels.get("phase", "")))
-    return records, [*notices, *guess_notice(guess, units)]
+    return records, [*notices, *inference_notice(guess, units)]
 
 
-def _channel(variables: MatVariables, place: str, layout: Layout) -> Intake:
+def _channel(variables: MatVariables, place: str, layout: ReadOptions) -> DecimatingBuffer:
     match = _PLACE.fullmatch(place)
     name, number = (match["name"], match["column"]) if match else (place, None)
     if name not in variables:

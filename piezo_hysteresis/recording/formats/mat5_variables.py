@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import RecordingError
-from ..segmentation.decimating_buffer import PIECE, Intake
-from ..table.read_options import Layout
+from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
+from ..table.read_options import ReadOptions
 from .mat5_sizes import COMPRESSED, HEADER, MATRIX, ORDERS, Inflated, check_sizes
 from .mat_variables import MatVariables
 
@@ -79,11 +79,11 @@ class Mat5Variables(MatVariables):
             raise KeyError(name)
         return self._variable(top)[name]
 
-    def samples(self, name: str, column: int | None, layout: Layout) -> Intake:
+    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
         matrix = self._long.get(name)
         shape = self[name].shape if matrix is None else matrix.shape
         self.check_column(name, shape, column)
-        intake = Intake.of(1, layout)
+        intake = DecimatingBuffer.of(1, layout)
         if matrix is not None:
             count = math.prod(shape) if column is None else shape[0]
             _read(self._path, matrix, (column or 0) * count, count, intake)
@@ -173,7 +173,7 @@ def _small_or_long(stream: BinaryIO | Inflated, order: str) -> tuple[bytes, int]
     return stream.read(min(padded, 1 << 16))[:length], 8 + padded
 
 
-def _read(path: Path, matrix: _Matrix, first: int, count: int, intake: Intake) -> None:
+def _read(path: Path, matrix: _Matrix, first: int, count: int, intake: DecimatingBuffer) -> None:
     """Take `count` numbers from the number `first` on."""
     with path.open("rb") as file:
         order = ORDERS[file.read(HEADER)[126:]]

@@ -10,8 +10,8 @@ from typing import Any, Self
 from numpy.typing import NDArray
 
 from ...errors import RecordingError
-from ..segmentation.decimating_buffer import Intake
-from ..table.read_options import Layout
+from ..segmentation.decimating_buffer import DecimatingBuffer
+from ..table.read_options import ReadOptions
 
 
 class MatVariables(Mapping[str, NDArray[Any]]):
@@ -34,7 +34,7 @@ class MatVariables(Mapping[str, NDArray[Any]]):
         """Let go of the file, and of what was read of it."""
 
     @abstractmethod
-    def samples(self, name: str, column: int | None, layout: Layout) -> Intake:
+    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
         """The one column of a vector, or a column of a matrix, as a layout keeps it.
 
         Parameters
@@ -43,7 +43,7 @@ class MatVariables(Mapping[str, NDArray[Any]]):
             Dotted name.
         column : int or None
             Column in MATLAB, counted from 0.
-        layout : Layout
+        layout : ReadOptions
             Its `rows`, where they count from the beginning, and its `average` apply.
 
         Raises

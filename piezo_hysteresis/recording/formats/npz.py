@@ -13,12 +13,12 @@ import numpy as np
 from ...errors import RecordingError
 from ...record import Experiment, Notice, Record, Samples
 from ..checks.error_context import naming
-from ..checks.split_at_gaps import finite_records
+from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.decimating_buffer import averaged_notice, shared_averages
 from ..segmentation.phases import labelled
-from ..table.column_inference import guess_notice, guessed, guessed_period, unit_in
-from ..table.read_options import CHANNELS, LABELS, Layout
-from ..table.time_column import TimeBase
+from ..table.column_inference import inference_notice, inferred_columns, inferred_period, unit_in
+from ..table.read_options import CHANNELS, LABELS, ReadOptions
+from ..table.time_column import TimeColumn
 from .npz_members import NpzMembers
 
 _EXPECTED = "an .npz file with voltage, displacement and sample_period"
@@ -30,14 +30,14 @@ class Npz:
 
     Keys `voltage` [V], `displacement` [m], `sample_period` [s], `start_time` [s] and `phase`; optional `continues`,
     `truncated`, `initial_voltage` [V], `other_displacement` [m], `temperature` [K]. Other keys are ignored, unless
-    `Layout.columns` names them for a channel. Pickled objects are refused.
+    `ReadOptions.columns` names them for a channel. Pickled objects are refused.
     """
 
     def recognises(self, path: Path) -> bool:
         """True for an .npz file or a folder that holds one."""
         return path.suffix == ".npz" if path.is_file() else any(path.glob("*.npz"))
 
-    def read(self, path: Path, layout: Layout) -> Experiment:
+    def read(self, path: Path, layout: ReadOptions) -> Experiment:
         """The phases in the order of their file numbers."""
         files = [path] if path.is_file() else sorted(path.glob("*.npz"), key=_order)
         records: list[Record] = []
@@ -78,16 +78,16 @@ class Npz:
                 np.savez(path / f"{number:02d}_{name}.npz", **_keys(record))
 
 
-def _places(values: NpzMembers, layout: Layout) -> tuple[dict[str, str], dict[str, str]]:
-    """Channel or label to the key that holds it, and those of them that were guessed."""
+def _places(values: NpzMembers, layout: ReadOptions) -> tuple[dict[str, str], dict[str, str]]:
+    """Channel or label to the key that holds it, and those of them that were inferred_columns."""
     place = {name: str(layout.columns.get(name, name)) for name in (*CHANNELS, *LABELS)}
     open_ = [c for c in ("voltage", "displacement") if c not in layout.columns and c not in values]
     names = [name for name in values if name not in place.values()]
-    guess = {c: names[at] for c, at in guessed(names, (), open_).items()}
+    guess = {c: names[at] for c, at in inferred_columns(names, (), open_).items()}
     return place | guess, guess
 
 
-def _size(file: Path, layout: Layout) -> int:
+def _size(file: Path, layout: ReadOptions) -> int:
     """Samples that a layout keeps of a file, before they are averaged."""
     with zipfile.ZipFile(file) as archive:
         values = NpzMembers(archive, file.stat().st_size)
@@ -95,7 +95,7 @@ def _size(file: Path, layout: Layout) -> int:
         return part.stop - part.start
 
 
-def _phase(file: Path, layout: Layout, average: int, end: float) -> tuple[list[Record], list[Notice]]:
+def _phase(file: Path, layout: ReadOptions, average: int, end: float) -> tuple[list[Record], list[Notice]]:
     """Records of one file; `end` is where the one before it ended [s]."""
     with zipfile.ZipFile(file) as archive:
         values = NpzMembers(archive, file.stat().st_size)
@@ -112,7 +112,7 @@ def _phase(file: Path, layout: Layout, average: int, end: float) -> tuple[list[R
         period, breaks, told = _time_base(values, place, layout, lambda: channel("time"), average)
         optional = [name for name in ("other_displacement", "temperature") if place[name] in values]
         named = place["phase"] in values or _NUMBERED.match(file.name)
-        records, notices = finite_records(
+        records, notices = split_at_gaps(
             {name: channel(name) for name in ("voltage", "displacement", *optional)},
             period,
             breaks,
@@ -122,7 +122,7 @@ def _phase(file: Path, layout: Layout, average: int, end: float) -> tuple[list[R
             truncated=bool(number("truncated", 0.0)) or layout.truncates(part),
             initial_voltage=number("initial_voltage", None),
         )
-    notices += [*told, *guess_notice(guess, units)]
+    notices += [*told, *inference_notice(guess, units)]
     if layout.average is None and average > 1:
         notices.append(averaged_notice(average, period, records[0].phase))
     if named and layout.phases is None:
@@ -132,7 +132,7 @@ def _phase(file: Path, layout: Layout, average: int, end: float) -> tuple[list[R
 
 
 def _time_base(
-    values: NpzMembers, place: dict[str, str], layout: Layout, times: Callable[[], Samples], average: int
+    values: NpzMembers, place: dict[str, str], layout: ReadOptions, times: Callable[[], Samples], average: int
 ) -> tuple[float, dict[int, int], list[Notice]]:
     """Sample period [s] from wherever the file tells it; missing samples, where it holds times; what to tell."""
     if layout.sample_period is not None:
@@ -141,9 +141,9 @@ def _time_base(
         period = layout.in_si("sample_period", np.array(values.number(place["sample_period"])))
         return float(period) * average, {}, []
     if place["time"] in values:
-        base = TimeBase.of(times())
+        base = TimeColumn.of(times())
         return base.period, dict(zip(base.breaks.tolist(), base.lost.tolist(), strict=True)), base.notices()
-    if found := guessed_period(values):
+    if found := inferred_period(values):
         value = values.number(found[0])
         return (1.0 / value if found[1] else value) * average, {}, []
     return values.number(place["sample_period"]), {}, []  # raises, and says what the file holds

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import RecordingError
 from ...record import Samples
-from ..segmentation.decimating_buffer import PIECE, Intake
+from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
 
 _MAGIC_READERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 _LARGEST_EXPANSION = 100
@@ -58,7 +58,7 @@ class NpzMembers:
             self._check(name, dtype, shape)
             if len(shape) != 1:
                 raise RecordingError(f"{name}: got shape {shape}, expected one dimension")
-            intake = Intake(1, part.start, min(part.stop, shape[0]), average)
+            intake = DecimatingBuffer(1, part.start, min(part.stop, shape[0]), average)
             for first in range(0, intake.stop or 0, PIECE):
                 raw = stream.read(min(PIECE, shape[0] - first) * dtype.itemsize)
                 intake.add(np.frombuffer(raw, dtype).astype(np.float64)[:, None])

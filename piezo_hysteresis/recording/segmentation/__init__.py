@@ -1,1 +1,1 @@
-"""TODO."""
+"""Phases of a record: where the drive rests, steps and moves; long records shortened on reading."""

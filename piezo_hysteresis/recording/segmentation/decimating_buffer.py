@@ -1,4 +1,4 @@
-"""`Intake`: samples on their way from a large file into memory, selected and averaged before they are kept."""
+"""`DecimatingBuffer`: samples of a large file, selected and averaged before they are kept."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...errors import RecordingError
 from ...record import Notice, Samples
-from ..table.read_options import Layout
+from ..table.read_options import ReadOptions
 
 PIECE = 1 << 18
 """Numbers that are looked at, or moved, at a time."""
@@ -73,7 +73,7 @@ def _too_many() -> RecordingError:
 
 
 @dataclass(slots=True)
-class Intake:
+class DecimatingBuffer:
     """Columns that grow block by block.
 
     Parameters
@@ -93,7 +93,7 @@ class Intake:
 
     Examples
     --------
-    >>> intake = Intake(1, start=1, stop=7, average=2)
+    >>> intake = DecimatingBuffer(1, start=1, stop=7, average=2)
     >>> intake.add(np.arange(4.0)[:, None]), intake.add(np.arange(4.0, 9.0)[:, None]), intake.column(0).tolist()
     (None, None, [1.5, 3.5, 5.5])
     """
@@ -114,7 +114,7 @@ class Intake:
         self._rest = np.empty((0, self.width))
 
     @classmethod
-    def of(cls, width: int, layout: Layout) -> Intake:
+    def of(cls, width: int, layout: ReadOptions) -> DecimatingBuffer:
         """For columns of which a layout keeps a part."""
         start, stop = layout.from_the_beginning
         return cls(width, start, stop, layout.average)

@@ -1,4 +1,4 @@
-"""`Stretch`: samples of one phase from a stream."""
+"""`Segment`: samples of one phase from a stream."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...record import Samples
-from .decimating_buffer import Intake
+from .decimating_buffer import DecimatingBuffer
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Stretch:
+class Segment:
     """Samples of one phase number and one sample period."""
 
     channels: dict[str, Samples]
@@ -37,7 +37,7 @@ class Stretch:
         """Number of samples."""
         return self.channels["voltage"].size
 
-    def averaged(self, average: int) -> Stretch:
+    def averaged(self, average: int) -> Segment:
         """The same with `average` samples in one, never across missing ones; incomplete last groups are dropped."""
         if average == 1:
             return self
@@ -59,6 +59,6 @@ class Stretch:
 
 
 def _averaged(values: Samples, average: int) -> Samples:
-    intake = Intake(1, average=average)
+    intake = DecimatingBuffer(1, average=average)
     intake.add_column(values)
     return intake.column(0)

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Columns of numbers and labels, their titles, units and time."""

@@ -30,7 +30,7 @@ def unit_in(title: str, channel: str) -> str | None:
     return unit if unit in UNITS.get(channel, {}) else None
 
 
-def guessed(names: Sequence[str], taken: Iterable[int], wanted: Iterable[str]) -> dict[str, int]:
+def inferred_columns(names: Sequence[str], taken: Iterable[int], wanted: Iterable[str]) -> dict[str, int]:
     """Position of the only column that a channel can be, for each of `wanted` that has one.
 
     A column counts by the unit in its title, or else by its words; two that count the same leave the channel open.
@@ -46,7 +46,8 @@ def guessed(names: Sequence[str], taken: Iterable[int], wanted: Iterable[str]) -
 
     Examples
     --------
-    >>> guessed(["t_ms", "Piezo Voltage", "Target (um)", "Sensor (um)"], (), ("time", "voltage", "displacement"))
+    >>> titles = ["t_ms", "Piezo Voltage", "Target (um)", "Sensor (um)"]
+    >>> inferred_columns(titles, (), ("time", "voltage", "displacement"))
     {'time': 0, 'voltage': 1, 'displacement': 3}
     """
     used = set(taken)
@@ -66,10 +67,10 @@ def guessed(names: Sequence[str], taken: Iterable[int], wanted: Iterable[str]) -
     return found
 
 
-def guessed_period(names: Iterable[str]) -> tuple[str, bool] | None:
+def inferred_period(names: Iterable[str]) -> tuple[str, bool] | None:
     """Name of the variable that holds the sample period [s], or with True the sample rate [Hz]; None where none does.
 
-    >>> guessed_period(["u", "y", "fs"]), guessed_period(["run.Ts"]), guessed_period(["u"])
+    >>> inferred_period(["u", "y", "fs"]), inferred_period(["run.Ts"]), inferred_period(["u"])
     (('fs', True), ('run.Ts', False), None)
     """
     for name in names:
@@ -79,8 +80,8 @@ def guessed_period(names: Iterable[str]) -> tuple[str, bool] | None:
     return None
 
 
-def guess_notice(found: Mapping[str, str], units: Mapping[str, str | None]) -> tuple[Notice, ...]:
-    """What was guessed: channel to title, and the unit that the title names."""
+def inference_notice(found: Mapping[str, str], units: Mapping[str, str | None]) -> tuple[Notice, ...]:
+    """What was inferred_columns: channel to title, and the unit that the title names."""
     if not found:
         return ()
     told = ", ".join(f"{c} = '{title}'{f' in {units[c]}' if units.get(c) else ''}" for c, title in found.items())

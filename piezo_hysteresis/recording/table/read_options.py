@@ -1,4 +1,4 @@
-"""`Layout`: how a recording is to be read, as far as the file itself does not tell."""
+"""`ReadOptions`: how a recording is to be read, as far as the file itself does not tell."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Column = str | int
 
 
 @dataclass(frozen=True)
-class Layout:
+class ReadOptions:
     """Where the channels of a recording are and what the file does not say about them.
 
     Parameters
@@ -98,7 +98,7 @@ class Layout:
             return 0, None
         return start or 0, stop
 
-    def after_reading(self, average: int) -> Layout:
+    def after_reading(self, average: int) -> ReadOptions:
         """What is left to do once `from_the_beginning` has been applied and `average` samples became one."""
         rows = None if self.rows is None or self.from_the_beginning != (0, None) else self.rows
         period = None if self.sample_period is None else self.sample_period * average
@@ -126,6 +126,6 @@ class Layout:
         """True where reading begins behind the first row, with an unknown initial state."""
         return bool(self.from_the_beginning[0]) and self.initial_voltage is None
 
-    def with_period(self, sample_period: float | None) -> Layout:
+    def with_period(self, sample_period: float | None) -> ReadOptions:
         """The same layout with a sample period [s] that the file tells."""
         return replace(self, sample_period=sample_period)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 from ...errors import RecordingError
 from ...record import Notice, Record, Samples
-from ..checks.split_at_gaps import finite_records
+from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.phases import labelled
-from .column_inference import guess_notice, guessed, unit_in
-from .read_options import LABELS, Layout
-from .time_column import TimeBase
+from .column_inference import inference_notice, inferred_columns, unit_in
+from .read_options import LABELS, ReadOptions
+from .time_column import TimeColumn
 from .units import UNITS, plain
 
 Mark = tuple[int, Mapping[str, str]]
@@ -50,7 +50,7 @@ class Places:
     notices: tuple[Notice, ...]
 
 
-def resolve(titles: Sequence[str], width: int, layout: Layout) -> Places:
+def resolve(titles: Sequence[str], width: int, layout: ReadOptions) -> Places:
     """Find every channel and label of a table.
 
     Parameters
@@ -59,7 +59,7 @@ def resolve(titles: Sequence[str], width: int, layout: Layout) -> Places:
         Column titles; empty where there are none.
     width : int
         Number of columns.
-    layout : Layout
+    layout : ReadOptions
         Its `columns` go before the titles.
 
     Raises
@@ -84,7 +84,7 @@ def resolve(titles: Sequence[str], width: int, layout: Layout) -> Places:
     open_ = [c for c in ("time", "voltage", "displacement") if c not in places]
     if "time" in open_ and layout.sample_period is not None:
         open_.remove("time")
-    found = guessed(titles, (at for at, _ in places.values()), open_)
+    found = inferred_columns(titles, (at for at, _ in places.values()), open_)
     places |= {channel: (at, unit_in(titles[at], channel)) for channel, at in found.items()}
     for channel in ("voltage", "displacement"):
         if channel not in places:
@@ -92,7 +92,7 @@ def resolve(titles: Sequence[str], width: int, layout: Layout) -> Places:
                 f"got {_listed(titles, width)}, expected a column for {channel}; name it by columns, e.g. {channel}=2"
             )
     names = {channel: titles[at].strip() for channel, at in found.items()}
-    return Places(places, guess_notice(names, {channel: places[channel][1] for channel in found}))
+    return Places(places, inference_notice(names, {channel: places[channel][1] for channel in found}))
 
 
 def _listed(titles: Sequence[str], width: int) -> str:
@@ -104,7 +104,7 @@ def _listed(titles: Sequence[str], width: int) -> str:
 def table_records(
     columns: Mapping[str, Samples],
     marks: Sequence[Mark],
-    layout: Layout,
+    layout: ReadOptions,
     before: Sequence[Record] = (),
     *,
     truncated: bool = False,
@@ -117,7 +117,7 @@ def table_records(
         Channels in SI units, `time` among them where the table has it.
     marks : sequence of Mark
         Where records begin, and their labels; empty for a table in one piece without any.
-    layout : Layout
+    layout : ReadOptions
         Its `rows`, `phases`, `sample_period` apply; its `average` has been applied.
     before : sequence of Record
         Records of tables that come before.
@@ -159,7 +159,7 @@ def table_records(
 
 
 def _stretch(
-    columns: Mapping[str, Samples], labels: Mapping[str, str], layout: Layout, before: Sequence[Record]
+    columns: Mapping[str, Samples], labels: Mapping[str, str], layout: ReadOptions, before: Sequence[Record]
 ) -> tuple[list[Record], list[Notice]]:
     phase = labels.get("phase") or "record"
     time = columns.get("time")
@@ -168,7 +168,7 @@ def _stretch(
     notices: list[Notice] = []
     breaks: dict[int, int] = {}
     if time is not None and (time.size > 1 or period is None):
-        base = TimeBase.of(time)
+        base = TimeColumn.of(time)
         period = period or base.period
         breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
         notices = base.notices(phase)
@@ -179,7 +179,7 @@ def _stretch(
     if start is None:
         start = end if time is None else float(time[0])
     goes_on = abs(start - end) < 1.5 * period
-    parts, told = finite_records(
+    parts, told = split_at_gaps(
         {name: values for name, values in columns.items() if name != "time"},
         period,
         breaks,

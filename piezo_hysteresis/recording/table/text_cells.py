@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ...errors import RecordingError
 from ...record import Samples
-from ..segmentation.decimating_buffer import Intake
-from .read_options import Layout
+from ..segmentation.decimating_buffer import DecimatingBuffer
+from .read_options import ReadOptions
 from .units import is_unit
 
 BLOCK_BYTES = 1 << 20
@@ -123,7 +123,7 @@ def decoded(block: bytes) -> str:
 
 
 def read_cells(
-    path: Path, dialect: Dialect, numbers: Mapping[str, int], words: Mapping[str, int], layout: Layout
+    path: Path, dialect: Dialect, numbers: Mapping[str, int], words: Mapping[str, int], layout: ReadOptions
 ) -> Cells:
     """Read columns of a text file.
 
@@ -135,7 +135,7 @@ def read_cells(
         How it is written.
     numbers, words : mapping of str to int
         Name of every column to read to its position, counted from 0.
-    layout : Layout
+    layout : ReadOptions
         Its `rows`, where they count from the beginning, and its `average` apply before anything is kept.
 
     Raises
@@ -143,7 +143,7 @@ def read_cells(
     RecordingError
         On a line that is longer than a block, or more samples than can be kept.
     """
-    intake = Intake.of(len(numbers), layout)
+    intake = DecimatingBuffer.of(len(numbers), layout)
     marks: list[tuple[int, dict[str, str]]] = []
     bad = 0
     for lines in _line_blocks(path, dialect.skipped):

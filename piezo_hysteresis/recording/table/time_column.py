@@ -28,7 +28,7 @@ def round_period(period: float, tolerance: float = 1e-12) -> float:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class TimeBase:
+class TimeColumn:
     """What a column of times says.
 
     Attributes
@@ -49,7 +49,7 @@ class TimeBase:
     jitter: float
 
     @classmethod
-    def of(cls, time: Samples) -> TimeBase:
+    def of(cls, time: Samples) -> TimeColumn:
         """Read the times of samples.
 
         Parameters

@@ -1,1 +1,1 @@
-"""TODO."""
+"""One figure per file."""

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Tables of the page and of the terminal."""

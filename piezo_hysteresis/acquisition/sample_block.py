@@ -1,0 +1,68 @@
+"""`SampleBlock`: consecutive samples of a stage, and the phase that each belongs to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..stage.stage import Samples
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SampleBlock:
+    """Consecutive samples of a stage, as one message of `samples`.
+
+    Parameters
+    ----------
+    stamp : int
+        Time of the first sample on the driver's clock [ns].
+    time : (n,) ndarray of float64
+        Time of every sample since the stamp [s].
+    voltage : (n,) ndarray of float64
+        Drive voltage before the amplifier [V].
+    displacement : (n,) ndarray of float64
+        Measured displacement [m].
+    index : (n,) ndarray of uint32
+        Running number of the sample, modulo 2^32.
+    phase : (n,) ndarray of uint32
+        Number of the phase.
+    stage : str
+        Name of the stage.
+    follows_gap : bool
+        True where samples before the block were never measured (a device reading out its memory), as told by the
+        index; False where a jump of the index means lost messages.
+    """
+
+    stamp: int
+    time: Samples
+    voltage: Samples
+    displacement: Samples
+    index: NDArray[np.uint32]
+    phase: NDArray[np.uint32]
+    stage: str = ""
+    follows_gap: bool = False
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return int(self.time.size)
+
+    @property
+    def columns(self) -> dict[str, NDArray]:
+        """Arrays by field name of the topic `samples`."""
+        return {name: getattr(self, name) for name in ("time", "voltage", "displacement", "index", "phase")}
+
+    def after(self, count: int) -> SampleBlock:
+        """Without its first samples."""
+        if count == 0:
+            return self
+        kept: dict[str, Any] = {name: values[count:] for name, values in self.columns.items()}
+        return replace(self, **kept)
+
+    @property
+    def sample_period(self) -> float | None:
+        """Time between samples [s]; None for a block of one."""
+        return float(self.time[-1] - self.time[0]) / (self.size - 1) if self.size > 1 else None
