@@ -20,8 +20,7 @@ from piezo_hysteresis.acquisition.settings import DRIVER, IN_FORCE
 from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
 from piezo_hysteresis.nodes.identification.identification_node import IDENTIFICATION
 from piezo_hysteresis.nodes.model.model_node import MODEL
-from piezo_hysteresis.nodes.runtime.parameters import Discretisation
-from piezo_hysteresis.parameter import Parameter, Row
+from piezo_hysteresis.parameter import Parameter, Row, Setting
 from piezo_hysteresis.stage.plant import PlantParameters
 
 DOCS = Path(__file__).parent
@@ -104,7 +103,7 @@ def settings(rows: Iterable[Row]) -> str:
     """ROS parameters of a node."""
     lines = []
     for row in rows:
-        if isinstance(row, Discretisation):
+        if isinstance(row, Setting):
             value = str(row.value).lower() if isinstance(row.value, bool) else str(row.value)
             lines.append((f"`{row.name}`", value, "", ", ".join(row.choices), row.meaning))
         else:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from piezo_hysteresis import effects
+from piezo_hysteresis import blocks, effects
 from piezo_hysteresis.blocks.kernel import fma
 from piezo_hysteresis.blocks.time import TimeBlock
 from piezo_hysteresis.effects import (
@@ -138,8 +138,9 @@ def rounded_once(x: float, y: float, z: float) -> float:
 @pytest.fixture
 def plain_python(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every kernel replaced by the Python function it was compiled from, with an `fma` that rounds once as theirs."""
-    for info in pkgutil.iter_modules(effects.__path__):
-        module = importlib.import_module(f"{effects.__name__}.{info.name}")
+    rooms = (pkgutil.walk_packages(room.__path__, f"{room.__name__}.") for room in (blocks, effects))
+    modules = [info.name for room in rooms for info in room]
+    for module in map(importlib.import_module, modules):
         for name, value in vars(module).copy().items():
             if hasattr(value, "py_func"):
                 monkeypatch.setattr(module, name, value.py_func)

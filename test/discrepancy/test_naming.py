@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from benchmarks.naming_cases import UNKNOWN, Case
-from benchmarks.naming_experiments import ReadOptions
+from benchmarks.naming_experiments import ProtocolVariant
 from piezo_hysteresis.discrepancy import Verdict, diagnose
 from piezo_hysteresis.effects import BY_NAME, CATALOGUE
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.record import Experiment, Notice, Record
 
-BRIEF = ReadOptions(hold=3.0)
+BRIEF = ProtocolVariant(hold=3.0)
 
 
 @cache

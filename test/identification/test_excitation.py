@@ -117,8 +117,8 @@ def test_a_slew_limit_flattens_the_edges_and_keeps_the_levels():
         lambda: DriveLimits(ramp_rate=0.0),
         lambda: excitation.hold(LIMITS, 1.2, 1.0),
         lambda: protocol.Protocol("empty", LIMITS, ()),
-        lambda: protocol.Protocol("high", LIMITS, (protocol.Phase("step", np.array([0.0, 11.0, 0.0]), 2e-5),)),
-        lambda: protocol.Protocol("unsafe", LIMITS, (protocol.Phase("step", np.array([0.0, 1.0]), 2e-5),)),
+        lambda: protocol.Protocol("high", LIMITS, (protocol.ProtocolPhase("step", np.array([0.0, 11.0, 0.0]), 2e-5),)),
+        lambda: protocol.Protocol("unsafe", LIMITS, (protocol.ProtocolPhase("step", np.array([0.0, 1.0]), 2e-5),)),
     ],
 )
 def test_contradictions_are_refused_in_one_line(make):

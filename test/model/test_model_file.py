@@ -19,7 +19,7 @@ from piezo_hysteresis.model.parameter_file import parameters
 from piezo_hysteresis.parameter import Parameter
 
 MODEL = Model((BoucWen(), Arx(a=[-0.5], b=[1e-05, 0.5]), Offset(y0=3e-9)), 2e-5, displacement_scale=1e-6)
-PUBLISHED = Path(__file__).parent.parent / "config" / "published_stage.yaml"
+PUBLISHED = Path(__file__).parents[2] / "config" / "published_stage.yaml"
 
 
 def _values(row: Parameter) -> st.SearchStrategy:
