@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..discrepancy import Diagnosis, diagnose
 from ..model import model_file
-from ..report.figures.comparison import Comparison, compare
+from ..report.figures.comparison import ModelComparison, compare
 from ..report.json_file import write_json
 from ..report.page import page
 from ..report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _comparison(found: Diagnosis) -> Comparison:
+def _comparison(found: Diagnosis) -> ModelComparison:
     models, nuisances = {}, {}
     if found.baseline is not None:
         models["before"] = found.baseline

@@ -8,10 +8,10 @@ import threading
 
 from ..emulators.daqmx.card import Card
 from ..emulators.daqmx.faults import FAULTS as NI_FAULTS
-from ..emulators.daqmx.server import Server as NiServer
+from ..emulators.daqmx.server import DaqmxServer
 from ..emulators.gcs2.controller import Controller
 from ..emulators.gcs2.faults import FAULTS as GCS2_FAULTS
-from ..emulators.gcs2.server import Server as Gcs2Server
+from ..emulators.gcs2.server import Gcs2Server
 from ..stage.simulated import SimulatedStage
 from .plant_option import add_plant_arguments, plant
 from .terminal import console
@@ -59,13 +59,13 @@ def run(args: argparse.Namespace) -> int:
     port = _PORT[args.device] if args.port is None else args.port
     period = args.servo_time if args.device == "gcs2" else 20e-6
     stage = SimulatedStage(parameters, seed=args.seed, sample_period=period)
-    server: Gcs2Server | NiServer
+    server: Gcs2Server | DaqmxServer
     if args.device == "gcs2":
         faults = [GCS2_FAULTS.parse(text) for text in args.fault]
         controller = Controller(stage, serial=str(args.seed), command_per_volt=args.command_per_volt, faults=faults)
         server = Gcs2Server(controller, args.host, port)
     else:
-        server = NiServer(Card(stage, faults=[NI_FAULTS.parse(text) for text in args.fault]), args.host, port)
+        server = DaqmxServer(Card(stage, faults=[NI_FAULTS.parse(text) for text in args.fault]), args.host, port)
     ended = threading.Event()
     for ending in (signal.SIGINT, signal.SIGTERM):  # also where a shell has told it to ignore them
         signal.signal(ending, lambda *_: ended.set())

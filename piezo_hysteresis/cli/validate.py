@@ -10,7 +10,7 @@ from ..discrepancy.residual.correlation import CAPTION, correlate
 from ..errors import RecordError
 from ..identification.fit.normal_equations import Nuisance
 from ..model import model_file
-from ..report.figures.comparison import Comparison, compare
+from ..report.figures.comparison import ModelComparison, compare
 from ..report.json_file import write_json
 from ..report.tables.error_table import error_table, frequency_table
 from ..report.tables.table import Table
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def answer(comparison: Comparison, tests: list[dict[str, Any]]) -> dict[str, Any]:
+def answer(comparison: ModelComparison, tests: list[dict[str, Any]]) -> dict[str, Any]:
     """The result for machines."""
     now = comparison.now
     assert now is not None
@@ -81,7 +81,7 @@ def answer(comparison: Comparison, tests: list[dict[str, Any]]) -> dict[str, Any
     }
 
 
-def _tests(comparison: Comparison) -> list[dict[str, Any]]:
+def _tests(comparison: ModelComparison) -> list[dict[str, Any]]:
     assert comparison.now is not None
     tests = []
     for record, residual in zip(comparison.experiment, comparison.now.residuals, strict=True):
@@ -120,7 +120,7 @@ def _test_table(tests: list[dict[str, Any]]) -> Table:
     return Table(title, header, rows, CAPTION, frozenset(range(1, 5)))
 
 
-def _draw(comparison: Comparison, folder: Path) -> None:
+def _draw(comparison: ModelComparison, folder: Path) -> None:
     from ..report.figures.gap import gap
     from ..report.figures.time_series import time_series
     from ..report.figures.whiteness import whiteness

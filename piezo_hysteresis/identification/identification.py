@@ -10,7 +10,7 @@ from ..effects import Arx
 from ..model.model import Model
 from ..record import Notice, Samples
 from .fit.fit import Fit
-from .steps.comparison import Comparison
+from .steps.comparison import InputComparison
 from .steps.delay import Delay
 from .steps.dynamics import Dynamics, OrderError
 from .steps.three_steps import ThreeSteps
@@ -59,7 +59,7 @@ class Identification:
         What the three published steps alone reach; None where their phases are missing.
     orders : tuple of OrderError
         Error against order.
-    comparisons : tuple of Comparison
+    comparisons : tuple of InputComparison
         G from v and from w at each noise amplitude.
     phases : tuple of PhaseError
         Free-run error of every record.
@@ -73,7 +73,7 @@ class Identification:
     dynamics: Dynamics | None
     published: ThreeSteps | None
     orders: tuple[OrderError, ...]
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[InputComparison, ...]
     phases: tuple[PhaseError, ...]
     notices: tuple[Notice, ...]
 

@@ -24,7 +24,7 @@ from .identification import Identification, PhaseError
 from .records.conditioning_split import known_from_within
 from .records.leading_step import Blocks, steps_apart
 from .records.roles import HELD_OUT, Roles, roles_of
-from .steps.comparison import Comparison, compare_inputs
+from .steps.comparison import InputComparison, compare_inputs
 from .steps.delay import Delay, identify_delay
 from .steps.dynamics import Dynamics, OrderError, choose_order, compare_orders, delay_of
 from .steps.hysteresis import fit_hysteresis, hysteresis_name
@@ -124,7 +124,7 @@ def identify(
     start = _behind_the_gauge(frame, published, records, roles.loops)
     dynamics: Dynamics | None = None
     table: tuple[OrderError, ...] = ()
-    comparisons: tuple[Comparison, ...] = ()
+    comparisons: tuple[InputComparison, ...] = ()
     blocks: Blocks = (records, floors, roles.fitted)
     if roles.broadband:
         tell("step 2: dynamics", 0.2)

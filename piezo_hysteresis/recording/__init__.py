@@ -42,14 +42,14 @@ from .checks.initial_condition_check import departures, is_within_its_loop
 from .checks.quality import inspect
 from .formats.csv import Csv
 from .formats.format import Format, WritableFormat
-from .formats.gcs_array import GcsArray
+from .formats.gcs_array import GcsArrayFormat
 from .formats.mat import Mat
 from .formats.npz import Npz
 from .segmentation.decimation import load_decimation
 from .table.read_options import Column, ReadOptions
 
 __all__ = [
-    "FORMATS", "Bag", "BagWriter", "Csv", "Format", "GcsArray", "Mat", "Npz", "ReadOptions", "Rosbag2",
+    "FORMATS", "Bag", "BagWriter", "Csv", "Format", "GcsArrayFormat", "Mat", "Npz", "ReadOptions", "Rosbag2",
     "inspect", "read", "recorded_model", "write",
 ]  # fmt: skip
 
@@ -57,7 +57,7 @@ FORMATS: Mapping[str, Format] = {
     "npz": Npz(),
     "rosbag2": Rosbag2(),
     "mat": Mat(),
-    "gcs_array": GcsArray(),
+    "gcs_array": GcsArrayFormat(),
     "csv": Csv(),
 }
 """Name of every format to its reader, in the order in which they are asked whether they know a path."""

@@ -7,15 +7,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
-from .figures.comparison import Comparison
+from .figures.comparison import ModelComparison
 from .figures.drawing import Drawing
 from .tables.table import Table
-from .verdict import Verdict
+from .verdict import VerdictText
 from .words import nanometre
 
 
 def document(
-    title: str, comparison: Comparison, verdict: Verdict, parts: Mapping[str, tuple[Sequence[Drawing], Sequence[Table]]]
+    title: str,
+    comparison: ModelComparison,
+    verdict: VerdictText,
+    parts: Mapping[str, tuple[Sequence[Drawing], Sequence[Table]]],
 ) -> str:
     """The whole page.
 
@@ -23,9 +26,9 @@ def document(
     ----------
     title : str
         Heading.
-    comparison : Comparison
+    comparison : ModelComparison
         For source, chain and the figures under the verdict.
-    verdict : Verdict
+    verdict : VerdictText
         Comes first.
     parts : mapping of str to (drawings, tables)
         Heading of every section and what stands under it.
@@ -80,7 +83,7 @@ def _figure(drawing: Drawing) -> str:
     )
 
 
-def _figures_of_merit(comparison: Comparison) -> Iterator[tuple[str, str]]:
+def _figures_of_merit(comparison: ModelComparison) -> Iterator[tuple[str, str]]:
     now, before = comparison.now, comparison.before
     if now is not None:
         if before is not None:

@@ -11,7 +11,7 @@ from ..errors import RecordingError
 from ..identification.fit.fit import Fit
 from .document import document
 from .figures.bode import bode
-from .figures.comparison import Comparison
+from .figures.comparison import ModelComparison
 from .figures.creep import creep
 from .figures.drawing import Drawing
 from .figures.gap import gap
@@ -28,7 +28,7 @@ from .tables.quality_table import notice_table, record_table
 from .tables.table import Table
 from .verdict import verdict
 
-Draw = Callable[[Comparison], Drawing | None]
+Draw = Callable[[ModelComparison], Drawing | None]
 Progress = Callable[[str, float], None]
 
 SECTIONS: Mapping[str, tuple[Draw, ...]] = {
@@ -75,7 +75,7 @@ class Page:
 
 
 def page(
-    comparison: Comparison,
+    comparison: ModelComparison,
     *,
     fit: Fit | None = None,
     answer: Mapping[str, Any] | None = None,
@@ -86,7 +86,7 @@ def page(
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : ModelComparison
         Experiment and models.
     fit : Fit, optional
         Fit of the last model, for intervals, correlations and bounds.
@@ -115,7 +115,7 @@ def page(
     return Page(document(title, comparison, verdict(comparison, answer), parts), drawings)
 
 
-def _tables(comparison: Comparison, fit: Fit | None, answer: Mapping[str, Any] | None) -> dict[str, list[Table]]:
+def _tables(comparison: ModelComparison, fit: Fit | None, answer: Mapping[str, Any] | None) -> dict[str, list[Table]]:
     tables: dict[str, list[Table | None]] = {
         "Errors": [error_table(comparison), frequency_table(comparison)],
         "Data": [notice_table(comparison.experiment), record_table(comparison.experiment, comparison.noise)],

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .figures.comparison import Comparison
+from .figures.comparison import ModelComparison
 from .words import nanometre
 
 ENOUGH = 1.5
@@ -14,19 +14,19 @@ ENOUGH = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class VerdictText:
     """One headline and the sentences under it."""
 
     headline: str
     sentences: tuple[str, ...]
 
 
-def verdict(comparison: Comparison, answer: Mapping[str, Any] | None = None) -> Verdict:
+def verdict(comparison: ModelComparison, answer: Mapping[str, Any] | None = None) -> VerdictText:
     """Say what the comparison, and the diagnosis if there is one, come to.
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : ModelComparison
         Models against measurement.
     answer : mapping, optional
         The answer of a diagnosis, as it is written for machines.
@@ -34,33 +34,33 @@ def verdict(comparison: Comparison, answer: Mapping[str, Any] | None = None) -> 
     severe = [n.message for n in comparison.experiment.notices if n.severe]
     doubts = tuple(f"Caution: {message}." for message in severe)
     if comparison.now is None:
-        return Verdict("The recording, without a model", (*doubts, "No model was given: only the data are shown."))
+        return VerdictText("The recording, without a model", (*doubts, "No model was given: only the data are shown."))
     if answer is None:
         more = "What is missing, `piezo diagnose` tries to name."
         advice = (more,) if _excess(comparison) > ENOUGH else ()
-        return Verdict(_fit_headline(comparison), (*doubts, *_fit_sentences(comparison), *advice))
+        return VerdictText(_fit_headline(comparison), (*doubts, *_fit_sentences(comparison), *advice))
     said = answer_verdict(answer)
-    return Verdict(said.headline, (*doubts, *said.sentences, *_fit_sentences(comparison)))
+    return VerdictText(said.headline, (*doubts, *said.sentences, *_fit_sentences(comparison)))
 
 
-def answer_verdict(answer: Mapping[str, Any]) -> Verdict:
+def answer_verdict(answer: Mapping[str, Any]) -> VerdictText:
     """What a diagnosis says, from its answer for machines."""
-    return Verdict(_headline(answer), _sentences(answer))
+    return VerdictText(_headline(answer), _sentences(answer))
 
 
-def _excess(comparison: Comparison) -> float:
+def _excess(comparison: ModelComparison) -> float:
     assert comparison.now is not None
     ratios = [(row.rms / comparison.floors[row.index]) ** 2 for row in comparison.now.judged]
     return float(sum(ratios) / len(ratios))
 
 
-def _fit_headline(comparison: Comparison) -> str:
+def _fit_headline(comparison: ModelComparison) -> str:
     now = comparison.now
     assert now is not None
     return f"The model predicts this experiment to {now.percent:.2g} % of range"
 
 
-def _fit_sentences(comparison: Comparison) -> tuple[str, ...]:
+def _fit_sentences(comparison: ModelComparison) -> tuple[str, ...]:
     now, before = comparison.now, comparison.before
     assert now is not None
     worst = max(now.judged, key=lambda row: row.rms / comparison.floors[row.index])

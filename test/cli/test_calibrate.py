@@ -7,7 +7,7 @@ pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'ni
 pytest.importorskip("grpc")
 
 from piezo_hysteresis.emulators.daqmx.card import Card
-from piezo_hysteresis.emulators.daqmx.server import Server
+from piezo_hysteresis.emulators.daqmx.server import DaqmxServer
 from piezo_hysteresis.model.parameter_file import parameters
 from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
 from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
@@ -19,7 +19,7 @@ WAVE = 2.0 - 2.0 * np.cos(2 * np.pi * np.arange(4000) / 2000)
 
 @pytest.fixture
 def address():
-    with Server(Card(SimulatedStage(seed=3), speed=float("inf"))) as server:
+    with DaqmxServer(Card(SimulatedStage(seed=3), speed=float("inf"))) as server:
         yield f"127.0.0.1:{server.port}"
 
 

@@ -12,7 +12,7 @@ from rclpy.parameter import parameter_value_to_python
 from piezo_hysteresis.emulators.fault import Faults
 from piezo_hysteresis.emulators.gcs2.controller import Controller
 from piezo_hysteresis.emulators.gcs2.faults import FAULTS
-from piezo_hysteresis.emulators.gcs2.server import Server
+from piezo_hysteresis.emulators.gcs2.server import Gcs2Server
 from piezo_hysteresis.model.model_file import load
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
@@ -86,7 +86,7 @@ def test_a_controller_with_memory(lab):
     def voltage_now():
         return float(controller.carry_out("VOL? 1").lines[0].partition("=")[2]) / GAIN
 
-    with Server(controller) as server:
+    with Gcs2Server(controller) as server:
         address = {"gcs2__host": server.host, "gcs2__port": server.port}
         driven = Driven(lab, "gcs2", gcs2__amplifier_gain=GAIN, gcs2__points_per_command=500, **address)
         assert "E-727.EMULATED" in driven.in_force("stage")
@@ -105,7 +105,7 @@ def test_a_controller_with_memory(lab):
         assert voltage_now() == 0.0
         driven.configure_again()
     driven.await_failure("lost the link|closed from the other side|cannot connect", "voltage of the stage is unknown")
-    with Server(controller, port=server.port):
+    with Gcs2Server(controller, port=server.port):
         driven.configure_again()
         driven.end(signal.SIGINT, lambda: voltage_now() > 0.5)
         assert voltage_now() == 0.0
@@ -117,10 +117,10 @@ def test_a_card_that_streams(lab):
     pytest.importorskip("grpc")
     from piezo_hysteresis.emulators.daqmx.card import Card
     from piezo_hysteresis.emulators.daqmx.faults import FAULTS as NI_FAULTS
-    from piezo_hysteresis.emulators.daqmx.server import Server as NiServer
+    from piezo_hysteresis.emulators.daqmx.server import DaqmxServer
 
     card = Card(SimulatedStage(seed=3, sample_period=PERIOD))
-    with NiServer(card) as server:
+    with DaqmxServer(card) as server:
         wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1"}
         wiring |= {"nidaqmx__voltage_input": "ai1", "nidaqmx__lead": 1.5, "sample_period": PERIOD}
         driven = Driven(lab, "nidaqmx", block_duration=0.1, **wiring)
@@ -136,7 +136,7 @@ def test_a_card_that_streams(lab):
         assert card.voltage == 0.0
         driven.configure_again()
     driven.await_failure("Failed to connect|Socket closed|no answer", "voltage of the stage is unknown")
-    with NiServer(card, port=server.port):
+    with DaqmxServer(card, port=server.port):
         driven.configure_again()
         driven.end(signal.SIGTERM, lambda: card.voltage > 0.5)
         assert card.voltage == 0.0
@@ -146,7 +146,7 @@ def test_a_card_that_streams(lab):
 @contextmanager
 def emulated_controller():
     controller = Controller(SimulatedStage(seed=3, sample_period=PERIOD))
-    with Server(controller) as server:
+    with Gcs2Server(controller) as server:
         address = {"gcs2__host": server.host, "gcs2__port": server.port}
         yield {"stage": "gcs2", "gcs2__amplifier_gain": GAIN, "gcs2__points_per_command": 500, **address}
 
@@ -155,9 +155,9 @@ def emulated_controller():
 def emulated_card():
     pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
     from piezo_hysteresis.emulators.daqmx.card import Card
-    from piezo_hysteresis.emulators.daqmx.server import Server as NiServer
+    from piezo_hysteresis.emulators.daqmx.server import DaqmxServer
 
-    with NiServer(Card(SimulatedStage(seed=3, sample_period=PERIOD))) as server:
+    with DaqmxServer(Card(SimulatedStage(seed=3, sample_period=PERIOD))) as server:
         wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1", "nidaqmx__lead": 1.5}
         yield {
             "stage": "nidaqmx",

@@ -9,7 +9,7 @@ import pytest
 
 from piezo_hysteresis.discrepancy import Verdict
 from piezo_hysteresis.emulators.gcs2.controller import Controller
-from piezo_hysteresis.emulators.gcs2.server import Server as Gcs2Server
+from piezo_hysteresis.emulators.gcs2.server import Gcs2Server
 from piezo_hysteresis.stage.gcs2.setup import Gcs2Setup
 from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
 from piezo_hysteresis.stage.simulated import SimulatedStage
@@ -64,11 +64,11 @@ def nidaqmx(plant):
     pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
     pytest.importorskip("grpc")
     from piezo_hysteresis.emulators.daqmx.card import Card
-    from piezo_hysteresis.emulators.daqmx.server import Server
+    from piezo_hysteresis.emulators.daqmx.server import DaqmxServer
     from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
     from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
 
-    with Server(Card(SimulatedStage(plant, seed=SEED, sample_period=PERIOD), speed=math.inf)) as server:
+    with DaqmxServer(Card(SimulatedStage(plant, seed=SEED, sample_period=PERIOD), speed=math.inf)) as server:
         wiring = {"voltage_input": "ai1", "amplifier_gain": GAIN, "server": f"127.0.0.1:{server.port}"}
         stage = DaqmxStage(DaqmxSetup("Dev1", sample_period=PERIOD, **wiring))
         late = round(stage.description.latency / PERIOD)

@@ -1,4 +1,4 @@
-"""`Server`: an emulated card behind the port of NI's gRPC device server."""
+"""`DaqmxServer`: an emulated card behind the port of NI's gRPC device server."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LATE = (-200284, "Some or all of the samples requested have not yet been acquir
 _RESOURCE_LOST = (-200324, "Device not available for routing. It is possible that it was removed.")
 
 
-class Server:
+class DaqmxServer:
     """Serves the calls that clocked analogue output and input need; every other one is unimplemented, and says so.
 
     Parameters

@@ -1,4 +1,4 @@
-"""`Server`: an emulated controller behind a TCP port."""
+"""`Gcs2Server`: an emulated controller behind a TCP port."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _CODE_PAGE = "cp1252"
 _LONGEST_LINE = 1 << 20
 
 
-class Server:
+class Gcs2Server:
     """Serves any number of links, one command at a time, from threads of its own.
 
     Parameters
@@ -33,7 +33,7 @@ class Server:
     Examples
     --------
     >>> from piezo_hysteresis.stage.simulated import SimulatedStage
-    >>> with Server(Controller(SimulatedStage(sample_period=50e-6))) as server:
+    >>> with Gcs2Server(Controller(SimulatedStage(sample_period=50e-6))) as server:
     ...     server.port > 0
     True
     """

@@ -1,4 +1,4 @@
-"""`Comparison`: ARX from v against ARX from w, at each amplitude of the noise.
+"""`InputComparison`: ARX from v against ARX from w, at each amplitude of the noise.
 
 Where they disagree, something between v and y depends on amplitude or forgets: the state of a Bouc-Wen operator under
 noise (its gain at low frequency falls towards that of the polynomial), backlash, an amplitude-dependent gain.
@@ -26,7 +26,7 @@ TOLERANCE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class InputComparison:
     """G seen from v and from w at one noise amplitude.
 
     Parameters
@@ -62,7 +62,7 @@ def _shape(dynamics: Dynamics) -> tuple[float, float, float]:
 
 def compare_inputs(
     model: Model, records: Sequence[Record], noise: Collection[int], delay: int, orders: tuple[int, int]
-) -> tuple[tuple[Comparison, ...], tuple[Notice, ...]]:
+) -> tuple[tuple[InputComparison, ...], tuple[Notice, ...]]:
     """Identify G from v and from w of the model, separately for every noise amplitude.
 
     Parameters
@@ -80,7 +80,7 @@ def compare_inputs(
 
     Returns
     -------
-    comparisons : tuple of Comparison
+    comparisons : tuple of InputComparison
         In rising order of amplitude; records within 20 % of one another count as one amplitude.
     notices : tuple of Notice
         ``inputs_disagree`` where v and w do, ``amplitude_dependent`` where two amplitudes of the noise do.
@@ -97,7 +97,9 @@ def compare_inputs(
         signals: Signals = voltage_signals([records[i] for i in group], model.voltage_scale, model.displacement_scale)
         shape_v, lag_v, _ = _shape(identify_arx(signals, delay, model.sample_period, orders))
         shape_w, lag_w, gain_w = _shape(dynamics_behind(model, records, group, delay, orders))
-        comparisons.append(Comparison(float(np.mean([rms[i] for i in group])), shape_v, shape_w, lag_v, lag_w, gain_w))
+        comparisons.append(
+            InputComparison(float(np.mean([rms[i] for i in group])), shape_v, shape_w, lag_v, lag_w, gain_w)
+        )
     notices = []
     worst = max(comparisons, key=lambda c: abs(c.from_v / c.from_w - 1.0), default=None)
     if worst is not None and abs(worst.from_v / worst.from_w - 1.0) > TOLERANCE:

@@ -16,7 +16,7 @@ from ..table.text_cells import BLOCK_BYTES, Dialect, decoded, read_cells
 _END = "# END_HEADER"
 
 
-class GcsArray:
+class GcsArrayFormat:
     """Text with ``# KEY = value`` lines up to ``# END_HEADER``, then rows of numbers.
 
     Without a mapping the first column whose name speaks of a voltage is the drive [V], and the first one that speaks of

@@ -12,7 +12,7 @@ from ...errors import IdentificationError
 from ...identification.steps.frequency_response import FrequencyResponse, swept, welch
 from ...model.model import Model
 from ...record import Record
-from .comparison import Comparison
+from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import BLACK, GREEN, PREDICTED, SKY, canvas, handles_of, legend_above, plain_log, styled
 
@@ -27,7 +27,7 @@ GAP = 8
 
 
 @styled
-def bode(comparison: Comparison) -> Drawing | None:
+def bode(comparison: ModelComparison) -> Drawing | None:
     """Gain and phase from drive to displacement, from the noise phases or what replaces them."""
     levels = _levels(comparison)
     if not levels:
@@ -89,7 +89,7 @@ def bode(comparison: Comparison) -> Drawing | None:
     )
 
 
-def _levels(comparison: Comparison) -> list[tuple[float, list[int]]]:
+def _levels(comparison: ModelComparison) -> list[tuple[float, list[int]]]:
     """Broadband records of one sample period, grouped by the rms of their drive; at most two groups, largest first."""
     for phases in (("noise",), ("multisine",), ("chirp",), ("validation",)):
         members = comparison.indices(*phases)

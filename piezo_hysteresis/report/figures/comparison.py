@@ -1,4 +1,4 @@
-"""`Comparison`: an experiment and the models held against it, the one to report last."""
+"""`ModelComparison`: an experiment and the models held against it, the one to report last."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Comparison:
+class ModelComparison:
     """What all figures of a report are drawn from.
 
     Parameters
@@ -77,7 +77,7 @@ def compare(
     models: Mapping[str, Model] | None = None,
     nuisances: Mapping[str, Nuisance] | None = None,
     record_floors: Sequence[float] | None = None,
-) -> Comparison:
+) -> ModelComparison:
     """Simulate every model over the experiment.
 
     Parameters
@@ -94,7 +94,7 @@ def compare(
     models, nuisances = dict(models or {}), nuisances or {}
     records = experiment.records
     noise = noise_floors(records)
-    return Comparison(
+    return ModelComparison(
         experiment=experiment,
         models=models,
         errors={label: errors(model, experiment, nuisances.get(label)) for label, model in models.items()},

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ...identification.records.edges import find_edges
 from ...record import Record
 from ..words import duration
-from .comparison import Comparison
+from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import BEFORE, MEASURED, PREDICTED, canvas, plain_log, styled
 
@@ -24,7 +24,7 @@ POINTS = 60
 
 
 @styled
-def creep(comparison: Comparison) -> Drawing | None:
+def creep(comparison: ModelComparison) -> Drawing | None:
     """Displacement since 0.1 s after a change of level, in % of that change: mean over the holds."""
     holds = [h for i, r in enumerate(comparison.experiment) for h in _holds(r, i)]
     if not holds:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .comparison import Comparison
+from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import BLUE, GREY, ORANGE, canvas, handles_of, legend_above, plain_log, styled
 
 
 @styled
-def gap(comparison: Comparison) -> Drawing | None:
+def gap(comparison: ModelComparison) -> Drawing | None:
     """Dots on a logarithmic axis: floor, error of the first model, error of the last one."""
     now, before = comparison.now, comparison.before
     if now is None:

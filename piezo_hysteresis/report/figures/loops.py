@@ -10,7 +10,7 @@ from scipy.signal import find_peaks
 
 from ...discrepancy.residual.residual import drive_frequency
 from ...record import Record
-from .comparison import Comparison
+from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import MEASURED, PREDICTED, canvas, styled
 from .thinning import thinned
@@ -80,7 +80,7 @@ def opening(voltage: Array, displacement: Array) -> float:
 
 
 @styled
-def loops_by_amplitude(comparison: Comparison) -> Drawing | None:
+def loops_by_amplitude(comparison: ModelComparison) -> Drawing | None:
     """Slow loops of up to six swings, from the largest to the smallest."""
     slow = comparison.indices("triangle", "minor")
     sines = [row for row in _sines(comparison) if row[0] <= 10.0]
@@ -110,7 +110,7 @@ def loops_by_amplitude(comparison: Comparison) -> Drawing | None:
 
 
 @styled
-def loops_by_frequency(comparison: Comparison) -> Drawing | None:
+def loops_by_frequency(comparison: ModelComparison) -> Drawing | None:
     """The last cycle of every sine: rate-dependent hysteresis and lag open the loop with frequency."""
     kept, titles = [], []
     for frequency, index in _sines(comparison)[:PANELS]:
@@ -133,7 +133,7 @@ def loops_by_frequency(comparison: Comparison) -> Drawing | None:
     )
 
 
-def _sines(comparison: Comparison) -> list[tuple[float, int]]:
+def _sines(comparison: ModelComparison) -> list[tuple[float, int]]:
     named = ((drive_frequency(r), i) for i, r in enumerate(comparison.experiment))
     return sorted({f: (f, i) for f, i in named if f is not None}.values())
 
@@ -144,7 +144,7 @@ def _steady(record: Record, cycle: Cycle, frequency: float) -> bool:
 
 
 def _drawing(
-    comparison: Comparison, kept: list[Cycle], titles: list[str], name: str, title: str, caption: str
+    comparison: ModelComparison, kept: list[Cycle], titles: list[str], name: str, title: str, caption: str
 ) -> Drawing:
     columns = min(3, len(kept))
     rows = -(-len(kept) // columns)

@@ -7,7 +7,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from .comparison import Comparison
+from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import BLUE, GREY, ORANGE, canvas, handles_of, legend_above, styled
 
@@ -21,7 +21,7 @@ DECADES = 30.0
 
 
 @styled
-def residual_maps(comparison: Comparison) -> Drawing | None:
+def residual_maps(comparison: ModelComparison) -> Drawing | None:
     """Maps of residual against u, y and du/dt, with the mean of rising and of falling drive."""
     now = comparison.now
     if now is None:
@@ -74,7 +74,7 @@ def residual_maps(comparison: Comparison) -> Drawing | None:
     )
 
 
-def _samples(comparison: Comparison) -> list[tuple[Array, Array, Array, Array]]:
+def _samples(comparison: ModelComparison) -> list[tuple[Array, Array, Array, Array]]:
     assert comparison.now is not None
     parts = []
     for record, residual in zip(comparison.experiment, comparison.now.residuals, strict=True):

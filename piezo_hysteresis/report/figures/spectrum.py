@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from ..words import duration
-from .comparison import Comparison
+from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import BEFORE, FLOOR, MEASURED, PREDICTED, canvas, handles_of, legend_above, styled
 
@@ -18,7 +18,7 @@ PANELS = 3
 
 
 @styled
-def residual_spectrum(comparison: Comparison) -> Drawing | None:
+def residual_spectrum(comparison: ModelComparison) -> Drawing | None:
     """Amplitude density of displacement, residual and floor, one panel per sample period of the experiment."""
     now, before = comparison.now, comparison.before
     if now is None:

@@ -11,7 +11,7 @@ from ...errors import IdentificationError
 from ...identification.steps.delay import identify_delay
 from ...identification.steps.step_response import StepResponse, step_response
 from ..words import duration
-from .comparison import Comparison
+from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import BLUE, GREEN, MEASURED, PREDICTED, canvas, styled
 
@@ -20,7 +20,7 @@ ZOOM = 24
 
 
 @styled
-def step(comparison: Comparison) -> Drawing | None:
+def step(comparison: ModelComparison) -> Drawing | None:
     """Response per volt to the fastest edges of the experiment, averaged, ± 2σ of the noise."""
     members = comparison.indices("step", "steps") or list(range(len(comparison.experiment)))
     period = min(comparison.experiment[i].sample_period for i in members)

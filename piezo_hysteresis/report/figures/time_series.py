@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 
 from ...discrepancy.residual.residual import drive_frequency
 from ...record import Record
-from .comparison import Comparison
+from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import BEFORE, FLOOR, MEASURED, PREDICTED, RESIDUAL, canvas, handles_of, legend_above, styled
 from .thinning import thinned
@@ -44,7 +44,7 @@ def window(record: Record, residual: Array | None) -> slice:
 
 
 @styled
-def time_series(comparison: Comparison) -> Drawing:
+def time_series(comparison: ModelComparison) -> Drawing:
     """One panel per phase name: displacement above, residual below; fast phases around their largest residual."""
     first: dict[str, int] = {}
     for index, record in enumerate(comparison.experiment):
@@ -124,5 +124,5 @@ def time_series(comparison: Comparison) -> Drawing:
     )
 
 
-def _rms(comparison: Comparison, index: int) -> float:
+def _rms(comparison: ModelComparison, index: int) -> float:
     return 0.0 if comparison.now is None else comparison.now.rows[index].rms

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...discrepancy.residual.correlation import CAPTION, correlate
 from ...errors import RecordError
-from .comparison import Comparison
+from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import BLACK, GREY, canvas, styled
 from .thinning import thinned
@@ -18,7 +18,7 @@ WIDE = 0.1
 
 
 @styled
-def whiteness(comparison: Comparison) -> Drawing | None:
+def whiteness(comparison: ModelComparison) -> Drawing | None:
     """Auto- and cross-correlation of the residual in the phase with the broadest drive."""
     now = comparison.now
     if now is None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from ..figures.comparison import Comparison
+from ..figures.comparison import ModelComparison
 from .table import Table
 
 
-def error_table(comparison: Comparison) -> Table | None:
+def error_table(comparison: ModelComparison) -> Table | None:
     """Every record: its floor, the error of every model, and of the last one in nm, at worst and as fit."""
     now = comparison.now
     if now is None:
@@ -56,7 +56,7 @@ def error_table(comparison: Comparison) -> Table | None:
     )
 
 
-def frequency_table(comparison: Comparison) -> Table | None:
+def frequency_table(comparison: ModelComparison) -> Table | None:
     """Error of every model at every frequency of the sine phases, as in the paper's Table 1."""
     now = comparison.now
     if now is None or not now.by_frequency:

@@ -27,7 +27,7 @@ _ELEMENTS_PER_DECADE = 4
 
 
 @dataclass(frozen=True)
-class Creep(Group):
+class PlantCreep(Group):
     """Hidden effect: displacement that goes on growing after each change of level."""
 
     gamma: float = quantity(0.0, "1/decade", -0.1, 0.1, "growth of the step response per decade at 0.1 s")
@@ -66,7 +66,7 @@ class Creep(Group):
 class Bank:
     """Creep in motion, settled at the normalised output `w`: every element relaxed."""
 
-    def __init__(self, creep: Creep, clock: Clock, w: float) -> None:
+    def __init__(self, creep: PlantCreep, clock: Clock, w: float) -> None:
         tau, weight, start = creep.elements()
         self.active = tau.size > 0
         self._start = start

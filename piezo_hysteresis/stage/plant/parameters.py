@@ -8,7 +8,7 @@ from typing import Any
 
 from ...errors import ParameterError
 from ...parameter import Parameter, Value
-from .creep import Creep
+from .creep import PlantCreep
 from .electronics import Electronics
 from .environment import Environment
 from .hysteresis import Hysteresis
@@ -19,7 +19,7 @@ from .structure import Structure
 _GROUPS: dict[str, type[Group]] = {
     "electronics": Electronics,
     "hysteresis": Hysteresis,
-    "creep": Creep,
+    "creep": PlantCreep,
     "structure": Structure,
     "sensor": Sensor,
     "environment": Environment,
@@ -53,7 +53,7 @@ class PlantParameters:
 
     electronics: Electronics = field(default_factory=Electronics)
     hysteresis: Hysteresis = field(default_factory=Hysteresis)
-    creep: Creep = field(default_factory=Creep)
+    creep: PlantCreep = field(default_factory=PlantCreep)
     structure: Structure = field(default_factory=Structure)
     sensor: Sensor = field(default_factory=Sensor)
     environment: Environment = field(default_factory=Environment)

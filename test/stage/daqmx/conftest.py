@@ -13,7 +13,7 @@ pytest.importorskip("grpc")
 
 from piezo_hysteresis.emulators.daqmx.card import Card
 from piezo_hysteresis.emulators.daqmx.faults import FAULTS
-from piezo_hysteresis.emulators.daqmx.server import Server
+from piezo_hysteresis.emulators.daqmx.server import DaqmxServer
 from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
 from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
 from piezo_hysteresis.stage.simulated import SimulatedStage
@@ -27,7 +27,7 @@ class Rig:
     """A card, its server, and the back end."""
 
     card: Card
-    server: Server
+    server: DaqmxServer
     stage: DaqmxStage | None = None
 
     def setup(self, **changes) -> DaqmxSetup:
@@ -42,7 +42,7 @@ def rig():
 
     def make(*faults: str, plant=None, seed=3, speed=math.inf, opened=True, **changes) -> Rig:
         card = Card(SimulatedStage(plant, seed=seed), speed=speed, faults=[FAULTS.parse(f) for f in faults])
-        rig = Rig(card, Server(card))
+        rig = Rig(card, DaqmxServer(card))
         made.append(rig)
         rig.server.__enter__()
         if opened:

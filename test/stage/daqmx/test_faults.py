@@ -5,7 +5,7 @@ import pytest
 
 from piezo_hysteresis.emulators.daqmx.card import Card
 from piezo_hysteresis.emulators.daqmx.faults import FAULTS
-from piezo_hysteresis.emulators.daqmx.server import Server
+from piezo_hysteresis.emulators.daqmx.server import DaqmxServer
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
 from piezo_hysteresis.stage.daqmx.stage import DaqmxStage
@@ -95,7 +95,7 @@ def test_a_server_that_went_away_and_came_back_is_found_again(rig, streamed, ide
         r.stage.exchange(WAVE[800:1200])
     stands = r.card.voltage
     assert stands > 1.0, "the card holds its output"
-    with Server(r.card, port=port):
+    with DaqmxServer(r.card, port=port):
         r.stage.safe()
         assert r.card.voltage == r.stage.voltage == 0.0
         voltage, _ = streamed(r.stage, WAVE, *BLOCKS)

@@ -9,7 +9,7 @@ import pytest
 
 from piezo_hysteresis.emulators.gcs2.controller import Controller
 from piezo_hysteresis.emulators.gcs2.faults import FAULTS
-from piezo_hysteresis.emulators.gcs2.server import Server
+from piezo_hysteresis.emulators.gcs2.server import Gcs2Server
 from piezo_hysteresis.stage.gcs2.client import Client
 from piezo_hysteresis.stage.gcs2.connection import Connection
 from piezo_hysteresis.stage.gcs2.setup import Gcs2Setup
@@ -38,7 +38,7 @@ class Bench:
     """A controller, its port, the back end, and a second link of an observer."""
 
     controller: Listening
-    server: Server
+    server: Gcs2Server
     stage: Gcs2Stage | None = None
 
     def setup(self, **changes) -> Gcs2Setup:
@@ -66,7 +66,7 @@ def bench():
     def make(*faults: str, plant=None, seed=3, speed=math.inf, opened=True, controller=None, **changes) -> Bench:
         simulated = SimulatedStage(plant, seed=seed, sample_period=SERVO_TIME)
         options = {"faults": [FAULTS.parse(f) for f in faults], "speed": speed, **(controller or {})}
-        bench = Bench(heard := Listening(simulated, **options), Server(heard))
+        bench = Bench(heard := Listening(simulated, **options), Gcs2Server(heard))
         made.append(bench)
         bench.server.__enter__()
         if opened:

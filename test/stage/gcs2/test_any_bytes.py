@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from piezo_hysteresis.emulators.gcs2 import answer
 from piezo_hysteresis.emulators.gcs2.controller import BYTES, Controller
-from piezo_hysteresis.emulators.gcs2.server import Server, cut
+from piezo_hysteresis.emulators.gcs2.server import Gcs2Server, cut
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.stage.gcs2.array import GcsArray
 from piezo_hysteresis.stage.gcs2.axis import NEEDED
@@ -154,7 +154,7 @@ def controller():
 
 @pytest.fixture(scope="module")
 def served(controller):
-    with Server(controller) as server:
+    with Gcs2Server(controller) as server:
         yield server
 
 
