@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.one_core import on_one_core
 from ..effects import CATALOGUE, Effect
 from ..errors import IdentificationError
 from ..identification.fit.fit import Fit, Progress
 from ..identification.fit.normal_equations import Nuisance, residuals
+from ..identification.one_core import on_one_core
 from ..identification.records.roles import CARRYING
 from ..model.model import Model
 from ..record import Experiment, Notice

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..blocks.one_core import on_one_core
 from ..effects import Arx, BoucWen, Effect, Offset
 from ..errors import IdentificationError
 from ..model.model import Model
@@ -21,6 +20,7 @@ from .fit.fit import Fit, Progress
 from .fit.joint import fit_dynamics, fit_lag
 from .fit.normal_equations import Nuisance, residuals
 from .identification import Identification, PhaseError
+from .one_core import on_one_core
 from .records.conditioning_split import known_from_within
 from .records.leading_step import Blocks, steps_apart
 from .records.roles import HELD_OUT, Roles, roles_of

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ..blocks.block import Block, State, SumBlock
 from ..blocks.channel import ChannelBlock
-from ..blocks.samples import not_finite
 from ..blocks.scaling import ChangeOfUnit, hand_out, take_in
 from ..effects import ChainPosition, Discretisation, Effect
 from ..errors import DivergenceError
+from .samples import not_finite
 
 Array = NDArray[np.float64]
 Channels = Mapping[str, Array]

@@ -10,12 +10,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..blocks.samples import row
 from ..effects import CHAIN, Discretisation, Effect, Offset
 from ..errors import ModelError
 from ..parameter import Parameter, Value
 from ..record import Record
 from .chain import Chain, ChainState, ChainTangent, Channels
+from .samples import row
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..blocks.samples import samples
 from ..errors import DivergenceError, RecordError
 from ..model.chain import Chain, ChainState
 from ..model.model import Model
+from ..model.samples import samples
 from .running_rms import RunningRms
 from .sensor_offset import SensorOffset
 from .sequence_check import LONGEST_SILENCE, SequenceCheck

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from piezo_hysteresis.blocks.one_core import on_one_core
 from piezo_hysteresis.errors import IdentificationError
+from piezo_hysteresis.identification.one_core import on_one_core
 
 
 def _threads() -> set[int]:

@@ -1,0 +1,120 @@
+"""What `make lint` checks of the layout: class names, folder and file sizes, docstrings of constants, commit subjects.
+
+Every finding is one line; without findings nothing is printed and the exit status is 0.
+"""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+"""The repository."""
+PACKAGE = ROOT / "piezo_hysteresis"
+"""The Python package."""
+MOST_MODULES = 16
+"""Modules in a folder of the package at most, `__init__.py` aside."""
+MOST_LINES = 250
+"""Lines of a module of the package at most."""
+LONGER = {
+    "piezo_hysteresis/record.py": 260,
+    "piezo_hysteresis/model/model.py": 265,
+    "piezo_hysteresis/online/predictor.py": 295,
+    "piezo_hysteresis/recording/bag/rosbag2.py": 260,
+    "piezo_hysteresis/recording/table/text_cells.py": 260,
+}
+"""Modules that are longer, and how long they may be."""
+UNDOCUMENTED = 229
+"""Constants without a docstring that are still allowed."""
+LONGEST_SUBJECT = 72
+"""Characters of the first line of a commit message."""
+SUBJECTS_SINCE = "2026-11-22T19:30:00+00:00"
+"""Commits written before are older than the rule on subjects."""
+
+
+def findings() -> Iterator[str]:
+    """Everything that breaks a rule."""
+    modules = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
+    yield from repeated_classes(modules)
+    yield from full_folders(list(modules))
+    yield from long_files(list(modules))
+    bare = list(bare_constants(modules))
+    if len(bare) > UNDOCUMENTED:
+        yield from bare
+    yield from long_subjects()
+
+
+def repeated_classes(modules: dict[Path, ast.Module]) -> Iterator[str]:
+    """Public classes of one name in two modules."""
+    homes: dict[str, list[str]] = defaultdict(list)
+    for path, tree in modules.items():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes[node.name].append(str(path.relative_to(ROOT)))
+    for name, paths in homes.items():
+        if len(paths) > 1:
+            yield f"class {name} stands in {' and '.join(paths)}, expected every public class name once; rename one"
+
+
+def full_folders(paths: list[Path]) -> Iterator[str]:
+    """Folders with too many modules."""
+    counts: dict[Path, int] = defaultdict(int)
+    for path in paths:
+        counts[path.parent] += path.name != "__init__.py"
+    for folder, count in counts.items():
+        if count > MOST_MODULES:
+            yield f"{folder.relative_to(ROOT)} holds {count} modules, expected at most {MOST_MODULES}; group them"
+
+
+def long_files(paths: list[Path]) -> Iterator[str]:
+    """Modules with too many lines."""
+    for path in paths:
+        name = str(path.relative_to(ROOT))
+        lines, most = len(path.read_text(encoding="utf-8").splitlines()), LONGER.get(name, MOST_LINES)
+        if lines > most:
+            yield f"{name} has {lines} lines, expected at most {most}; split it"
+
+
+def bare_constants(modules: dict[Path, ast.Module]) -> Iterator[str]:
+    """Module constants (capitals) that no docstring follows."""
+    for path, tree in modules.items():
+        for node, following in zip(tree.body, [*tree.body[1:], None], strict=True):
+            names = _constants(node)
+            if names and not _is_docstring(following):
+                where = f"{path.relative_to(ROOT)}:{node.lineno}"
+                yield f"{where}: constant {', '.join(names)} has no docstring; say below it what it is, with its unit"
+
+
+def _constants(node: ast.stmt) -> list[str]:
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+    names = [inner.id for target in targets for inner in ast.walk(target) if isinstance(inner, ast.Name)]
+    return names if all(name.isupper() and len(name) > 1 for name in names) else []
+
+
+def _is_docstring(node: ast.stmt | None) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+
+
+def long_subjects() -> Iterator[str]:
+    """New commits whose subject is too long; a copy without history has none."""
+    command = ["git", "-C", str(ROOT), "log", "--format=%h%x09%aI%x09%s"]
+    try:
+        log = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):
+        return
+    since = datetime.fromisoformat(SUBJECTS_SINCE)
+    for line in log.splitlines():
+        commit, written, subject = line.split("\t", 2)
+        if datetime.fromisoformat(written) >= since and len(subject) > LONGEST_SUBJECT:
+            yield f"commit {commit}: subject of {len(subject)} characters, expected {LONGEST_SUBJECT}; reword it"
+
+
+if __name__ == "__main__":
+    found = list(findings())
+    sys.stdout.writelines(f"{line}\n" for line in found)
+    sys.exit(bool(found))
