@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from piezo_hysteresis.compensation import Inverse
 from piezo_hysteresis.effects import BASELINE, CATALOGUE, Arx, BoucWen, Offset, PublishedBoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -22,4 +23,5 @@ for model in models:
         record = Record(DRIVE, DRIVE, period)
         model.simulate(record)
         model.sensitivities(record, list(model.values()))
+    Inverse(model, approximate=True).run(1e-3 * DRIVE, Inverse(model, approximate=True).rest(0.0))
 SimulatedStage().play(DRIVE)

@@ -6,7 +6,7 @@ import numpy as np
 
 from .block import Array, State
 from .kernel import fma, kernel
-from .linear import LinearBlock
+from .linear import LinearBlock, Section
 
 ORDER = 8
 """Taps and feedback go in groups of this many, padded with zeros: eight numbers stay in registers."""
@@ -160,6 +160,10 @@ class ArxBlock(LinearBlock):
         self.taps_slope = padded(np.convolve(b, slopes))
         self.feedback = padded(a)
         self._gain_slopes = dc_gain_slopes(a, b)
+
+    def sections(self) -> tuple[Section, ...]:
+        """G(z), one section."""
+        return ((np.concatenate((np.zeros(self.offset), self.taps)), np.append(1.0, self.a)),)
 
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.offset + self.taps.size - 1 + self.feedback.size))

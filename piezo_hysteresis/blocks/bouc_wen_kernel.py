@@ -58,11 +58,53 @@ def advance(h, drive, length, r_same, r_flipped):
 
 
 @kernel
-def run_plain(v, p, p1, p2, state, w):
-    """The n = 1 loop without terms. state = [h, v_last], updated; w (n,) is filled.
+def plain_step(h, dv, a, beta, gamma):
+    """h after the n = 1 loop without terms has gone by dv ≠ 0.
 
     Both losses are ready before h is known: each step waits for the last h only for a choice and two products.
     """
+    s, length = copysign(1.0, dv), abs(dv)
+    drive = s * a
+    r_above, r_below = beta + gamma * s, beta - gamma * s
+    above, below = decay(r_above, length), decay(r_below, length)
+    is_above = h > 0.0 or (h == 0.0 and drive > 0.0)
+    r_same = r_above if is_above else r_below
+    end = h + (drive - r_same * h) * (above if is_above else below)
+    if end * h < 0.0:
+        r_flipped = r_below if is_above else r_above
+        end = drive * decay(r_flipped, max(0.0, length - crossing(h, drive, r_same)))
+    return end
+
+
+@kernel
+def general_step(h, dv, p, sample_period, jump_period):
+    """h after the loop with all its terms has gone by dv ≠ 0. A jump takes `jump_period`, all else `sample_period`."""
+    n, k = p[EXPONENT], p[RATE]
+    s = copysign(1.0, dv)
+    drive = s * p[A]
+    if k != 0.0:
+        period = jump_period if abs(dv) > JUMP else sample_period
+        drive = drive * (1.0 + k * rate_factor(abs(dv) / period, p[RATE_EXPONENT]))
+    steps = 1
+    if n != 1.0:
+        steps = max(1, int(ceil(abs(dv) / SUB_STEP)))
+    length = abs(dv) / steps
+    for _ in range(steps):
+        g = copysign(1.0, drive if h == 0.0 else h)
+        bend, gm = p[PHI1] * s, p[PHI2] * g
+        same, flipped = p[BETA] + p[GAMMA] * s * g, p[BETA] - p[GAMMA] * s * g
+        if n != 1.0:
+            power = abs(h / H_REFERENCE) ** (n - 1.0)
+            middle = advance(h, drive, 0.5 * length, power * same - bend - gm, power * flipped - bend + gm)
+            power = abs(middle / H_REFERENCE) ** (n - 1.0)
+            same, flipped = power * same, power * flipped
+        h = advance(h, drive, length, same - bend - gm, flipped - bend + gm)
+    return h
+
+
+@kernel
+def run_plain(v, p, p1, p2, state, w):
+    """The n = 1 loop without terms. state = [h, v_last], updated; w (n,) is filled."""
     a, beta, gamma = p[A], p[BETA], p[GAMMA]
     h, last = state[0], state[1]
     for i in range(v.size):
@@ -70,17 +112,7 @@ def run_plain(v, p, p1, p2, state, w):
         dv = x - last
         if dv != 0.0:
             last = x
-            s, length = copysign(1.0, dv), abs(dv)
-            drive = s * a
-            r_above, r_below = beta + gamma * s, beta - gamma * s
-            above, below = decay(r_above, length), decay(r_below, length)
-            is_above = h > 0.0 or (h == 0.0 and drive > 0.0)
-            r_same = r_above if is_above else r_below
-            end = h + (drive - r_same * h) * (above if is_above else below)
-            if end * h < 0.0:
-                r_flipped = r_below if is_above else r_above
-                end = drive * decay(r_flipped, max(0.0, length - crossing(h, drive, r_same)))
-            h = end
+            h = plain_step(h, dv, a, beta, gamma)
         w[i] = p1 * x * x * x + p2 * x + h
     state[0], state[1] = h, last
 
@@ -88,31 +120,12 @@ def run_plain(v, p, p1, p2, state, w):
 @kernel
 def run_general(v, p, p1, p2, sample_period, jump_period, state, w):
     """The loop with all its terms; arguments as `run_plain`. A jump takes `jump_period`, all else `sample_period`."""
-    n, k = p[EXPONENT], p[RATE]
     h, last = state[0], state[1]
     for i in range(v.size):
         x = v[i]
         dv = x - last
         if dv != 0.0:
             last = x
-            s = copysign(1.0, dv)
-            drive = s * p[A]
-            if k != 0.0:
-                period = jump_period if abs(dv) > JUMP else sample_period
-                drive = drive * (1.0 + k * rate_factor(abs(dv) / period, p[RATE_EXPONENT]))
-            steps = 1
-            if n != 1.0:
-                steps = max(1, int(ceil(abs(dv) / SUB_STEP)))
-            length = abs(dv) / steps
-            for _ in range(steps):
-                g = copysign(1.0, drive if h == 0.0 else h)
-                bend, gm = p[PHI1] * s, p[PHI2] * g
-                same, flipped = p[BETA] + p[GAMMA] * s * g, p[BETA] - p[GAMMA] * s * g
-                if n != 1.0:
-                    power = abs(h / H_REFERENCE) ** (n - 1.0)
-                    middle = advance(h, drive, 0.5 * length, power * same - bend - gm, power * flipped - bend + gm)
-                    power = abs(middle / H_REFERENCE) ** (n - 1.0)
-                    same, flipped = power * same, power * flipped
-                h = advance(h, drive, length, same - bend - gm, flipped - bend + gm)
+            h = general_step(h, dv, p, sample_period, jump_period)
         w[i] = p1 * x * x * x + p2 * x + h
     state[0], state[1] = h, last

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .block import Array, State
-from .linear import AddedBlock
+from .linear import AddedBlock, Section
 
 
 class FirBlock(AddedBlock):
@@ -28,6 +28,10 @@ class FirBlock(AddedBlock):
         self.added = np.concatenate((np.zeros(first), taps))
         self.added[0] -= 1.0
         self.slopes = np.pad(slopes, ((0, 0), (first, 0)))
+
+    def sections(self) -> tuple[Section, ...]:
+        """The direct path and the taps, one section without poles."""
+        return ((self.added + np.eye(1, self.added.size)[0], np.ones(1)),)
 
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.added.size - 1))

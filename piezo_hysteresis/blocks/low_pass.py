@@ -6,7 +6,7 @@ import numpy as np
 
 from .block import Array, State
 from .kernel import kernel
-from .linear import AddedBlock
+from .linear import AddedBlock, Section
 from .relaxation import hold
 
 
@@ -64,6 +64,11 @@ class LowPassBlock(AddedBlock):
         fade, lead, fade_slope, lead_slope = (float(c[0]) for c in step)
         self.step = (1.0 - fade, lead, fade - lead)
         self.slopes = (-fade_slope, lead_slope, fade_slope - lead_slope)
+
+    def sections(self) -> tuple[Section, ...]:
+        """One section for every pole."""
+        left, lead, back = self.step
+        return ((np.array([lead, back]), np.array([1.0, -left])),) * self.count
 
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, 1 + self.count))

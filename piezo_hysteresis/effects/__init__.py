@@ -29,6 +29,7 @@ from .hysteresis.hysteresis_memory import HysteresisMemory
 from .hysteresis.initial_state import InitialState
 from .hysteresis.published_bouc_wen import PublishedBoucWen
 from .hysteresis.rate_dependent_hysteresis import RateDependentHysteresis
+from .inversion import Inversion
 from .material.creep import Creep
 from .material.creep_exponential import CreepExponential
 from .material.creep_fractional import CreepFractional
@@ -115,6 +116,7 @@ __all__ = [
     "HysteresisExponent",
     "HysteresisMemory",
     "InitialState",
+    "Inversion",
     "MainsHum",
     "Offset",
     "ChainPosition",

@@ -18,6 +18,7 @@ from ..blocks.block import Block
 from ..errors import ModelError, ParameterError
 from ..parameter import Parameter, Value
 from .extent import Extent
+from .inversion import Inversion
 
 
 class ChainPosition(IntEnum):
@@ -89,6 +90,8 @@ class Effect(ABC):
     """Extra channel of the record that is needed: ``other_displacement`` or ``temperature``."""
     twin: ClassVar[str | None] = None
     """Effect that is one with this one on slow drive: what remains beside the one is the form of it, not the other."""
+    inversion: ClassVar[Inversion]
+    """Whether `piezo_hysteresis.compensation` can turn the effect round."""
     equation: ClassVar[str]
     signature: ClassVar[str]
     source: ClassVar[str]

@@ -12,6 +12,7 @@ from ...blocks.kernel import kernel
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
+from ..inversion import Inversion
 
 UNLIMITED = 1e9
 
@@ -26,6 +27,7 @@ class AmplifierSlewLimit(Effect):
     """
 
     name = "amplifier_slew_limit"
+    inversion = Inversion.EXACT
     family = "amplifier"
     place = ChainPosition.DRIVE
     equation = "|dy/dt| ≤ S = I_max/C"

@@ -12,6 +12,7 @@ from ...blocks.softened_arx import SlowSoftenedBlock, SoftenedArxBlock, StaticSo
 from ...errors import ModelError, ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
+from ..inversion import Inversion
 from .softening import Softening
 
 LONGEST_DELAY = 1e6
@@ -47,6 +48,7 @@ class Arx(Effect):
     """
 
     name = "arx"
+    inversion = Inversion.EXACT
     family = "dynamics"
     place = ChainPosition.DYNAMICS
     equation = "G(z) = z^(−d) (b1 + b2 z⁻¹ + …)/(1 + a1 z⁻¹ + …)"

@@ -10,10 +10,11 @@ from scipy.linalg import expm, expm_frechet
 from ...blocks.block import Array, Block, State
 from ...blocks.fir import FirBlock
 from ...blocks.kernel import kernel
-from ...blocks.linear import AddedBlock
+from ...blocks.linear import AddedBlock, Section
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
+from ..inversion import Inversion
 
 RESOLVED = 0.25
 """Cycles per sample up to which the mode is simulated; faster ones act as their lag."""
@@ -37,6 +38,7 @@ class ExtraResonance(Effect):
     """
 
     name = "extra_resonance"
+    inversion = Inversion.EXACT
     family = "dynamics"
     place = ChainPosition.DYNAMICS
     equation = "y = x + r (q − x),  q̈/ω0² + 2 ζ q̇/ω0 + q = x,  ω0 = 2π f0"
@@ -130,6 +132,13 @@ class ModeBlock(AddedBlock):
     @property
     def is_idle(self) -> bool:
         return self.r == 0.0
+
+    def sections(self) -> tuple[Section, ...]:
+        """1 + r (Q − 1), one section."""
+        (p0, p1, p2, p3), (v0, v1, v2, v3) = self.step
+        poles = np.array([1.0, -(p0 + v1), p0 * v1 - p1 * v0])
+        mode = np.convolve([1.0, -v1], [p3, p2 - p3]) + p1 * np.array([0.0, v3, v2 - v3])
+        return (((1.0 - self.r) * poles + self.r * mode, poles),)
 
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, 3))

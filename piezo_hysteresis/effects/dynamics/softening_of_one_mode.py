@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ...blocks.mode_path import OwnPath, Path
+from ..inversion import Inversion
 from .softening import Softening
 
 
@@ -24,6 +25,7 @@ class SofteningOfOneMode(Softening):
     """
 
     name = "softening_of_one_mode"
+    inversion = Inversion.IMPOSSIBLE
     entry = "softening"
     signature = "as softening, on a stage of several modes"
     source = "Duffing oscillator as one term of a modal expansion"

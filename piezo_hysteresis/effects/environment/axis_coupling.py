@@ -8,6 +8,7 @@ from ...blocks.block import Array, Block
 from ...blocks.channel import ChannelBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
+from ..inversion import Inversion
 
 
 class AxisCoupling(Effect):
@@ -26,6 +27,7 @@ class AxisCoupling(Effect):
     """
 
     name = "axis_coupling"
+    inversion = Inversion.NOT_NEEDED
     family = "disturbance"
     place = ChainPosition.ENVIRONMENT
     channel = "other_displacement"

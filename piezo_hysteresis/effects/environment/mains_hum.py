@@ -12,6 +12,7 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
+from ..inversion import Inversion
 
 
 class MainsHum(Effect):
@@ -31,6 +32,7 @@ class MainsHum(Effect):
     """
 
     name = "mains_hum"
+    inversion = Inversion.NOT_NEEDED
     family = "disturbance"
     place = ChainPosition.ENVIRONMENT
     equation = "y = x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)]"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
+from ..inversion import Inversion
 
 
 class AsymmetricHysteresis(Term):
@@ -22,6 +23,7 @@ class AsymmetricHysteresis(Term):
     """
 
     name = "asymmetric_hysteresis"
+    inversion = Inversion.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"

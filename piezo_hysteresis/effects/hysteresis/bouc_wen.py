@@ -10,6 +10,7 @@ from ...blocks.bouc_wen_sensitivities import START, linearise_general, linearise
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
+from ..inversion import Inversion
 
 LOOP_OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5])
 
@@ -57,6 +58,7 @@ class BoucWen(Effect):
     """
 
     name = "bouc_wen"
+    inversion = Inversion.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     equation = "w = p1 v³ + p2 v + h;  dh = A dv − β|dv|h − γ dv|h|"

@@ -7,6 +7,7 @@ import numpy as np
 from ...blocks.block import Array, Block, MemorylessBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
+from ..inversion import Inversion
 
 
 class EvenInputPolynomial(Effect):
@@ -21,6 +22,7 @@ class EvenInputPolynomial(Effect):
     """
 
     name = "even_input_polynomial"
+    inversion = Inversion.EXACT
     family = "static"
     place = ChainPosition.HYSTERESIS
     equation = "w + p_e v² + p_4 v⁴"

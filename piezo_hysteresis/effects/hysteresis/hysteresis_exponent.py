@@ -7,6 +7,7 @@ from typing import Self
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
 from ..extent import Extent
+from ..inversion import Inversion
 
 FOUND_BY = (1.3, 1.7)
 """Exponents at which a search begins."""
@@ -26,6 +27,7 @@ class HysteresisExponent(Term):
     """
 
     name = "hysteresis_exponent"
+    inversion = Inversion.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"

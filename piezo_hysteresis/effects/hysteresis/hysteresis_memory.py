@@ -12,6 +12,7 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
+from ..inversion import Inversion
 
 SPAN = 32.0
 """Largest radius over the smallest."""
@@ -36,6 +37,7 @@ class HysteresisMemory(Effect):
     """
 
     name = "hysteresis_memory"
+    inversion = Inversion.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     equation = "w + Σ_j c_j p_j,  p_j = max(v − r_j, min(v + r_j, p_j before))"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
+from ..inversion import Inversion
 
 
 class InitialState(Term):
@@ -16,6 +17,7 @@ class InitialState(Term):
     """
 
     name = "initial_state"
+    inversion = Inversion.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"

@@ -8,6 +8,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.kernel import fma, kernel
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
+from ..inversion import Inversion
 from .bouc_wen import MODIFIED_BOUC_WEN, check_bounded
 
 
@@ -28,6 +29,7 @@ class PublishedBoucWen(Effect):
     """
 
     name = "published_bouc_wen"
+    inversion = Inversion.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     equation = "w_i = p1 v_i³ + p2 v_i + h_i;  h_i = h_(i−1) + A Δv − β|Δv||h|^(n−1)h − γ Δv|h|^n"

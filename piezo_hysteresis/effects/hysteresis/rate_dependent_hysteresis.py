@@ -7,6 +7,7 @@ from typing import Self
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
 from ..extent import Extent
+from ..inversion import Inversion
 
 FOUND_BY = (-0.03, 0.03)
 """Sizes k at which a search begins."""
@@ -32,6 +33,7 @@ class RateDependentHysteresis(Term):
     """
 
     name = "rate_dependent_hysteresis"
+    inversion = Inversion.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"

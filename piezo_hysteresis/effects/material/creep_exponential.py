@@ -13,6 +13,7 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
+from ..inversion import Inversion
 
 FASTEST = 5e-3
 """Time constant below which a relaxation is no creep but dynamics [s]."""
@@ -30,6 +31,7 @@ class CreepExponential(Effect):
     """
 
     name = "creep_exponential"
+    inversion = Inversion.EXACT
     entry = "creep"
     family = "creep"
     place = ChainPosition.MATERIAL

@@ -1,0 +1,82 @@
+"""`Band`: how fast a wanted displacement may change at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..blocks.arx import arx_row, padded
+from ..blocks.block import State
+from ..errors import ModelError
+from .turned_block import TurnedBlock
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """Low-pass of linear phase: 1 up to `passed`, a raised cosine down to 0 at `stopped`.
+
+    Parameters
+    ----------
+    passed, stopped : float
+        Frequencies [Hz].
+    length : float
+        Duration of its impulse response, half of which is preview [s].
+
+    Raises
+    ------
+    ModelError
+        If the frequencies contradict one another.
+    """
+
+    passed: float = 1600.0
+    stopped: float = 4000.0
+    length: float = 4e-3
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.passed < self.stopped:
+            raise ModelError(f"band: got {self.passed:g} to {self.stopped:g} Hz, expected 0 < passed < stopped")
+
+    @classmethod
+    def of(cls, sample_period: float) -> Band:
+        """The usual band for a sample period [s]: 1.6 to 4 kHz at 50 kHz, the same shares at another rate."""
+        rate = 1.0 / sample_period
+        return cls(0.032 * rate, 0.08 * rate, 200.0 * sample_period)
+
+    def taps(self, sample_period: float) -> Array:
+        """Symmetric impulse response with sum 1, shape (2 k + 1,)."""
+        if self.stopped >= 0.5 / sample_period:
+            raise ModelError(f"band: got {self.stopped:g} Hz, expected less than half the sample rate")
+        half = max(1, round(0.5 * self.length / sample_period))
+        t = sample_period * np.arange(-half, half + 1)
+        middle, width = self.passed + self.stopped, self.stopped - self.passed
+        near = 2.0 * width * t
+        pole = np.isclose(np.abs(near), 1.0)
+        shape = np.where(pole, np.pi / 4.0, np.cos(np.pi * width * t) / np.where(pole, 1.0, 1.0 - near**2))
+        taps = np.sinc(middle * t) * shape * np.cos(0.5 * np.pi * np.arange(-half, half + 1) / (half + 1)) ** 2
+        return np.asarray(taps / taps.sum())
+
+    def stage(self, sample_period: float) -> BandFilter:
+        """The filter as a stage of the inverse."""
+        return BandFilter(self.taps(sample_period))
+
+
+class BandFilter(TurnedBlock):
+    """A symmetric filter that looks half its length ahead."""
+
+    def __init__(self, taps: Array) -> None:
+        self.preview, self.is_exact = taps.size // 2, False
+        self.noise_gain = float(np.abs(taps).sum())
+        self._taps = padded(taps)
+
+    def start(self, x0: float, state: State) -> State:
+        return x0, np.zeros(self._taps.size - 1)
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        x0, z = state[0], state[1].copy()
+        x = np.empty_like(y)
+        arx_row(y, x0, x0, self._taps, 0, np.zeros(0), z, x)
+        return x, (x0, z)

@@ -1,0 +1,117 @@
+"""Kernels that find the v at which the hysteresis gives a wanted w, from the state before the sample.
+
+w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j play_j(v). The loop is stepped by the
+kernels that the model runs, so that the root is that of the model to rounding. The search is Newton's first step and
+then the secant, kept inside a bracket.
+"""
+
+from __future__ import annotations
+
+from math import copysign
+
+from ..blocks.bouc_wen_kernel import BETA, GAMMA, A, general_step, plain_step
+from ..blocks.kernel import kernel
+from ..effects.hysteresis.published_bouc_wen import step as published_step
+
+NO_LOOP, PLAIN, GENERAL, PUBLISHED = range(4)
+"""Kinds of loop: none, n = 1 without terms, with terms, the explicit step of Eq. (7)."""
+P1, P2, SQUARE, FOURTH = range(4)
+"""Numbers of the static polynomial: of v³, v, v² and v⁴."""
+ROUNDING = 1e-15
+"""Share of w, and of v, below which a difference is rounding."""
+MOST = 80
+"""Steps of the search at most; the bracket is halved at every sixth."""
+
+
+@kernel
+def loop_end(kind, p, periods, h, last, v):
+    """h after the loop of `kind` has gone from `last` to v."""
+    if kind == NO_LOOP or v == last:
+        return h
+    if kind == PLAIN:
+        return plain_step(h, v - last, p[0], p[1], p[2])
+    if kind == GENERAL:
+        return general_step(h, v - last, p, periods[0], periods[1])
+    return published_step(h, v - last, p[0], p[1], p[2], p[3])
+
+
+@kernel
+def static_part(poly, v):
+    """p1 v³ + p2 v + p_e v² + p_4 v⁴."""
+    square = v * v
+    return poly[P1] * v * v * v + poly[P2] * v + (poly[SQUARE] + poly[FOURTH] * square) * square
+
+
+@kernel
+def plays_end(c, radii, plays, v):
+    """Σ c_j play_j at v."""
+    total = 0.0
+    for j in range(c.size):
+        total += c[j] * max(v - radii[j], min(v + radii[j], plays[j]))
+    return total
+
+
+@kernel
+def output(kind, p, periods, poly, c, radii, h, last, plays, v):
+    """w at v."""
+    w = static_part(poly, v) + loop_end(kind, p, periods, h, last, v)
+    if c.size:
+        w += plays_end(c, radii, plays, v)
+    return w
+
+
+@kernel
+def slope_at(kind, p, poly, c, radii, h, last, plays, s):
+    """∂w/∂v where v leaves `last` in the direction s."""
+    v = last
+    slope = (3.0 * poly[P1] * v + 2.0 * poly[SQUARE]) * v + poly[P2] + 4.0 * poly[FOURTH] * v * v * v
+    if kind != NO_LOOP:
+        slope += p[A] - (p[BETA] * s + p[GAMMA] * copysign(1.0, h)) * h
+    for j in range(c.size):
+        if s * (v - plays[j]) >= radii[j] * (1.0 - 1e-9):
+            slope += c[j]
+    return slope
+
+
+@kernel
+def solve(kind, p, periods, poly, c, radii, h, last, plays, wanted, now, orientation, low, high):
+    """v in [low, high] with w(v) = wanted; the nearer end where there is none. `now` is w at `last`."""
+    gap = wanted - now
+    enough = ROUNDING * (abs(wanted) + abs(now))
+    if abs(gap) <= enough:
+        return last
+    s = copysign(orientation, gap) if orientation > 0.0 else -copysign(1.0, gap)
+    edge = max(high, last) if s > 0.0 else min(low, last)
+    if edge == last:
+        return last
+    slope = slope_at(kind, p, poly, c, radii, h, last, plays, s)
+    if slope * orientation < 0.02 * abs(poly[P2]):
+        slope = orientation * max(abs(poly[P2]), 1e-3)
+    near = last  # wanted − w has the sign of gap here,
+    far, closed = edge, False  # and the other one here, once found
+    x0, g0 = last, gap
+    x = last + gap / slope
+    best, best_gap = last, abs(gap)
+    for k in range(MOST):
+        if s * (x - near) <= 0.0 or s * (far - x) < 0.0 or (closed and x == far):
+            x = 0.5 * (near + far) if closed else far
+        g = wanted - output(kind, p, periods, poly, c, radii, h, last, plays, x)
+        if abs(g) < best_gap:
+            best, best_gap = x, abs(g)
+        if abs(g) <= enough:
+            return x
+        if g * gap > 0.0:
+            if x == edge:
+                return edge
+            near = x
+        else:
+            far, closed = x, True
+        if closed and abs(far - near) <= ROUNDING * (abs(far) + abs(near)):
+            return best
+        change = g0 - g
+        following = x + g * (x - x0) / change if change != 0.0 else far
+        x0, g0 = x, g
+        if k % 6 == 5:
+            following = 0.5 * (near + far) if closed else x + 4.0 * (x - last)
+        x = following
+    return best

@@ -1,0 +1,225 @@
+"""`Inverse`: a model turned round, from the displacement that is wanted to the drive voltage that gives it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..blocks.arx import ArxBlock
+from ..blocks.block import Block, State, SumBlock
+from ..blocks.channel import ChannelBlock
+from ..blocks.fir import FirBlock
+from ..blocks.low_pass import LowPassBlock
+from ..blocks.mode_path import WholePath
+from ..blocks.scaling import ChangeOfUnit
+from ..blocks.softened_arx import SoftenedArxBlock
+from ..blocks.time import TimeBlock
+from ..effects import Inversion
+from ..effects.dynamics.extra_resonance import ModeBlock
+from ..effects.environment.mains_hum import MainsHumBlock
+from ..effects.sensor.gain_drift import GainDriftBlock
+from ..effects.sensor.offset import OffsetBlock
+from ..effects.sensor.sensor_nonlinearity import SensorNonlinearityBlock
+from ..errors import ModelError
+from ..model.chain import Chain, ChainState
+from ..model.model import Model
+from ..model.samples import samples
+from . import turned_block as t
+from .band import Band
+from .limits import Limits
+from .nonlinear_part import KINDS, NonlinearPart, RecursionState
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class InverseState:
+    """What an inverse carries from one block of samples to the next."""
+
+    stages: tuple[State, ...]
+    nonlinear: RecursionState
+    start_time: float
+    count: int
+    """Samples since `start_time`."""
+
+
+class Inverse:
+    """A model turned round, at the model's sample period.
+
+    Parameters
+    ----------
+    model : Model
+        What the stage does.
+    limits : Limits, optional
+        Of the drive; they act inside the recursion. Default none.
+    band : Band, optional
+        Low-pass that the wanted displacement passes first. Default none: what is wanted above the band of the stage
+        asks for any voltage.
+    approximate : bool
+        Leave out effects that cannot be turned round instead of refusing the chain.
+
+    Attributes
+    ----------
+    preview : int
+        Samples by which u is late: the wanted displacement must be known so far ahead.
+    is_exact : bool
+        False where an effect was left out or has an approximate inverse.
+    left_out : tuple of str
+        Effects that have no inverse and were left out.
+    not_on_path : tuple of str
+        Effects that the drive has no part in.
+    noise_gain : float
+        How much rounding of the wanted displacement may grow on the way to the drive, as a share.
+
+    Raises
+    ------
+    ModelError
+        If the chain holds an effect without an inverse and `approximate` is not set.
+
+    Examples
+    --------
+    >>> from piezo_hysteresis.effects import Arx, BoucWen
+    >>> model = Model((BoucWen(), Arx(b=[0.5], delay=2)), sample_period=2e-5)
+    >>> inverse = Inverse(model)
+    >>> inverse.preview
+    2
+    >>> y = 0.05 * (1.0 - np.cos(np.arange(100) / 9.0))
+    >>> u, _ = inverse.run(np.append(y, [y[-1], y[-1]]), inverse.rest(0.0))
+    >>> reached, _ = model.run(u, model.rest(0.0))
+    >>> bool(np.allclose(reached[2:], y, rtol=0.0, atol=1e-15))
+    True
+    """
+
+    def __init__(
+        self, model: Model, limits: Limits | None = None, *, band: Band | None = None, approximate: bool = False
+    ) -> None:
+        impossible = [e.name for e in model.effects if e.inversion is Inversion.IMPOSSIBLE and not e.is_off]
+        if impossible and not approximate:
+            raise ModelError(
+                f"{', '.join(impossible)}: cannot be turned round; expected a chain without it, or approximate=True to "
+                "leave it out and see the error that is predicted"
+            )
+        self.model, self.limits, self.left_out = model, limits or Limits(), tuple(impossible)
+        self.sample_period = model.sample_period
+        kept = Model(
+            tuple(e for e in model.effects if e.inversion is not Inversion.IMPOSSIBLE),
+            model.sample_period,
+            model.voltage_scale,
+            model.displacement_scale,
+        )
+        self.chain: Chain = kept.at(model.sample_period)
+        self.not_on_path = tuple(e.name for e in model.effects if e.inversion is Inversion.NOT_NEEDED)
+        blocks, labels = self.chain.blocks, self.chain.labels
+        self._nonlinear_end = _end_of_nonlinear_part(blocks, labels.index("voltage_scale"))
+        self._nonlinear = NonlinearPart(blocks[: self._nonlinear_end], self.limits, self.sample_period)
+        after = list(zip(labels, blocks, strict=True))[self._nonlinear_end :]
+        own = [(self._nonlinear_end + k, _stage(b, label)) for k, (label, b) in enumerate(after)]
+        turned: list[tuple[int | None, t.TurnedBlock]] = [(k, stage) for k, stage in own[::-1] if stage is not None]
+        if band is not None:
+            turned.insert(0, (None, band.stage(self.sample_period)))
+        self._stages = turned
+        previews = [stage.preview for _, stage in turned]
+        self._ahead = [sum(previews[k + 1 :]) for k in range(len(previews))]
+        self.preview = sum(previews)
+        self.is_exact = not impossible and all(stage.is_exact for _, stage in turned)
+        self.noise_gain = float(np.prod([stage.noise_gain for _, stage in turned]))
+
+    @property
+    def preview_time(self) -> float:
+        """`preview` in seconds."""
+        return self.preview * self.sample_period
+
+    def rest(self, voltage: float, time: float = 0.0) -> InverseState:
+        """State of a stage settled at `voltage` [V]; `time` is that of the first drive sample [s]."""
+        return self.resume(self.chain.rest(voltage, time))
+
+    def resume(self, state: ChainState) -> InverseState:
+        """State of a stage whose model, without what was left out, is in `state`; dynamics count as settled."""
+        end = self._nonlinear_end
+        inputs: list[float] = []
+        own: list[State] = []
+        for block, x, one in zip(self.chain.blocks[:end], state.inputs[:end], state.blocks[:end], strict=True):
+            count = len(block.members) if isinstance(block, SumBlock) else 1
+            inputs += [x] * count
+            own += list(one) if isinstance(block, SumBlock) else [one]
+        started = tuple(
+            stage.start(state.inputs[-1] if k is None else state.inputs[k], None if k is None else state.blocks[k])
+            for k, stage in self._stages
+        )
+        if self._stages and self._stages[0][0] is None:
+            last = len(self.chain.blocks) - 1
+            reading = self.chain.blocks[last].static(state.inputs[last])
+            started = (self._stages[0][1].start(reading, None), *started[1:])
+        return InverseState(started, self._nonlinear.start(inputs, own), state.time, 0)
+
+    def run(self, wanted: ArrayLike, state: InverseState) -> tuple[Array, InverseState]:
+        """Drive voltage [V] of the next samples, and the state after them.
+
+        Bit-identical for every way of cutting the path into blocks.
+
+        Parameters
+        ----------
+        wanted : (n,) array_like
+            Displacement [m]; u_i drives towards the sample `preview` before.
+        state : InverseState
+            From `rest`, or from the block before.
+
+        Raises
+        ------
+        ModelError
+            On empty or non-finite samples.
+        """
+        y = np.ascontiguousarray(samples(wanted, "displacement")).copy()
+        index, states = state.count + np.arange(y.size, dtype=np.float64), []
+        for (_, stage), ahead, own in zip(self._stages, self._ahead, state.stages, strict=True):
+            time = np.asarray(state.start_time + self.sample_period * (index + ahead), dtype=np.float64)
+            y, own = stage.run(y, own, time)
+            states.append(own)
+        u, nonlinear = self._nonlinear.run(y, state.nonlinear)
+        return u, InverseState(tuple(states), nonlinear, state.start_time, state.count + y.size)
+
+    def command(self, wanted: ArrayLike, state: InverseState) -> tuple[Array, InverseState]:
+        """Drive voltage (n + preview,) [V] for a whole path (n,) [m], which is held at its end.
+
+        The stage is at the first sample of the path `preview` samples after the first of the drive.
+        """
+        path = samples(wanted, "displacement")
+        return self.run(np.append(path, np.full(self.preview, path[-1])), state)
+
+
+def _end_of_nonlinear_part(blocks: Sequence[Block], scale: int) -> int:
+    """Number of the first block behind drive, hysteresis and creep."""
+    return next(
+        (k for k, b in enumerate(blocks) if k > scale and (isinstance(b, ChangeOfUnit) or not isinstance(b, KINDS))),
+        len(blocks),
+    )
+
+
+def _stage(block: Block, label: str) -> t.TurnedBlock | None:
+    """The block turned round; None where nothing is to be done.
+
+    Raises
+    ------
+    ModelError
+        If no inverse of such a block is known.
+    """
+    if isinstance(block, ChannelBlock | MainsHumBlock):
+        return None
+    if isinstance(block, ArxBlock | FirBlock | LowPassBlock | ModeBlock):
+        return t.TurnedLinear(block, block.sections(), label)
+    if isinstance(block, SoftenedArxBlock) and isinstance(block.path, WholePath):
+        return t.TurnedSoftening(block, label)
+    if isinstance(block, ChangeOfUnit):
+        return t.TurnedFactor(block.factor)
+    if isinstance(block, SensorNonlinearityBlock):
+        return t.TurnedCubic(block)
+    if isinstance(block, GainDriftBlock):
+        return t.TurnedGainDrift(block)
+    if isinstance(block, TimeBlock):
+        return t.TurnedAddition(block)
+    if isinstance(block, OffsetBlock):
+        return t.TurnedOffset(block)
+    raise ModelError(f"{label}: {type(block).__name__} has no inverse, expected one of those that compensation knows")

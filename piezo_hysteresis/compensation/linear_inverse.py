@@ -1,0 +1,86 @@
+"""`LinearInverse`: one section of linear dynamics turned round, as taps that look ahead and a recursion."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..blocks.arx import arx_row, padded
+from ..blocks.linear import Section
+from ..errors import ModelError
+from .factors import factors, preview_taps, zero_phase_taps
+
+Array = NDArray[np.float64]
+
+
+class LinearInverse:
+    """x from y = H x, `preview` samples late.
+
+    Zeros inside the unit circle become poles of a recursion, exactly, also slow ones. A zero outside and the delay
+    need the future: 1/(1 − z0 z⁻¹) = −Σ_(k ≥ 1) (z/z0)^k. Zeros at the circle are inverted by zero-phase tracking,
+    which is approximate.
+
+    Parameters
+    ----------
+    section : tuple of ndarray
+        Numerator and denominator of H in powers of z⁻¹.
+    gain : float
+        H(1) as the block uses it at rest.
+    name : str
+        Effect, for messages.
+
+    Attributes
+    ----------
+    preview : int
+        Samples of the wanted output that must be known ahead.
+    is_exact : bool
+        False where a zero lies at the unit circle.
+    noise_gain : float
+        Σ |impulse response|: how much rounding and noise of y may grow.
+
+    Raises
+    ------
+    ModelError
+        If H blocks a constant.
+    """
+
+    def __init__(self, section: Section, gain: float, name: str) -> None:
+        numerator, denominator = section
+        if gain == 0.0 or not np.any(numerator):
+            raise ModelError(f"{name}: passes no constant, so no drive holds a displacement; expected a gain at dc")
+        parts = factors(numerator)
+        ahead, taps = preview_taps(parts.outside)
+        near, zero_phase = zero_phase_taps(parts.near)
+        self.preview, self.is_exact, self.gain = parts.delay + ahead + near, parts.near.size == 1, gain
+        self._taps = np.convolve(np.convolve(taps, zero_phase), denominator) / parts.inside[0]
+        self._feedback = parts.inside[1:] / parts.inside[0]
+        self._section = section
+        self._padded, self._recursion = padded(self._taps), padded(self._feedback)
+        self.noise_gain = float(np.abs(self.impulse_response()).sum())
+
+    def impulse_response(self, size: int = 20000) -> Array:
+        """Of the inverse, `preview` samples late, shape (size,)."""
+        impulse, out = np.eye(1, size)[0], np.empty(size)
+        arx_row(impulse, 0.0, 0.0, self._padded, 0, self._recursion, self._zeros(), out)
+        return out
+
+    def error(self, frequency: Array, sample_period: float) -> Array:
+        """|H · inverse − 1| at frequencies [Hz], shape (k,)."""
+        z = np.exp(-2j * np.pi * np.asarray(frequency) * sample_period)
+        forward = np.polyval(self._section[0][::-1], z) / np.polyval(self._section[1][::-1], z)
+        inverse = np.polyval(self._taps[::-1], z) / np.polyval(np.append(1.0, self._feedback)[::-1], z)
+        return np.asarray(np.abs(forward * inverse / z**self.preview - 1.0))
+
+    def _zeros(self) -> Array:
+        return np.zeros(self._padded.size - 1 + self._recursion.size)
+
+    def rest(self, x0: float) -> tuple[float, Array]:
+        """State of a stage that has been at the input x0 for long."""
+        return x0, self._zeros()
+
+    def run(self, y: Array, state: tuple[float, Array]) -> tuple[Array, tuple[float, Array]]:
+        """Next samples: x (n,) for the y (n,) of `preview` samples before, and the state after them."""
+        x0, z = state[0], state[1].copy()
+        x = np.empty_like(y)
+        arx_row(y, self.gain * x0, x0, self._padded, 0, self._recursion, z, x)
+        return x, (x0, z)

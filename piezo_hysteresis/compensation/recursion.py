@@ -1,0 +1,122 @@
+"""The part of the inverse that is nonlinear in the last sample: creep, hysteresis, amplifier and limits in one loop.
+
+Every state follows what the limits have let through, not what was wanted: after a limit the inverse goes on from where
+the stage really is.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from ..blocks.kernel import kernel
+from .hysteresis_solver import loop_end, solve, static_part
+
+PER_VOLT, LEFT, LEAD, BACK, PLAY, REACH, LOWER, UPPER, CORNER, LOWEST, HIGHEST, STEP, LOW, HIGH, TURN = range(15)
+"""Numbers of the drive: 1/voltage scale, pole, play, slew limit and saturation of the amplifier, limits of the drive
+[V], ends of the search [v], sign of the static slope."""
+VOLTAGE, SLEWED, POLE, HELD, PUSHED, LAST, H, W = range(8)
+"""States: drive, behind the slew limit, behind the pole, behind the play, before the play [V]; v, h and w."""
+SAME = 1e-13
+"""Changes below this share of the voltage are no reversal to a play."""
+
+
+@kernel
+def saturated(u, lower, upper, corner):
+    """Voltage behind the amplifier's saturation."""
+    return u - ramp(u - upper, corner) + ramp(lower - u, corner)
+
+
+@kernel
+def ramp(excess, corner):
+    """Ramp with a bend of half width `corner`."""
+    if abs(excess) < corner:
+        return (excess + corner) * (excess + corner) / (4.0 * corner)
+    return max(excess, 0.0)
+
+
+@kernel
+def before_saturation(v, lower, upper, corner):
+    """The voltage that `saturated` turns into v; where v is beyond the end, where the end is reached."""
+    if v > upper - corner:
+        return upper + corner - 2.0 * sqrt(corner * max(upper - v, 0.0))
+    if v < lower + corner:
+        return lower - corner + 2.0 * sqrt(corner * max(v - lower, 0.0))
+    return v
+
+
+@kernel
+def voltage_for(v, d, state):
+    """Drive voltage inside the limits for a voltage v behind the play."""
+    pushed = v
+    if d[PLAY] > 0.0:
+        move, same = v - state[HELD], SAME * (abs(v) + d[PLAY])
+        pushed = v + d[PLAY] if move > same else v - d[PLAY] if move < -same else state[PUSHED]
+    slewed = pushed
+    if d[LEFT] != 0.0:
+        slewed = (pushed - d[LEFT] * state[POLE] - d[BACK] * state[SLEWED]) / d[LEAD]
+    slewed = min(max(slewed, state[SLEWED] - d[REACH]), state[SLEWED] + d[REACH])
+    u = before_saturation(slewed, d[LOWER], d[UPPER], d[CORNER])
+    u = min(max(u, state[VOLTAGE] - d[STEP]), state[VOLTAGE] + d[STEP])
+    return min(max(u, d[LOWEST]), d[HIGHEST])
+
+
+@kernel
+def drive(u, d, state):
+    """Voltage behind the play for the drive u; the state follows."""
+    state[VOLTAGE] = u
+    slewed = saturated(u, d[LOWER], d[UPPER], d[CORNER])
+    slewed = min(max(slewed, state[SLEWED] - d[REACH]), state[SLEWED] + d[REACH])
+    state[POLE] = d[LEFT] * state[POLE] + d[LEAD] * slewed + d[BACK] * state[SLEWED]
+    state[SLEWED] = slewed
+    state[PUSHED] = state[POLE]
+    state[HELD] = max(state[POLE] - d[PLAY], min(state[POLE] + d[PLAY], state[HELD]))
+    return state[HELD]
+
+
+@kernel
+def settle_before(target, starts, direct, fade, lead, weights, lasts, banks, gains, ahead):
+    """w that gives `target` behind the relaxation banks; ahead (s,) becomes their states for an unchanged input."""
+    for b in range(direct.size - 1, -1, -1):
+        rest, last = 0.0, lasts[b]
+        for j in range(starts[b], starts[b + 1]):
+            ahead[j] = banks[j] + fade[j] * (last - banks[j])
+            rest += weights[j] * (ahead[j] - lead[j] * last)
+        target = (target - rest) / gains[b]
+    return target
+
+
+@kernel
+def relax_to(w, starts, direct, lead, weights, lasts, banks, ahead):
+    """States of the banks for the w that comes."""
+    for b in range(direct.size):
+        moved, y = w - lasts[b], w + direct[b] * w
+        for j in range(starts[b], starts[b + 1]):
+            banks[j] = ahead[j] + lead[j] * moved
+            y += weights[j] * banks[j]
+        lasts[b] = w
+        w = y
+
+
+@kernel
+def invert(targets, kind, p, periods, poly, c, radii, d, bank, state, plays, lasts, banks, u):
+    """Drive u (n,) [V] for wanted outputs of the material (n,).
+
+    `bank` is (starts, direct, fade, lead, weights, gains); state (8,), plays (s,), lasts and banks are updated.
+    """
+    starts, direct, fade, lead, weights, gains = bank
+    ahead = banks.copy()
+    for i in range(targets.size):
+        target = settle_before(targets[i], starts, direct, fade, lead, weights, lasts, banks, gains, ahead)
+        h, last = state[H], state[LAST]
+        v = solve(kind, p, periods, poly, c, radii, h, last, plays, target, state[W], d[TURN], d[LOW], d[HIGH])
+        u[i] = voltage_for(v / d[PER_VOLT], d, state)
+        v = drive(u[i], d, state) * d[PER_VOLT]
+        state[H], state[LAST] = loop_end(kind, p, periods, h, last, v), v
+        state[W] = static_part(poly, v) + state[H]
+        if radii.size:
+            total = 0.0
+            for j in range(radii.size):
+                plays[j] = max(v - radii[j], min(v + radii[j], plays[j]))
+                total += c[j] * plays[j]
+            state[W] += total
+        relax_to(state[W], starts, direct, lead, weights, lasts, banks, ahead)

@@ -1,0 +1,176 @@
+"""`TurnedBlock`: one block between the sensor and the creep turned round, displacement in, its cause out."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..blocks.block import Block, State
+from ..blocks.kernel import kernel
+from ..blocks.linear import Section
+from ..blocks.softened_arx import SoftenedArxBlock, force
+from ..blocks.time import TimeBlock
+from ..effects.sensor.gain_drift import GainDriftBlock
+from ..effects.sensor.offset import OffsetBlock
+from ..effects.sensor.sensor_nonlinearity import SensorNonlinearityBlock
+from .linear_inverse import LinearInverse
+
+Array = NDArray[np.float64]
+
+
+class TurnedBlock(ABC):
+    """A block turned round.
+
+    Attributes
+    ----------
+    preview : int
+        Samples that must be known ahead.
+    is_exact : bool
+        Whether run(inverse(y)) is y to rounding.
+    noise_gain : float
+        How much rounding and noise may grow on the way.
+    """
+
+    preview: int = 0
+    is_exact: bool = True
+    noise_gain: float = 1.0
+
+    def start(self, x0: float, state: State) -> State:
+        """State from the last input of the block and the state of the block."""
+        return None
+
+    @abstractmethod
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        """Causes x (n,) of the wanted y (n,), which happen at `time` (n,) [s], and the state after them."""
+
+
+class TurnedFactor(TurnedBlock):
+    """y = factor · x."""
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        return y / self.factor, None
+
+
+class TurnedLinear(TurnedBlock):
+    """Sections of linear dynamics, one after the other."""
+
+    def __init__(self, block: Block, sections: Iterable[Section], name: str) -> None:
+        slope, _ = block.static_slopes(0.0)
+        own = list(sections)
+        gains = [slope] if len(own) == 1 else [float(b.sum() / a.sum()) for b, a in own]
+        self.inverses = [LinearInverse(s, g, name) for s, g in zip(own, gains, strict=True)][::-1]
+        self.preview = sum(i.preview for i in self.inverses)
+        self.is_exact = all(i.is_exact for i in self.inverses)
+        self.noise_gain = float(np.prod([i.noise_gain for i in self.inverses]))
+
+    def start(self, x0: float, state: State) -> State:
+        states = []
+        for inverse in self.inverses[::-1]:
+            states.append(inverse.rest(x0))
+            x0 = inverse.gain * x0
+        return tuple(states[::-1])
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        states = []
+        for inverse, s in zip(self.inverses, state, strict=True):
+            y, s = inverse.run(y, s)
+            states.append(s)
+        return y, tuple(states)
+
+
+@kernel
+def force_for(x, x0, p, z, w):
+    """w (n,) − w0 that moves the mode along x (n,); p = [m1, m2, k2, k3], z = the two deflections before, updated."""
+    gain, held = 1.0 + p[0] + p[1], force(x0, p[2], p[3])
+    for i in range(x.size):
+        moved = x[i] - x0
+        w[i] = (moved + p[0] * z[0] + p[1] * z[1]) / gain + (force(x0 + z[0], p[2], p[3]) - held)
+        z[1], z[0] = z[0], moved
+
+
+class TurnedSoftening(TurnedBlock):
+    """A softened mode that drives all the rest of G: the rest turned round, then the force that moves the mode."""
+
+    def __init__(self, block: SoftenedArxBlock, name: str) -> None:
+        self.block = block
+        self.path = LinearInverse(block.path.filter.sections()[0], block.arx.gain, name)
+        self.preview, self.is_exact, self.noise_gain = self.path.preview, self.path.is_exact, self.path.noise_gain
+
+    def start(self, x0: float, state: State) -> State:
+        settled = self.block.settled.static(x0)
+        return x0, self.path.rest(settled), np.zeros(2)
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        w0, path, z = state
+        x, path = self.path.run(y, path)
+        z, w = z.copy(), np.empty_like(x)
+        force_for(x, path[0], self.block.loop, z, w)
+        return w0 + w, (w0, path, z)
+
+
+@kernel
+def cubic_root(y, s2, s3, x):
+    """x (n,) with x + s2 x² + s3 x³ = y (n,), the one joined to zero; else the turning point."""
+    for i in range(y.size):
+        root = y[i]
+        for _ in range(60):
+            slope = 1.0 + (2.0 * s2 + 3.0 * s3 * root) * root
+            if slope < 1e-3:
+                root *= 0.9
+                continue
+            change = (y[i] - root - (s2 + s3 * root) * root * root) / slope
+            root += change
+            if abs(change) <= 2e-16 * abs(root):
+                break
+        x[i] = root
+
+
+class TurnedCubic(TurnedBlock):
+    """y = x + s2 x² + s3 x³."""
+
+    def __init__(self, block: SensorNonlinearityBlock) -> None:
+        self.block = block
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        x = np.empty_like(y)
+        cubic_root(y, self.block.s2, self.block.s3, x)
+        return x, None
+
+
+class TurnedGainDrift(TurnedBlock):
+    """y = x · g(t)."""
+
+    def __init__(self, block: GainDriftBlock) -> None:
+        self.block = block
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        return y / self.block.slope(y, time), None
+
+
+class TurnedAddition(TurnedBlock):
+    """y = x + d(t)."""
+
+    def __init__(self, block: TimeBlock) -> None:
+        self.block = block
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        return y - self.block.value(np.zeros_like(y), time), None
+
+
+class TurnedOffset(TurnedBlock):
+    """y = x + y0 + r x_rest."""
+
+    def __init__(self, block: OffsetBlock) -> None:
+        self.block = block
+
+    def start(self, x0: float, state: State) -> State:
+        return state
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        return y - (self.block.y0 + self.block.settling * state), state

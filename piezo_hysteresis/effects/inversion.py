@@ -1,0 +1,18 @@
+"""`Inversion`: what an effect says about its own inverse, so that a chain can be turned round."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Inversion(StrEnum):
+    """Whether a wanted output of an effect can be turned into the input that gives it."""
+
+    EXACT = "exact"
+    """To rounding, wherever the wanted output can be had."""
+    APPROXIMATE = "approximate"
+    """With an error that `Inverse` states."""
+    NOT_NEEDED = "not needed"
+    """The effect is not on the way from the drive to the displacement, and nobody knows its course beforehand."""
+    IMPOSSIBLE = "impossible"
+    """No inverse sample by sample is known."""

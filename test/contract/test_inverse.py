@@ -1,0 +1,191 @@
+"""What every effect says about its own inverse, and that it is true."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.compensation import Inverse
+from piezo_hysteresis.effects import (
+    CHAIN,
+    Arx,
+    BoucWen,
+    Creep,
+    Effect,
+    HysteresisMemory,
+    Inversion,
+    Offset,
+    PublishedBoucWen,
+    RateDependentHysteresis,
+)
+from piezo_hysteresis.errors import DivergenceError, ModelError, ParameterError
+from piezo_hysteresis.model.model import Model
+
+PERIOD = 2e-5
+N = 1500
+WORST = 1e9
+"""Largest growth of rounding in the dynamics at which a path still says something."""
+TYPICAL: dict[str, dict[str, float]] = {
+    "amplifier_slew_limit": {"S": 1e5},
+    "amplifier_saturation": {"lower": -3.0, "upper": 4.4, "corner": 0.5},
+    "rate_dependent_hysteresis": {"k": 0.01, "a": 0.1},
+    "arx": {},
+}
+
+every_effect = pytest.mark.parametrize("kind", CHAIN, ids=lambda kind: kind.name)
+exact = [kind for kind in CHAIN if kind.inversion is Inversion.EXACT]
+
+
+def typical(kind: type[Effect]) -> Effect:
+    """The effect at a size that shows."""
+    values = dict(TYPICAL.get(kind.name, {}))
+    for row in kind.parameters:
+        if row.name not in values and row.off is not None:
+            size = row.off + row.scale
+            values[row.name] = (size,) * len(row.value) if row.is_array else size
+    return kind(**values)
+
+
+def model_with(*added: Effect) -> Model:
+    """A chain with a resonance, a zero outside the unit circle and a delay, and the effects `added`."""
+    names = {e.name for e in added}
+    base: list[Effect] = [Arx(a=[-1.2, 0.6], b=[0.1, 0.3, 0.1], delay=2), Offset(y0=1e-7)]
+    if not names & {PublishedBoucWen.name}:
+        base.append(BoucWen())
+    model = Model(tuple(e for e in base if e.name not in names), PERIOD, 10.0, 1e-5)
+    for effect in added:
+        model = model.with_effect(effect)
+    return model
+
+
+def drive() -> np.ndarray:
+    """Swings with minor loops, a hold, and back to rest [V]."""
+    t = np.arange(N) * PERIOD
+    u = 1.5 * (1.0 - np.cos(2 * np.pi * 120.0 * t)) + 0.4 * (1.0 - np.cos(2 * np.pi * 700.0 * t))
+    return np.concatenate((u, np.full(N // 5, u[-1])))
+
+
+def mismatch(model: Model, inverse: Inverse) -> float:
+    """Largest deviation of run(inverse(y)) from a y that can be had, as a share of the largest |y|."""
+    y, _ = model.run(drive(), model.rest(0.0))
+    u, _ = inverse.command(y, inverse.rest(0.0))
+    reached, _ = model.run(u, model.rest(0.0))
+    told = y.size - inverse.preview  # at the end of the path the future is missing
+    return float(np.abs(reached[inverse.preview :] - y)[:told].max() / max(np.abs(y).max(), 1e-12))
+
+
+@every_effect
+def test_declares_it_in_its_own_class(kind: type[Effect]) -> None:
+    assert isinstance(vars(kind).get("inversion"), Inversion), f"{kind.name}: say `inversion = Inversion.…`"
+
+
+@pytest.mark.parametrize("kind", exact, ids=lambda kind: kind.name)
+def test_exact_is_exact_to_rounding(kind: type[Effect]) -> None:
+    model = model_with(typical(kind))
+    inverse = Inverse(model)
+    assert inverse.is_exact
+    assert mismatch(model, inverse) < 1e-12
+
+
+def is_well_posed(model: Model) -> bool:
+    """Whether w grows with v on every branch of the drive, so that one v belongs to every w.
+
+    Read off the model itself: the hysteresis output of the test drive falls nowhere while v rises, nor rises while it
+    falls.
+    """
+    chain = model.at(PERIOD)
+    scale = chain.labels.index("voltage_scale")
+    x, w = drive(), drive()
+    for k, block in enumerate(chain.blocks):
+        before = w
+        w, _ = block.run(w, block.rest(float(w[0]), 0.0))
+        if k == scale + 1:
+            x = before
+            break
+    dv, dw = np.diff(x), np.diff(w)
+    moving = np.abs(dv) > 1e-9
+    slopes = dw[moving] / dv[moving]
+    return bool((slopes > 1e-3).all() or (slopes < -1e-3).all())
+
+
+@pytest.mark.parametrize("kind", [k for k in exact if k is not Arx], ids=lambda kind: kind.name)
+def test_exact_at_the_corners_of_the_bounds(kind: type[Effect]) -> None:
+    checked = 0
+    for corner in itertools.product(*((p.lower, p.upper) for p in kind.parameters)):
+        rows = zip(kind.parameters, corner, strict=True)
+        values = {p.name: (c,) * max(1, len(p.value)) if p.is_array else c for p, c in rows}
+        with contextlib.suppress(ParameterError, DivergenceError, ModelError):
+            steep = [BoucWen(p2=8.0)] if kind.host == BoucWen.name else []  # so that every h0 is one that can be
+            model = model_with(*steep, kind(**values))
+            inverse = Inverse(model)
+            if not is_well_posed(model) or inverse.noise_gain > WORST or not inverse.is_exact:
+                continue
+            checked += 1
+            assert mismatch(model, inverse) < 1e-16 * inverse.noise_gain + 1e-9, values
+    assert checked
+
+
+@pytest.mark.parametrize("kind", [k for k in CHAIN if k.inversion is Inversion.APPROXIMATE], ids=lambda kind: kind.name)
+def test_approximate_is_good_in_the_band(kind: type[Effect]) -> None:
+    for size in (1e-5, 3e-5, 1e-3):
+        model = model_with(kind(tau=size))
+        assert mismatch(model, Inverse(model)) < 1e-4
+
+
+@pytest.mark.parametrize("kind", [k for k in CHAIN if k.inversion is Inversion.NOT_NEEDED], ids=lambda kind: kind.name)
+def test_what_is_not_on_the_path_changes_no_command(kind: type[Effect]) -> None:
+    model = model_with(typical(kind))
+    inverse, without = Inverse(model), Inverse(model.without(kind.name))
+    y, _ = without.model.run(drive(), without.model.rest(0.0))
+    np.testing.assert_array_equal(inverse.run(y, inverse.rest(0.0))[0], without.run(y, without.rest(0.0))[0])
+    assert inverse.not_on_path == (kind.name,)
+
+
+@pytest.mark.parametrize("kind", [k for k in CHAIN if k.inversion is Inversion.IMPOSSIBLE], ids=lambda kind: kind.name)
+def test_impossible_is_refused_by_name_or_left_out(kind: type[Effect]) -> None:
+    model = model_with(typical(kind))
+    with pytest.raises(ModelError, match=kind.name):
+        Inverse(model)
+    inverse = Inverse(model, approximate=True)
+    assert inverse.left_out == (kind.name,) and not inverse.is_exact
+    assert Inverse(model_with(typical(kind).off())).left_out == (), "off, it is not missed"
+
+
+@every_effect
+def test_every_cutting_gives_the_same_bits(kind: type[Effect]) -> None:
+    model = model_with(typical(kind))
+    inverse = Inverse(model, approximate=True)
+    y, _ = model.run(drive(), model.rest(0.0))
+    whole, _ = inverse.run(y, inverse.rest(0.0))
+    for edges in ((0, 1, 2, 37, 500, 501, y.size), (*range(0, 300), y.size)):
+        state, parts = inverse.rest(0.0), []
+        for a, b in itertools.pairwise(edges):
+            u, state = inverse.run(y[a:b], state)
+            parts.append(u)
+        np.testing.assert_array_equal(np.concatenate(parts), whole)
+
+
+def test_several_together_are_exact() -> None:
+    added = [typical(k) for k in CHAIN if k in (Creep, HysteresisMemory, Offset)]
+    kinds = {
+        "amplifier_bandwidth",
+        "asymmetric_hysteresis",
+        "creep_exponential",
+        "sensor_nonlinearity",
+        "thermal_drift",
+    }
+    model = model_with(*added, *(typical(k) for k in CHAIN if k.name in kinds))
+    assert mismatch(model, Inverse(model)) < 1e-12
+
+
+def test_a_falling_curve_is_turned_round_too() -> None:
+    model = model_with(BoucWen(A=0.7, p1=0.1, p2=-2.2))
+    assert mismatch(model, Inverse(model)) < 1e-12
+
+
+def test_a_loop_with_rate_is_exact_where_it_is_steep_enough() -> None:
+    model = model_with(RateDependentHysteresis(k=-0.02, a=0.1))
+    assert mismatch(model, Inverse(model)) < 1e-12
