@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
+import rooms
+
 from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
 from piezo_hysteresis.acquisition.settings import DRIVER, IN_FORCE
 from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
@@ -142,6 +144,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "topics": lambda: from_ros("Topics"),
     "services": lambda: from_ros("Services"),
     "plant": lambda: settings(PlantParameters.table()),
+    "rooms": lambda: table("folder | what it holds", rooms.folder_rows()),
 }
 
 
@@ -154,7 +157,7 @@ def pages() -> dict[Path, str]:
     """Every page that holds something generated, with the text it should have."""
     marked = [p for p in (DOCS.parent / "README.md", *sorted(DOCS.glob("*.md"))) if p.exists()]
     made = {p: filled(p.read_text()) for p in marked if MARKED.search(p.read_text())}
-    return {DOCS / "catalogue.md": catalogue(), **made}
+    return {DOCS / "catalogue.md": catalogue(), DOCS / "images" / "rooms.svg": rooms.picture(), **made}
 
 
 def main() -> int:

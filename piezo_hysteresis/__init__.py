@@ -1,19 +1,6 @@
-"""Identify a piezo stage, predict it live, and be told which physical effect its model misses.
+"""Identify a piezo stage, predict its displacement live, and find the physical effect that its model misses.
 
-The rooms, each of which sees only those below it::
-
-    nodes  cli      ROS 2 nodes; the `piezo` command
-    report          figures and the HTML page
-    discrepancy     the gap finder: `diagnose`
-    identification  excitation, three steps, joint fit: `identify`
-    predictor       prediction and residual, block by block
-    model_file      a `Model` as ROS parameters: `load`, `save`
-    model           `Model`: a chain of effects; chain: its coefficients at one sample period
-    effects         the catalogue, one physical effect per file
-    record          `Record`, `Experiment`; parameter: `Parameter`
-    errors          the error tree
-
-    stage, recording   beside the chain: simulated and real stages; files to and from `Experiment`: `read`
+docs/architecture.md shows the rooms (the folders), what each holds, and how they depend on one another.
 
 Examples
 --------

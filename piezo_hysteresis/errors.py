@@ -1,4 +1,4 @@
-"""The error tree. A message says what was got, what was expected and what to do.
+"""The error classes. A message says what was got, what was expected and what to do.
 
 ::
 

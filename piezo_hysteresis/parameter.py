@@ -1,4 +1,4 @@
-"""`Parameter`: one row of the table that names, bounds and explains every number of a model.
+"""`Parameter`: name, symbol, unit, value, bounds and meaning of one number of a model.
 
 The table is the single source for Python, model files, ROS parameter descriptors and the docs.
 """

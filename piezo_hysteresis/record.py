@@ -1,4 +1,4 @@
-"""`Record`: what was applied to a stage and what it answered; `Experiment`: records in order."""
+"""`Record`: drive voltage and measured displacement of one phase. `Experiment`: records in order."""
 
 from __future__ import annotations
 

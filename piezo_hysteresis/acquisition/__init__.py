@@ -1,1 +1,1 @@
-"""Drives a stage without ROS: blocks to and from it, playback, session."""
+"""Runs a stage without ROS: plays waveforms inside the limits and collects blocks of samples."""

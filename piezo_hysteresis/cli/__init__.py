@@ -1,1 +1,1 @@
-"""The `piezo` command: one file per subcommand, each with `add_parser(subparsers)` and `run(args) -> int`."""
+"""The `piezo` command. Every subcommand has a file with `add_parser(subparsers)` and `run(args) -> int`."""

@@ -1,4 +1,4 @@
-"""The gap finder: where a model is wrong, which physical effect is missing, and the gap after adding it.
+"""The gap finder: shows where a model is wrong, names the missing effect, and measures the gap after adding it.
 
 `noise_floor` (what no model can explain) → `localise` (where) → `candidates` (score test) → `refit` → `selection`
 (add, repeat, stop) → `gap` (before, after, on unseen records) → `next_experiment`. `diagnose` runs them all.

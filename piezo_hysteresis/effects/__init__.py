@@ -1,4 +1,4 @@
-"""The catalogue: one physical effect per file, listed here in the order of the chain.
+"""The catalogue of effects: one physical effect per file, listed in the order in which they act.
 
 u → [amplifier] → [backlash] → v → [h with its terms + plays + even polynomial] → w → [creep] →
 [delay, G with softening, extra mode] → x → [sensor] → [drift, other axis, hum, zero] → y

@@ -1,1 +1,1 @@
-"""Controllers without hardware, for tests and rehearsals; the runtime never imports them."""
+"""Emulated controllers for tests and rehearsals; the runtime never imports them."""

@@ -1,4 +1,4 @@
-"""Identification: excite, then delay, linear dynamics, hysteresis, and all of them jointly in free run.
+"""Identification: waveforms, the delay, the linear dynamics, the hysteresis, and a joint fit of all in free run.
 
 What is played: `DriveLimits`, the shapes of `excitation`, a `Protocol` of phases. What is found, step by step:
 `identify_delay`, `identify_arx`, `fit_hysteresis`, the published `three_steps`. What a user calls: `identify`.

@@ -1,1 +1,1 @@
-"""The chain of effects with its scales, and its file."""
+"""`Model`, a chain of effects with its scales, and its file."""

@@ -1,1 +1,1 @@
-"""ROS 2 nodes: parameters in, messages to arrays, one call of the core, messages out."""
+"""ROS 2 nodes. They turn messages into arrays, call the core, and publish the result."""

@@ -1,1 +1,1 @@
-"""A model that follows a stage block by block: prediction, residual, change of model in mid-stream."""
+"""A model that follows a stage block by block: prediction, residual, and a change of model while samples arrive."""

@@ -1,4 +1,4 @@
-"""Experiments on disk, without ROS: rosbag2, NPZ, CSV, MAT and GCS arrays become an `Experiment` and back.
+"""Reads and writes experiments without ROS: rosbag2, NPZ, CSV, MAT and GCS arrays.
 
 >>> experiment = read("measured.csv", columns={"voltage": 1, "displacement": 5},
 ...                   units={"displacement": "um"}, sample_period=5e-3)          # doctest: +SKIP

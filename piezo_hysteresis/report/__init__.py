@@ -1,5 +1,5 @@
-"""Figures, tables and one page that a physicist can believe. The only room that draws.
+"""Figures, tables and the HTML page. No other room draws.
 
-``comparison`` holds an experiment and the models compared with it; every figure is a function in a file of its own that
-takes a `ModelComparison` and returns a `Drawing`, or None where the experiment does not show what the figure would.
+``figures.comparison`` holds an experiment and the models compared with it. Every figure is a function in its own file.
+It takes a `ModelComparison` and returns a `Drawing`, or None if the experiment lacks the data for the figure.
 """

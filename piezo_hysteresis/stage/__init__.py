@@ -1,6 +1,6 @@
-"""Stages: what the driver moves.
+"""Stages that a driver can move: simulated, replayed and real ones.
 
-``stage`` is the protocol and ``description`` the limits of a device; ``simulated`` offers a simulated stage of both
-kinds, ``plant`` is its physics and ``hidden`` puts something in it that its user does not know; ``replay`` plays a
-recording.
+``stage`` is the protocol. ``description`` holds the limits of a device. ``simulated`` offers simulated stages,
+streaming and with memory; ``plant`` is their physics; ``hidden`` adds an effect to the plant that its user does not
+know. ``replay`` plays a recording.
 """

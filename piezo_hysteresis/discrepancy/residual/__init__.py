@@ -1,1 +1,1 @@
-"""What a model leaves: residual, noise floor, and where the residual sits."""
+"""The residual of a model: its noise floor, where it is large, and what sampling adds to it."""

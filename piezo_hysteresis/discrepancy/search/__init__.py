@@ -1,1 +1,1 @@
-"""The search for the missing effect: candidates, joint refits, scores on records left out, acceptance."""
+"""The search for the missing effect: candidates, joint refits, cross-validation and acceptance tests."""

@@ -1,1 +1,1 @@
-"""Effects from w to the position of the stage."""
+"""Effects between the hysteresis output w and the position of the stage."""

@@ -1,1 +1,1 @@
-"""Effects from the actuator input v to the hysteresis output w."""
+"""Effects between the actuator input v and the hysteresis output w."""

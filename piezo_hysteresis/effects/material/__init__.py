@@ -1,1 +1,1 @@
-"""Effects of the material on w: creep."""
+"""Effects of the material: laws of creep."""

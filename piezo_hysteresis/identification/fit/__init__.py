@@ -1,1 +1,1 @@
-"""Least squares in free run: the joint fit and its covariance."""
+"""The joint least-squares fit in free run, and its covariance."""

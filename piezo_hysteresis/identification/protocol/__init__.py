@@ -1,1 +1,1 @@
-"""What is played to a stage: waveforms, limits, phases."""
+"""The waveforms, limits and phases that are played to a stage."""

@@ -1,1 +1,1 @@
-"""What each record of an experiment is good for."""
+"""Which records of an experiment serve which purpose."""

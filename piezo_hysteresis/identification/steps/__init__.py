@@ -1,1 +1,1 @@
-"""The steps of the published method and what replaces them where data are missing."""
+"""The three published steps, and the steps that replace them where data are missing."""

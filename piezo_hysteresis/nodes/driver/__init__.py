@@ -1,1 +1,1 @@
-"""The driver node."""
+"""The driver node: owns one stage and publishes its samples."""

@@ -1,1 +1,1 @@
-"""The identification node."""
+"""The identification node: plays a protocol, records it, fits a model and serves it."""

@@ -1,1 +1,1 @@
-"""Arrays to ROS messages and back."""
+"""Conversion between arrays and ROS messages."""

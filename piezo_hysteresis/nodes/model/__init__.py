@@ -1,1 +1,1 @@
-"""The model node."""
+"""The model node: publishes prediction and residual of every sample."""

@@ -1,1 +1,1 @@
-"""What every node process needs: parameters, quality of service, executor, life of the process."""
+"""What every node process needs: parameters, quality of service, executor, start and end."""

@@ -1,1 +1,1 @@
-"""rosbag2 recordings of the nodes and of other software."""
+"""Reads and writes rosbag2 recordings."""

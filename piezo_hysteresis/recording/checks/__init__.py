@@ -1,1 +1,1 @@
-"""What may be wrong with the data of an experiment."""
+"""Checks of the recorded data: gaps, defective channels, initial conditions."""

@@ -1,1 +1,1 @@
-"""File formats other than bags."""
+"""File formats other than bags: NPZ, CSV, MAT and GCS arrays."""

@@ -1,1 +1,1 @@
-"""Phases of a record: where the drive rests, steps and moves; long records shortened on reading."""
+"""Cuts a long record into phases, names them, and averages long records while they are read."""

@@ -1,1 +1,1 @@
-"""Columns of numbers and labels, their titles, units and time."""
+"""Tables of numbers: columns, titles, units and the time base."""

@@ -1,1 +1,1 @@
-"""One figure per file."""
+"""The figures of the page, one per file."""

@@ -1,1 +1,1 @@
-"""Tables of the page and of the terminal."""
+"""The tables of the page and of the terminal."""

@@ -1,4 +1,4 @@
-"""The physics of the simulated stage, part by part; shares no code with the model it is used to test."""
+"""The physics of the simulated stage, part by part. It shares no code with the model."""
 
 from .parameters import PlantParameters
 from .plant import Plant, Reading
