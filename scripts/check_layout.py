@@ -23,7 +23,7 @@ MOST_LINES = 250
 """Lines of a module of the package at most."""
 LONGER = {
     "piezo_hysteresis/record.py": 260,
-    "piezo_hysteresis/model/model.py": 265,
+    "piezo_hysteresis/model/model.py": 290,
     "piezo_hysteresis/online/predictor.py": 295,
     "piezo_hysteresis/recording/bag/rosbag2.py": 260,
     "piezo_hysteresis/recording/table/text_cells.py": 260,

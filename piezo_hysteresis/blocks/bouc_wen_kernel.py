@@ -14,12 +14,20 @@ from __future__ import annotations
 
 from math import ceil, copysign, expm1, log, log1p
 
+import numpy as np
+
 from .kernel import kernel
 
 LOOP = ("A", "beta", "gamma", "phi1", "phi2", "n", "k", "a")
+"""Names of the loop parameters, in the order of their array."""
+LOOP_OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5])
+"""Loop parameters with every term at its off value."""
 A, BETA, GAMMA, PHI1, PHI2, EXPONENT, RATE, RATE_EXPONENT = range(8)
+"""Places in the array of loop parameters."""
 H_REFERENCE = 0.2
+"""State h_ref at which the exponent n leaves β and γ their meaning [1]."""
 SUB_STEP = 0.01
+"""Longest step of v for n ≠ 1 [1]."""
 JUMP = 0.05
 """Change of v in one sample beyond which a slow record holds a jump: how fast, the model's own period tells."""
 SLOWEST = 1e-4

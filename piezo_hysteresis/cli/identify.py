@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..effects import BoucWen, PublishedBoucWen
+from ..effects import HYSTERESIS, OPERATORS, PublishedBoucWen
 from ..identification.identification import Identification
 from ..identification.identify import identify
 from ..identification.records.roles import HELD_OUT
@@ -27,7 +27,21 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--orders", metavar=("NA", "NB"), nargs=2, type=int, help="orders of the ARX (default: 8 8, as published)"
     )
     parser.add_argument("--choose-orders", action="store_true", help="lowest orders that are as good as any")
-    parser.add_argument("--published", action="store_true", help="Bouc-Wen in the discrete form of the paper, Eq. (7)")
+    operator = parser.add_mutually_exclusive_group()
+    operator.add_argument(
+        "--hysteresis",
+        metavar="NAME",
+        choices=OPERATORS,
+        default=HYSTERESIS.name,
+        help=f"operator to identify: {', '.join(OPERATORS)} (default: {HYSTERESIS.name})",
+    )
+    operator.add_argument(
+        "--published",
+        dest="hysteresis",
+        action="store_const",
+        const=PublishedBoucWen.name,
+        help="Bouc-Wen in the discrete form of the paper, Eq. (7)",
+    )
     parser.add_argument("--no-memory", action="store_true", help="keep the Bouc-Wen state, whatever plays would reach")
     parser.add_argument(
         "--held-out", metavar="PHASE", action="append", help=f"not fitted but judged (default: {', '.join(HELD_OUT)})"
@@ -49,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         found = identify(
             experiment,
             orders=orders,
-            hysteresis=PublishedBoucWen if args.published else BoucWen,
+            hysteresis=OPERATORS[args.hysteresis],
             memory=not args.no_memory,
             held_out=HELD_OUT if args.held_out is None else tuple(args.held_out),
             progress=tell,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..effects import Creep, ExtraResonance, GainDrift, HysteresisExponent, HysteresisMemory, ThermalDrift
 from ..identification.records.excitation_content import SLOW, excitation_content
 from ..record import Notice, Record
 
@@ -28,15 +29,15 @@ def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
     span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
     missing = []
     if not any(_longest_hold(r, MOVED * span) >= HOLD for r in records):
-        missing.append(("creep", "no level is held for a second or more after it was changed"))
+        missing.append((Creep.name, "no level is held for a second or more after it was changed"))
     contents = [excitation_content(r) for r in records]
     kinds = ["slow loops" if c.is_slow else r.phase.split("_")[0] for r, c in zip(records, contents, strict=True)]
     if len(set(kinds)) == len(kinds):
-        missing.append(("thermal_drift and gain_drift", "no kind of phase is there twice"))
+        missing.append((f"{ThermalDrift.name} and {GainDrift.name}", "no kind of phase is there twice"))
     if not _has_smaller_loops(records):
-        missing.append(("hysteresis_memory and hysteresis_exponent", "all loops have one amplitude"))
+        missing.append((f"{HysteresisMemory.name} and {HysteresisExponent.name}", "all loops have one amplitude"))
     if not any(c.is_broadband for c in contents):
-        missing.append(("extra_resonance and the lags", "no drive moves the dynamics: no noise, no multisine"))
+        missing.append((f"{ExtraResonance.name} and the lags", "no drive moves the dynamics: no noise, no multisine"))
     return tuple(Notice("not_tested", f"{what} can hardly be seen: {why}") for what, why in missing)
 
 

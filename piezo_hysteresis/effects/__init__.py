@@ -27,6 +27,7 @@ from .hysteresis.even_input_polynomial import EvenInputPolynomial
 from .hysteresis.hysteresis_exponent import HysteresisExponent
 from .hysteresis.hysteresis_memory import HysteresisMemory
 from .hysteresis.initial_state import InitialState
+from .hysteresis.operator import HysteresisOperator, Loop
 from .hysteresis.published_bouc_wen import PublishedBoucWen
 from .hysteresis.rate_dependent_hysteresis import RateDependentHysteresis
 from .inversion import Inversion
@@ -70,6 +71,12 @@ CHAIN: tuple[type[Effect], ...] = (
 )
 """Every effect, in the order in which it acts."""
 
+HYSTERESIS: type[HysteresisOperator] = BoucWen
+"""The hysteresis that is identified unless another one is asked for."""
+
+OPERATORS: dict[str, type[HysteresisOperator]] = {e.name: e for e in CHAIN if issubclass(e, HysteresisOperator)}
+"""Every operator that can play the role of the hysteresis, by its identifier."""
+
 BASELINE: tuple[type[Effect], ...] = (BoucWen, PublishedBoucWen, Arx, Offset)
 """The published model: what the others are missing from."""
 
@@ -77,6 +84,7 @@ CATALOGUE: tuple[type[Effect], ...] = tuple(e for e in CHAIN if e not in BASELIN
 """The effects that a Hammerstein-MBW model can lack."""
 
 BY_NAME: dict[str, type[Effect]] = {e.name: e for e in CHAIN}
+"""Every effect by its identifier."""
 
 
 def effect_named(name: str) -> type[Effect]:
@@ -97,6 +105,8 @@ __all__ = [
     "BY_NAME",
     "CATALOGUE",
     "CHAIN",
+    "HYSTERESIS",
+    "OPERATORS",
     "AmplifierBandwidth",
     "AmplifierSaturation",
     "AmplifierSlewLimit",
@@ -115,8 +125,10 @@ __all__ = [
     "GainDrift",
     "HysteresisExponent",
     "HysteresisMemory",
+    "HysteresisOperator",
     "InitialState",
     "Inversion",
+    "Loop",
     "MainsHum",
     "Offset",
     "ChainPosition",

@@ -95,7 +95,7 @@ class Identification:
     @property
     def correlated(self) -> tuple[tuple[str, str, float], ...]:
         """Pairs of hysteresis numbers whose estimates move together: names and correlation."""
-        names = [n for n in self.fit.names if not n.startswith("arx.")]
+        names = [n for n in self.fit.names if not n.startswith(f"{Arx.name}.")]
         pairs = [(a, b, self.fit.correlation(a, b)) for i, a in enumerate(names) for b in names[:i]]
         return tuple(pair for pair in pairs if abs(pair[2]) > CORRELATED)
 
@@ -105,29 +105,30 @@ class Identification:
         The error is that of the complex value, carried over from the covariance of the coefficients; these alone mean
         nothing, poles and zeros of a high order nearly cancel.
         """
-        arx = self.model["arx"]
+        arx = self.model[Arx.name]
         assert isinstance(arx, Arx)
         period = self.model.sample_period
         value = arx.response(frequency, period)
-        names = [n for n in self.fit.names if n.startswith("arx.")]
+        names = [n for n in self.fit.names if n.startswith(f"{Arx.name}.")]
         rows = [self.fit.names.index(n) for n in names]
         z = np.exp(-2j * np.pi * np.asarray(frequency) * period)
         a, b = np.concatenate(([1.0], arx.array("a"))), arx.array("b")
         at_a, at_b = np.polyval(a[::-1], z), np.polyval(b[::-1], z)
         slopes = []
         for name in names:
-            if name == "arx.delay":
+            number = name.partition(".")[2]
+            if number == "delay":
                 slopes.append(np.log(z))
                 continue
-            power = int(name[6:-1])
-            slopes.append(z**power / at_b if name[4] == "b" else -(z ** (power + 1)) / at_a)
+            power = int(number[2:-1])
+            slopes.append(z**power / at_b if number[0] == "b" else -(z ** (power + 1)) / at_a)
         relative = np.array(slopes).reshape(len(names), z.size)
         covariance = self.fit.covariance[np.ix_(rows, rows)]
         variance = np.einsum("ik,ij,jk->k", relative.conj(), covariance, relative).real
         return value, np.sqrt(np.maximum(variance, 0.0))
 
     def __str__(self) -> str:
-        arx = self.model["arx"]
+        arx = self.model[Arx.name]
         assert isinstance(arx, Arx)
         lines = []
         if self.delay is not None:
@@ -136,7 +137,7 @@ class Identification:
         lag = arx.group_delay * self.model.sample_period
         lines.append(f"G: {orders}, dc gain {arx.dc_gain:.5g} (fixed), lag {lag * 1e6:.4g} µs")
         for name, value in self.fit.values.items():
-            if not name.startswith("arx.") or name == "arx.delay":
+            if not name.startswith(f"{Arx.name}.") or name == f"{Arx.name}.delay":
                 lines.append(f"{name:28s} {value:12.6g} ± {1.96 * self.fit.standard_errors[name]:.2g} (95 %)")
         for phase in self.phases:
             told = "" if phase.is_fitted else "  held out"

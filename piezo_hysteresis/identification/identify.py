@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects import Arx, BoucWen, Effect, Offset
+from ..effects import HYSTERESIS, Arx, HysteresisOperator, Offset
 from ..errors import IdentificationError
 from ..model.model import Model
 from ..model.provenance import provenance
@@ -27,7 +27,7 @@ from .records.roles import HELD_OUT, Roles, roles_of
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.delay import Delay, identify_delay
 from .steps.dynamics import Dynamics, OrderError, choose_order, compare_orders, delay_of
-from .steps.hysteresis import fit_hysteresis, hysteresis_name
+from .steps.hysteresis import fit_hysteresis
 from .steps.hysteresis_choice import choose_memory
 from .steps.linear_start import dynamics_of, hysteresis_signals
 from .steps.remaining_lag import lag_notices
@@ -49,7 +49,7 @@ def identify(
     displacement_scale: float | None = None,
     gain: float = 1.0,
     orders: tuple[int, int] | None = (8, 8),
-    hysteresis: type[Effect] = BoucWen,
+    hysteresis: type[HysteresisOperator] = HYSTERESIS,
     memory: bool = False,
     held_out: Collection[str] = HELD_OUT,
     progress: Progress | None = None,
@@ -68,8 +68,8 @@ def identify(
         G(1), the gauge: w times this is the settled output.
     orders : (int, int) or None
         na and nb of the ARX; None chooses the lowest order that is as good as any.
-    hysteresis : type of Effect
-        `BoucWen`, or `PublishedBoucWen` for data that Eq. (7) made.
+    hysteresis : type of HysteresisOperator
+        Which operator; `PublishedBoucWen` for data that Eq. (7) made.
     memory : bool
         Take plays instead of the Bouc-Wen state where they predict better what was left out.
     held_out : collection of str
@@ -201,7 +201,7 @@ def _published(
     voltage_scale: float,
     displacement_scale: float,
     orders: tuple[int, int],
-    hysteresis: type[Effect],
+    hysteresis: type[HysteresisOperator],
     delay: Delay | None,
     notices: list[Notice],
 ) -> ThreeSteps | None:
@@ -225,10 +225,8 @@ def _behind_the_gauge(
     """`frame` with its hysteresis fitted to the loops; where step 3 was, only its gain is another one."""
     if published is None or set(loops) != set(named(records, "triangle")):
         return fit_hysteresis(frame, records, loops).model
-    name = hysteresis_name(frame)
     gain = published.dynamics.arx.dc_gain / dynamics_of(frame).dc_gain
-    scales = {f"{name}.A": gain, f"{name}.p1": gain, f"{name}.p2": gain}
-    return frame.with_values({n: scales.get(n, 1.0) * value for n, value in published.loop.values.items()})
+    return frame.with_hysteresis(published.model.hysteresis.scaled(gain))
 
 
 def _free_run(model: Model, experiment: Experiment, roles: Roles, reach: float) -> tuple[PhaseError, ...]:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..effects import CHAIN, Discretisation, Effect, Offset
+from ..effects import CHAIN, Discretisation, Effect, HysteresisOperator, Offset
 from ..errors import ModelError
 from ..parameter import Parameter, Value
 from ..record import Record
@@ -94,6 +94,31 @@ class Model:
 
     def __contains__(self, name: object) -> bool:
         return any(e.name == name for e in self.effects)
+
+    @property
+    def has_hysteresis(self) -> bool:
+        """Whether an effect of the chain plays the role of the hysteresis."""
+        return any(isinstance(e, HysteresisOperator) for e in self.effects)
+
+    @property
+    def hysteresis(self) -> HysteresisOperator:
+        """The effect that plays the role of the hysteresis, whichever operator it is.
+
+        Raises
+        ------
+        ModelError
+            If the chain has none.
+        """
+        for effect in self.effects:
+            if isinstance(effect, HysteresisOperator):
+                return effect
+        names = ", ".join(e.name for e in self.effects)
+        raise ModelError(f"got no hysteresis in the chain {names}, expected one, e.g. BoucWen()")
+
+    def with_hysteresis(self, operator: HysteresisOperator) -> Model:
+        """With `operator` in the role of the hysteresis, instead of the one that has it."""
+        kept = tuple(e for e in self.effects if not isinstance(e, HysteresisOperator))
+        return replace(self, effects=(*kept, operator))
 
     def with_effect(self, effect: Effect) -> Model:
         """With `effect` in its place in the chain, instead of one of the same name."""

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from piezo_hysteresis.effects import Arx, BoucWen, Discretisation
+from piezo_hysteresis.effects import Arx, BoucWen, Discretisation, Loop
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.identification.protocol import excitation
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
-from piezo_hysteresis.identification.steps.hysteresis import Loop, fit_hysteresis, start_hysteresis
+from piezo_hysteresis.identification.steps.hysteresis import fit_hysteresis
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -38,14 +38,14 @@ loops = st.builds(
 @given(truth=loops, offset=st.floats(-5.0, 5.0), unit=st.sampled_from([0.1, 1.0, 40.0]))
 def test_any_loop_is_found_in_any_unit_of_v(truth, offset, unit):
     w = run(truth, V)
-    found = start_hysteresis([Loop(V * unit, w + offset)])
+    found = BoucWen().started([Loop(V * unit, w + offset)])
     assert found["beta"] >= abs(found["gamma"])
     assert np.std(run(found, V * unit) - w) < 1e-4 * np.ptp(w)
 
 
 def test_the_published_loop_is_found_number_by_number():
     truth = BoucWen()
-    found = start_hysteresis([Loop(V, run(truth, V) + 0.3)])
+    found = BoucWen().started([Loop(V, run(truth, V) + 0.3)])
     for name, value in truth.values.items():
         assert found[name] == pytest.approx(value, rel=1e-3)
 
@@ -54,7 +54,7 @@ def test_a_loop_that_continues_carries_its_state():
     truth = BoucWen()
     w = run(truth, V)
     cut = 1700
-    found = start_hysteresis([Loop(V[:cut], w[:cut], weight=0.0), Loop(V[cut:], w[cut:] + 1.0, continues=True)])
+    found = BoucWen().started([Loop(V[:cut], w[:cut], weight=0.0), Loop(V[cut:], w[cut:] + 1.0, continues=True)])
     assert found["A"] == pytest.approx(truth["A"], rel=1e-4)
     assert found["gamma"] == pytest.approx(truth["gamma"], rel=1e-3)
 
@@ -74,4 +74,4 @@ def test_the_fit_on_all_samples_is_within_its_uncertainty():
 @pytest.mark.parametrize("loops_", [[], [Loop(np.ones(50), np.ones(50), start=1.0)], [Loop(V, V, weight=0.0)]])
 def test_without_loops_the_error_says_what_to_record(loops_):
     with pytest.raises(IdentificationError, match="triangle"):
-        start_hysteresis(loops_)
+        BoucWen().started(loops_)

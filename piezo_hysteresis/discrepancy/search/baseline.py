@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 
-from ...effects import Arx, BoucWen, Offset, PublishedBoucWen
-from ...errors import IdentificationError, ModelError
+from ...effects import HYSTERESIS, Arx, Offset
+from ...errors import IdentificationError
 from ...identification.identify import identify
 from ...identification.records.roles import Roles, roles_of
 from ...identification.steps.delay import identify_delay
@@ -65,7 +65,7 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
         delay = None
     voltage = max(float(max(r.voltage.max(), -r.voltage.min())) for r in records)
     reach = max(float(r.displacement.max() - r.displacement.min()) for r in records)
-    loop = (BoucWen(), Arx(a=(), b=(1.0,), delay=delay or 1))
+    loop = (HYSTERESIS(), Arx(a=(), b=(1.0,), delay=delay or 1))
     frame = Model(loop, experiment.fastest_period, voltage, reach)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or _delay_without_steps(start, records, broadband)
@@ -139,13 +139,7 @@ def exact(model: Model) -> Model:
     ModelError
         On a published loop of another exponent than n = 1, for which there is no exact step.
     """
-    if PublishedBoucWen.name in model:
-        published = model[PublishedBoucWen.name]
-        if published["n"] != 1.0:
-            raise ModelError(f"diagnose: got published_bouc_wen.n = {published['n']:g}, expected 1")
-        values = {n: v for n, v in published.values.items() if n != "n"}
-        model = model.without(PublishedBoucWen.name).with_effect(BoucWen(**values))
-    return with_zero(model)
+    return with_zero(model.with_hysteresis(model.hysteresis.exact()) if model.has_hysteresis else model)
 
 
 def with_zero(model: Model) -> Model:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import BoucWen, Effect, MainsHum
+from ...effects import Arx, Effect, MainsHum, Offset
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.fit.fit import Fit, gauge
 from ...identification.fit.normal_equations import Gram, grams
@@ -57,20 +57,20 @@ def free_numbers(model: Model, evidence: TrainingData) -> list[str]:
     names = []
     for name in model.values():
         row = model.row(name)
-        if not (row.fixed or row.per_record or name == "arx.delay"):
+        if not (row.fixed or row.per_record or name == f"{Arx.name}.delay"):
             names.append(name)
-    skipped = {"offset.y0"} if evidence.nuisance.offset else set()
+    skipped = {f"{Offset.name}.y0"} if evidence.nuisance.offset else set()
     if evidence.nuisance.offset or not evidence.begins_at_levels:
-        skipped.add("offset.settling")
+        skipped.add(f"{Offset.name}.settling")
     skipped |= {f"{MainsHum.name}.f"}
     if loop_is_off(model):  # and stays so
-        skipped |= {f"{BoucWen.name}.{n}" for n in ("A", "beta", "gamma")}
+        skipped |= {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.memory_names}
     return [n for n in names if n not in skipped]
 
 
 def loop_is_off(model: Model) -> bool:
     """Whether the model has a loop that takes no part."""
-    return BoucWen.name in model and model[BoucWen.name]["A"] == 0.0
+    return model.has_hysteresis and not model.hysteresis.has_memory
 
 
 def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:

@@ -159,7 +159,7 @@ def _behind_anew(
     Iterations that describe the broadband records better, by a lack that is still there, may describe the others worse.
     """
     broadband = evidence.broadband()
-    if not broadband or not isinstance(model["arx"], Arx):
+    if not broadband or not isinstance(model[Arx.name], Arx):
         return None
     found, best = list[Fitted](), None
 
@@ -213,7 +213,7 @@ def _absorbed(model: Model, extended: Model, evidence: TrainingData) -> Model | 
     A joint fit may have stopped before its G held a mode that it has room for: what G can hold is no missing effect.
     """
     broadband = evidence.broadband()
-    if not broadband or not isinstance(model["arx"], Arx):
+    if not broadband or not isinstance(model[Arx.name], Arx):
         return None
     inputs = hysteresis_signals(model, evidence.records, broadband)
     outputs = extended.simulate(evidence.records)

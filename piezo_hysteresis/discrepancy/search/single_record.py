@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...effects import BoucWen, Effect, HysteresisMemory
+from ...effects import Effect, HysteresisMemory
 from ...identification.fit.fit import Progress
 from ...identification.fit.normal_equations import Nuisance, residuals
 from ...identification.identify import identify
@@ -88,7 +88,7 @@ def diagnose_few(
     tell("where", 0.45)
     left = residuals(baseline.model, records, Nuisance(offset=True))
     where = localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])
-    fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == BoucWen.name)]
+    fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
     found = select(now.model, evidence, score, null, fitting, lambda word, part: tell(word, 0.5 + 0.4 * part))
     selection = Selection(baseline.model, found.model, found.score, (*steps, *found.steps), null)
     final_evidence = found.accepted[-1].best.evidence if found.accepted else evidence

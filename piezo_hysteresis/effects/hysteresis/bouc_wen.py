@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Self
+
 import numpy as np
 
 from ...blocks.block import Array, Block, State
-from ...blocks.bouc_wen_kernel import LOOP, run_general, run_plain
+from ...blocks.bouc_wen_kernel import LOOP, LOOP_OFF, run_general, run_plain
 from ...blocks.bouc_wen_sensitivities import START, linearise_general, linearise_plain
 from ...errors import ParameterError
 from ...parameter import Parameter
-from ..effect import ChainPosition, Discretisation, Effect
+from ..effect import Discretisation, Effect
 from ..inversion import Inversion
-
-LOOP_OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5])
+from .bouc_wen_start import closest_loop
+from .operator import HysteresisOperator, Loop
 
 MODIFIED_BOUC_WEN = (
     Parameter("A", "A", "1", -0.7691, -1e3, 1e3, "slope of the hysteresis state at a turning point", "paper, Eq. (2)"),
@@ -21,6 +24,7 @@ MODIFIED_BOUC_WEN = (
     Parameter("p1", "p1", "1", -0.1085, -1e3, 1e3, "cubic term; 0 gives CBW", "paper, Eq. (3)", scale=0.1),
     Parameter("p2", "p2", "1", 2.1925, -1e3, 1e3, "proportional term of the output", "paper, Eq. (3)", scale=2.0),
 )
+"""Numbers of the modified Bouc-Wen operator."""
 
 
 def check_bounded(effect: Effect) -> None:
@@ -31,7 +35,28 @@ def check_bounded(effect: Effect) -> None:
         )
 
 
-class BoucWen(Effect):
+class ModifiedBoucWen(HysteresisOperator):
+    """What both forms of the modified Bouc-Wen operator share: their numbers and where a fit of them begins."""
+
+    gain_names = ("A", "p1", "p2")
+    memory_names = ("A", "beta", "gamma")
+
+    def check(self) -> None:
+        check_bounded(self)
+
+    @property
+    def has_memory(self) -> bool:
+        return self["A"] != 0.0
+
+    @property
+    def turning_slope(self) -> float:
+        return self["p2"] + self["A"]
+
+    def started(self, loops: Sequence[Loop]) -> Self:
+        return self.with_values(**closest_loop(loops))
+
+
+class BoucWen(ModifiedBoucWen):
     """Modified Bouc-Wen operator with the exact step for n = 1.
 
     Parameters
@@ -59,15 +84,13 @@ class BoucWen(Effect):
 
     name = "bouc_wen"
     inversion = Inversion.EXACT
-    family = "hysteresis"
-    place = ChainPosition.HYSTERESIS
     equation = "w = p1 v³ + p2 v + h;  dh = A dv − β|dv|h − γ dv|h|"
     signature = "rate-independent loops with one memory state, saturating at |A|/(β + γ sgn A)"
     source = "paper, Eq. (2), (3), (6); exact step for n = 1"
     parameters = MODIFIED_BOUC_WEN
 
-    def check(self) -> None:
-        check_bounded(self)
+    def memoryless(self) -> Self:
+        return type(self)(A=0.0, gamma=0.0, p1=self["p1"], p2=self["p2"])
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return BoucWenBlock(self, setting, terms)

@@ -6,13 +6,14 @@ import numpy as np
 
 from ...blocks.block import Array, Block, State
 from ...blocks.kernel import fma, kernel
+from ...errors import ModelError
 from ...parameter import Parameter
-from ..effect import ChainPosition, Discretisation, Effect
+from ..effect import Discretisation, Effect
 from ..inversion import Inversion
-from .bouc_wen import MODIFIED_BOUC_WEN, check_bounded
+from .bouc_wen import MODIFIED_BOUC_WEN, BoucWen, ModifiedBoucWen
 
 
-class PublishedBoucWen(Effect):
+class PublishedBoucWen(ModifiedBoucWen):
     """Modified Bouc-Wen by the explicit step of Eq. (7), with the exponent n of Eq. (2).
 
     Parameters
@@ -30,8 +31,6 @@ class PublishedBoucWen(Effect):
 
     name = "published_bouc_wen"
     inversion = Inversion.EXACT
-    family = "hysteresis"
-    place = ChainPosition.HYSTERESIS
     equation = "w_i = p1 v_i³ + p2 v_i + h_i;  h_i = h_(i−1) + A Δv − β|Δv||h|^(n−1)h − γ Δv|h|^n"
     signature = "as bouc_wen, but dependent on the sample rate"
     source = "paper, Eq. (6), (7); exponent of Eq. (2)"
@@ -42,8 +41,10 @@ class PublishedBoucWen(Effect):
         ),
     )
 
-    def check(self) -> None:
-        check_bounded(self)
+    def exact(self) -> BoucWen:
+        if self["n"] != 1.0:
+            raise ModelError(f"{self.name}: got n = {self['n']:g}, expected 1, for which the step is known exactly")
+        return BoucWen(**{n: v for n, v in self.values.items() if n != "n"})
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return PublishedBlock(self)

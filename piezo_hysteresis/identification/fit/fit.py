@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects import Arx
 from ...errors import DivergenceError, IdentificationError, ParameterError
 from ...model.model import Model
 from ...record import Record
@@ -85,21 +86,20 @@ class Fit:
 def gauge(model: Model, names: Sequence[str]) -> Array:
     """Directions (q, r) in which the free numbers may move with G(1) held.
 
-    Scaling w by c scales A, p1, p2 by c and b by 1/c: one direction is no information. With all of `b` free, b1 follows
-    from G(1) = B(1)/A(1).
+    Scaling w by c scales the gains of the hysteresis by c and b by 1/c: one direction is no information. With all of
+    `b` free, b1 follows from G(1) = B(1)/A(1).
     """
     directions = np.eye(len(names))
-    if "arx" not in model:
+    if Arx.name not in model or not model.has_hysteresis:
         return directions
-    b = [i for i, n in enumerate(names) if n.startswith("arx.b[")]
-    if len(b) < len(model["arx"].array("b")) or not any(
-        n.startswith("bouc_wen.p2") or n.endswith("bouc_wen.p2") for n in names
-    ):
+    b = [i for i, n in enumerate(names) if n.startswith(f"{Arx.name}.b[")]
+    gains = {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.linear_numbers()}
+    if len(b) < len(model[Arx.name].array("b")) or not gains.issubset(names):
         return directions
     directions[b[0], b[1:]] = -1.0
     for i, n in enumerate(names):
-        if n.startswith("arx.a["):
-            directions[b[0], i] = model["arx"].dc_gain  # type: ignore[attr-defined]
+        if n.startswith(f"{Arx.name}.a["):
+            directions[b[0], i] = model[Arx.name].dc_gain  # type: ignore[attr-defined]
     return np.delete(directions, b[0], axis=1)
 
 

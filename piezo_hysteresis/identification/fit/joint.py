@@ -12,7 +12,7 @@ from ...model.model import Model
 from ...record import Notice, Record
 from ..records.conditioning import select
 from ..steps.dynamics import Dynamics
-from ..steps.hysteresis import LOOP, hysteresis_name
+from ..steps.hysteresis import hysteresis_numbers
 from ..steps.linear_start import dynamics_behind, dynamics_of, follower, with_dynamics
 from .fit import Fit, Progress, fit
 from .normal_equations import Nuisance, residuals
@@ -40,18 +40,18 @@ def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fi
         Indices of the records to fit.
     """
     kept, sizes = select(records, floors, fitted)
-    name, gain = hysteresis_name(model), dynamics_of(model).dc_gain
-    loop = [f"{name}.{n}" for n in LOOP]
+    loop, gain = hysteresis_numbers(model), dynamics_of(model).dc_gain
+    first, own_gain, delay = (f"{Arx.name}.{n}" for n in ("a[0]", "b[0]", "delay"))
     period = model.sample_period
     starts = [
-        (Arx(a=(-pole,), b=(gain * (1.0 - pole),), delay=dead), period, ["arx.a[0]", "arx.b[0]", "arx.delay"])
+        (Arx(a=(-pole,), b=(gain * (1.0 - pole),), delay=dead), period, [first, own_gain, delay])
         for pole in (0.2, 0.8)
         for dead in (1.0, 2.0)
     ]
-    starts += [(Arx(a=(), b=(gain,), delay=lag * FINER), period / FINER, ["arx.delay"]) for lag in (0.2, 1.0, 3.0)]
+    starts += [(Arx(a=(), b=(gain,), delay=lag * FINER), period / FINER, [delay]) for lag in (0.2, 1.0, 3.0)]
     fits = []
     for arx, at, free in starts:
-        start = Model((model[name], arx), at, model.voltage_scale, model.displacement_scale)
+        start = Model((model.hysteresis, arx), at, model.voltage_scale, model.displacement_scale)
         fits.append(fit(start, kept, [*loop, *free], floors=sizes, nuisance=Nuisance(offset=True)))
     simplest = min((f for f in fits if len(f.names) == len(loop) + 1), key=lambda f: f.cost)
     best = min(fits, key=lambda f: f.cost)
@@ -81,8 +81,8 @@ def fit_joint(
         Called with a word and the fraction done.
     """
     kept, sizes = select(records, floors, fitted)
-    free = [f"{hysteresis_name(model)}.{n}" for n in LOOP]
-    free += [f"arx.{n}" for n in dynamics_of(model).free_names() if n != "delay"]
+    free = hysteresis_numbers(model)
+    free += [f"{Arx.name}.{n}" for n in dynamics_of(model).free_names() if n != "delay"]
     return fit(model, kept, free, floors=sizes, nuisance=Nuisance(offset=True), damping=NEAR, progress=progress)
 
 

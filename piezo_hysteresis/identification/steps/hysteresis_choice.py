@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import BoucWen, HysteresisMemory
+from ...effects import Arx, HysteresisMemory
 from ...model.model import Model
 from ...record import Notice, Record
 from ..fit.fit import Fit, fit
@@ -36,25 +36,31 @@ FEWEST = 64
 """Samples of a block at least."""
 TIE = 1.2
 """Ratio of errors up to which neither leads; then plays are taken, they are bounded by what the loops show."""
-LINEAR = ("bouc_wen.p1", "bouc_wen.p2", *(f"hysteresis_memory.c[{j}]" for j in range(PLAYS)))
-"""Numbers of the plays and of the polynomial beside them."""
 
 
-def with_plays(model: Model, records: Sequence[Record]) -> Model:
-    """The model with plays in the place of its Bouc-Wen state, whose polynomial stays.
+def with_plays(model: Model, records: Sequence[Record]) -> Model | None:
+    """The model with plays in the place of its Bouc-Wen state, whose polynomial stays; None without such a state.
 
     Parameters
     ----------
     model : Model
-        With a `BoucWen`.
+        With its hysteresis.
     records : sequence of Record
         Their drive sets the widest play.
     """
+    loop = model.hysteresis.memoryless()
+    if loop is None:
+        return None
     low = min(min(float(r.voltage.min()), r.settled_voltage) for r in records)
     high = max(max(float(r.voltage.max()), r.settled_voltage) for r in records)
     plays = HysteresisMemory(c=(0.0,) * PLAYS, reach=WIDEST * (high - low) / model.voltage_scale)
-    loop = BoucWen(A=0.0, gamma=0.0, p1=model[BoucWen.name]["p1"], p2=model[BoucWen.name]["p2"])
-    return model.with_effect(loop).with_effect(plays)
+    return model.with_hysteresis(loop).with_effect(plays)
+
+
+def linear_numbers(model: Model) -> list[str]:
+    """Numbers of the plays and of the polynomial beside them."""
+    polynomial = [f"{model.hysteresis.name}.{n}" for n in model.hysteresis.linear_numbers()]
+    return polynomial + [f"{HysteresisMemory.name}.c[{j}]" for j in range(PLAYS)]
 
 
 def choose_memory(
@@ -65,7 +71,7 @@ def choose_memory(
     Parameters
     ----------
     joint : Fit
-        Of a model with a `BoucWen`.
+        Of a model with its hysteresis.
     records : sequence of Record
         The experiment, in order.
     floors : sequence of float
@@ -80,10 +86,10 @@ def choose_memory(
     notices : tuple of Notice
         ``memory`` with both errors on blocks left out.
     """
-    if BoucWen.name not in joint.model:
+    plays = with_plays(joint.model, records)
+    if plays is None:
         return joint, ()
     blocks, sizes = _blocks(*select(records, floors, loops))
-    plays = with_plays(joint.model, records)
     state_error = left_out(blocks, sizes, lambda used: fit_hysteresis(joint.model, blocks, used).model)
     plays_error = left_out(blocks, sizes, lambda used: _fit_plays(plays, blocks, used))
     # the mean of logarithms keeps one bad block from deciding
@@ -98,7 +104,7 @@ def choose_memory(
     clear = lead < -np.log(TIE)
     because = "turning points are remembered" if clear else "the data do not decide, plays foretell other loops better"
     kept, kept_floors = select(records, floors, fitted)
-    free = [*LINEAR, *(n for n in joint.names if n.startswith("arx."))]
+    free = [*linear_numbers(plays), *(n for n in joint.names if n.startswith(f"{Arx.name}."))]
     found = fit(plays, kept, free, floors=kept_floors, nuisance=Nuisance(offset=True))
     return found, (Notice("memory", f"{told}: {because}; hysteresis_memory is taken"),)
 
@@ -127,7 +133,7 @@ def left_out(blocks: Sequence[Record], floors: Sequence[float], fitted_to: Calla
 
 def _fit_plays(model: Model, blocks: Sequence[Record], used: Collection[int]) -> Model:
     kept, sizes = select(blocks, [1.0] * len(blocks), used)
-    return fit(model, kept, LINEAR, floors=sizes, nuisance=Nuisance(offset=True)).model
+    return fit(model, kept, linear_numbers(model), floors=sizes, nuisance=Nuisance(offset=True)).model
 
 
 def _blocks(records: Sequence[Record], floors: Sequence[float]) -> tuple[list[Record], list[float]]:

@@ -80,7 +80,7 @@ def with_dynamics(model: Model, arx: Arx) -> Model:
 
 def dynamics_of(model: Model) -> Arx:
     """The linear dynamics in a model."""
-    arx = model["arx"]
+    arx = model[Arx.name]
     assert isinstance(arx, Arx)
     return arx
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...effects import Arx
 from ...record import Notice
 from ..fit.fit import Fit
 from ..records.excitation_content import ExcitationContent
@@ -17,7 +18,7 @@ ONE_FREQUENCY = 4
 
 def lag(fit: Fit) -> tuple[float, float]:
     """Group delay of G at low frequency and its standard error [s], from the covariance of its coefficients."""
-    names = [n for n in fit.names if n.startswith("arx.")]
+    names = [n for n in fit.names if n.startswith(f"{Arx.name}.")]
 
     def at(values: dict[str, float]) -> float:
         model = fit.model.with_values(values)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...effects import Arx, BoucWen, Effect, Offset
+from ...effects import HYSTERESIS, Arx, HysteresisOperator, Offset
 from ...errors import IdentificationError
 from ...model.model import Model
 from ...record import Record
@@ -68,7 +68,7 @@ def three_steps(
     voltage_scale: float,
     displacement_scale: float,
     orders: tuple[int, int] = (8, 8),
-    hysteresis: type[Effect] = BoucWen,
+    hysteresis: type[HysteresisOperator] = HYSTERESIS,
     delay: Delay | None = None,
 ) -> ThreeSteps:
     """Run the published identification on the phases `step`, `noise` and `triangle` of an experiment.
@@ -81,8 +81,8 @@ def three_steps(
         Scales of the model [V], [m].
     orders : (int, int)
         na and nb.
-    hysteresis : type of Effect
-        `BoucWen`, or `PublishedBoucWen` for data that Eq. (7) made.
+    hysteresis : type of HysteresisOperator
+        Which operator; `PublishedBoucWen` for data that Eq. (7) made.
     delay : Delay, optional
         Outcome of step 1, where it is known.
 

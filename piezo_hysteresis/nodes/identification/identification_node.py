@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from ...effects import Arx, BoucWen, Offset
+from ...effects import HYSTERESIS, Arx, Offset
 from ...errors import ParameterError, PiezoError
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import Protocol, paper, rich, short
@@ -46,7 +46,7 @@ IDENTIFICATION: tuple[Row, ...] = (
     ),
 )
 
-START = Model((BoucWen(), Arx(), Offset()), 2e-5)
+START = Model((HYSTERESIS(), Arx(), Offset()), 2e-5)
 """Declared, not valid, before there is a result."""
 
 _TICK = 0.02

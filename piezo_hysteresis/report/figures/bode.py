@@ -146,14 +146,12 @@ def _spread(found: FrequencyResponse) -> NDArray[np.intp]:
 
 
 def _linear_part(model: Model | None, gain_axis: object, phase_axis: object, data: dict[str, Array]) -> None:
-    if model is None or "arx" not in model:
+    if model is None or Arx.name not in model or not model.has_hysteresis:
         return
-    g = model["arx"]
-    loop = next((e for e in model.effects if e.name in ("bouc_wen", "published_bouc_wen")), None)
-    if loop is None or not isinstance(g, Arx):
-        return
+    g = model[Arx.name]
+    assert isinstance(g, Arx)
     f = np.geomspace(data["frequency_Hz_1"][0], data["frequency_Hz_1"][-1], 200)
-    slope = (loop["p2"] + loop["A"]) * model.displacement_scale / model.voltage_scale
+    slope = model.hysteresis.turning_slope * model.displacement_scale / model.voltage_scale
     value = slope * g.response(f, model.sample_period)
     angle = np.degrees(np.unwrap(np.angle(value)))
     style = {"color": GREEN, "linestyle": (0, (1, 1.4)), "linewidth": 1.6}

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.axes import Axes
 
+from ...effects import Arx
 from ...errors import IdentificationError
 from ...identification.steps.delay import identify_delay
 from ...identification.steps.step_response import StepResponse, step_response
@@ -40,8 +41,8 @@ def step(comparison: ModelComparison) -> Drawing | None:
     _draw(axes[1], measured, predicted, measured.mean.size)
     axes[0].axvline(1e6 * delay.time, color=BLUE, linestyle=(0, (6, 2, 1, 2)), label=f"delay {delay.samples} samples")
     model = comparison.model
-    if model is not None and "arx" in model:
-        lag = model["arx"]["delay"] * model.sample_period
+    if model is not None and Arx.name in model:
+        lag = model[Arx.name]["delay"] * model.sample_period
         axes[0].axvline(1e6 * lag, color=GREEN, linestyle=(0, (1, 1.4)), label=f"delay of the model {duration(lag)}")
     axes[0].set_title("onset")
     axes[1].set_title("whole response")

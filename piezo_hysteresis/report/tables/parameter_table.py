@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...effects import Arx
 from ...identification.fit.fit import Fit
 from ...model.model import Model
 from .table import Table
@@ -48,7 +49,7 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
         "Parameters",
         ("name", "symbol", "value", "95 %", "unit", "bounds", "meaning"),
         tuple(rows),
-        note if "arx" in model else "",
+        note if Arx.name in model else "",
         frozenset({2, 3, 5}),
     )
 
@@ -56,7 +57,7 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
 def correlation_table(fit: Fit) -> Table | None:
     """Pairs of fitted numbers whose estimates move together, the strongest first; ARX coefficients left out."""
     sure = fit.standard_errors
-    names = [n for n in fit.names if sure[n] > 0.0 and not n.startswith(("arx.a", "arx.b"))]
+    names = [n for n in fit.names if sure[n] > 0.0 and not n.startswith((f"{Arx.name}.a", f"{Arx.name}.b"))]
     pairs = [(a, b, fit.correlation(a, b)) for i, a in enumerate(names) for b in names[:i]]
     strong = sorted((p for p in pairs if abs(p[2]) > ALIKE), key=lambda p: -abs(p[2]))
     if not strong:

@@ -1,0 +1,197 @@
+"""`HysteresisOperator`: the effect of a chain that plays the role of the hysteresis, found as `Model.hysteresis`.
+
+Another operator (Preisach, Prandtl-Ishlinskii, …) is one class that derives from it: identification, diagnosis and
+report ask for the role and for no name.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from ...blocks.block import Array
+from ...errors import IdentificationError
+from ..effect import ChainPosition, Discretisation, Effect
+
+POINTS = 6000
+"""About how many points of the data a search for start values uses."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Loop:
+    """Input and output of the hysteresis in one record.
+
+    Parameters
+    ----------
+    v : (n,) array
+        Normalised input.
+    w : (n,) array
+        Hysteresis output.
+    continues : bool
+        True where the state of the loop before is carried on.
+    start : float
+        v at which the stage had settled before, where it does not continue.
+    weight : float
+        Weight in the search; 0 where the record only carries the state.
+    """
+
+    v: Array
+    w: Array
+    continues: bool = False
+    start: float = 0.0
+    weight: float = 1.0
+
+
+class HysteresisOperator(Effect):
+    """From the normalised input v to the hysteresis output w, with the numbers that make it large and that shape it."""
+
+    family = "hysteresis"
+    place = ChainPosition.HYSTERESIS
+
+    gain_names: ClassVar[tuple[str, ...]]
+    """Parameters to which w is proportional: w doubles when all of them do."""
+    memory_names: ClassVar[tuple[str, ...]] = ()
+    """Parameters without meaning once the memory is switched off."""
+
+    def fitted_names(self) -> tuple[str, ...]:
+        """Names of the numbers that a fit adjusts: ``"beta"``, or ``"c[0]"`` for elements of an array parameter."""
+        chosen = {row.name for row in self.parameters if row.fixed or row.per_record}
+        return tuple(n for n in self.free_names() if n.partition("[")[0] not in chosen)
+
+    def gain_numbers(self) -> tuple[str, ...]:
+        """Names of the single numbers of `gain_names`."""
+        return tuple(n for n in self.free_names() if n.partition("[")[0] in self.gain_names)
+
+    def linear_numbers(self) -> tuple[str, ...]:
+        """Numbers to which w is proportional whether or not the operator has memory."""
+        return tuple(n for n in self.gain_numbers() if n.partition("[")[0] not in self.memory_names)
+
+    def scaled(self, factor: float) -> Self:
+        """The same operator with `factor` times the output."""
+        changed = {n: factor * self.array(n) for n in self.gain_names}
+        return self.with_values(**{n: tuple(v.tolist()) if v.ndim else float(v) for n, v in changed.items()})
+
+    @property
+    def has_memory(self) -> bool:
+        """False where the numbers switch the memory off, so that w is a function of v alone."""
+        return True
+
+    def memoryless(self) -> Self | None:
+        """The same operator with its memory switched off; None where it has no such form."""
+        return None
+
+    def exact(self) -> HysteresisOperator:
+        """The operator that terms of the catalogue can join; itself, unless another one stands for it.
+
+        Raises
+        ------
+        ModelError
+            Where there is none for these values.
+        """
+        return self
+
+    @property
+    @abstractmethod
+    def turning_slope(self) -> float:
+        """∂w/∂v just after a turning point, at v = 0 [1]: the gain that small fast motion sees."""
+
+    def shaped(self, low: float, high: float) -> Self:
+        """The same operator with the shape from which a search begins.
+
+        Parameters
+        ----------
+        low, high : float
+            Smallest and largest v of the loops.
+        """
+        return self
+
+    def started(self, loops: Sequence[Loop]) -> Self:
+        """The operator closest to the loops, without a start value: its shape by `shaped`, its gains by least squares.
+
+        Parameters
+        ----------
+        loops : sequence of Loop
+            In experiment order; those of weight 0 only carry the state.
+
+        Raises
+        ------
+        IdentificationError
+            If no loop has weight, or the input does not move.
+        """
+        range_of(loops)
+        moved = [loop for loop in loops if loop.weight > 0]
+        low = min(float(min(loop.v.min(), loop.start)) for loop in moved)
+        high = max(float(max(loop.v.max(), loop.start)) for loop in moved)
+        shape = self.shaped(low, high)
+        thin = [thinned(loop, max(POINTS // len(moved), 500)) for loop in loops]
+        used = [i for i, loop in enumerate(thin) if loop.weight > 0]
+        roots = [np.sqrt(loop.weight / loop.v.size) for loop in thin]
+
+        def stacked(parts: Sequence[Array]) -> Array:
+            return np.concatenate([roots[i] * (parts[i] - parts[i].mean()) for i in used])
+
+        sizes = {n: shape.array(n).size for n in self.gain_names}
+        width = sum(sizes.values())
+        columns = np.column_stack([stacked(outputs(shape._with_gains(row, sizes), thin)) for row in np.eye(width)])
+        table = {row.name: row for row in self.parameters}
+        limits = [(table[n].lower, table[n].upper) for n, size in sizes.items() for _ in range(size)]
+        scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        bounds = np.transpose(limits) * scale
+        found = lsq_linear(columns / scale, stacked([loop.w for loop in thin]), bounds=(bounds[0], bounds[1]))
+        return shape._with_gains(found.x / scale, sizes)
+
+    def _with_gains(self, gains: NDArray[np.float64], sizes: dict[str, int]) -> Self:
+        cuts = np.split(gains, np.cumsum(list(sizes.values()))[:-1])
+        values = dict(zip(sizes, cuts, strict=True))
+        arrays = {n: isinstance(self.values[n], tuple) for n in sizes}
+        return self.with_values(**{n: tuple(v.tolist()) if arrays[n] else float(v[0]) for n, v in values.items()})
+
+
+def outputs(operator: HysteresisOperator, loops: Sequence[Loop]) -> list[Array]:
+    """Output w (n,) of an operator in every loop, the state carried where a loop continues."""
+    block = operator.block(Discretisation(1.0, 1.0))
+    state, found = None, []
+    for loop in loops:
+        if state is None or not loop.continues:
+            state = block.rest(loop.start, 0.0)
+        w, state = block.run(loop.v, state)
+        found.append(w)
+    return found
+
+
+def range_of(loops: Sequence[Loop]) -> float:
+    """Largest range of v in the loops that have weight.
+
+    Raises
+    ------
+    IdentificationError
+        If there is none, or the input does not move.
+    """
+    weighted = [loop for loop in loops if loop.weight > 0]
+    span = max((float(np.ptp(np.append(loop.v, loop.start))) for loop in weighted), default=0.0)
+    if span == 0.0:
+        raise IdentificationError(
+            f"hysteresis: got {len(weighted)} records whose drive moves by {span:g}, "
+            "expected at least one with loops, e.g. a triangle of several amplitudes"
+        )
+    return span
+
+
+def thinned(loop: Loop, points: int) -> Loop:
+    """Fewer points, the extremes of v in every segment among them, so that no turning point is lost."""
+    stretch = -(-3 * loop.v.size // points)
+    if stretch < 4:
+        return loop
+    whole = loop.v.size // stretch
+    rows = loop.v[: whole * stretch].reshape(whole, stretch)
+    first = stretch * np.arange(whole)
+    keep = np.unique(
+        np.concatenate((first, first + rows.argmin(axis=1), first + rows.argmax(axis=1), [loop.v.size - 1]))
+    )
+    return Loop(loop.v[keep], loop.w[keep], loop.continues, loop.start, loop.weight)

@@ -1,0 +1,128 @@
+"""Another operator in the role of the hysteresis is one class: it is simulated, identified, diagnosed and reported."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piezo_hysteresis
+from piezo_hysteresis.discrepancy.search.baseline import exact
+from piezo_hysteresis.effects import CHAIN, Arx, BoucWen, HysteresisOperator, Loop, Offset, PublishedBoucWen
+from piezo_hysteresis.effects.hysteresis.hysteresis_memory import HysteresisMemoryBlock
+from piezo_hysteresis.effects.hysteresis.operator import outputs
+from piezo_hysteresis.errors import IdentificationError, ModelError
+from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.protocol import excitation
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.parameter import Parameter
+from piezo_hysteresis.record import Experiment, Record
+
+SOURCE = Path(piezo_hysteresis.__file__).parent
+ROOMS = ("cli", "compensation", "discrepancy", "identification", "model", "nodes", "online", "report")
+OTHER_MEANINGS = {("report/figures/creep.py", "creep"), ("nodes/model/diagnostics.py", "offset")}
+LIMITS = DriveLimits(sample_period=2e-4)
+
+
+class PrandtlIshlinskii(HysteresisOperator):
+    """Plays in parallel; the narrowest, of half width 0, is the proportional part."""
+
+    name = "prandtl_ishlinskii"
+    equation = "w = Σ_j c_j p_j"
+    signature = "nested loops that return to the point where they were left"
+    source = "Gu et al. 2016"
+    gain_names = ("c",)
+    parameters = (
+        Parameter("c", "c_j", "1", (1.0,) + (0.0,) * 7, 0.0, 1e3, "weights of the plays", "Gu et al. 2016"),
+        Parameter("reach", "r_max", "1", 0.5, 1e-6, 1e3, "half width of the widest play", "Gu et al. 2016", fixed=True),
+    )
+
+    def shaped(self, low, high):
+        return self.with_values(reach=0.47 * (high - low))
+
+    @property
+    def turning_slope(self):
+        return float(self.array("c")[0])
+
+    def block(self, setting, terms=()):
+        c = self.array("c")
+        names = tuple(f"{self.name}.c[{j}]" for j in range(c.size))
+        return HysteresisMemoryBlock(names, c, self["reach"] * np.arange(c.size) / c.size, 0.0)
+
+
+TRUTH = PrandtlIshlinskii(c=(1.1, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05, 0.05), reach=0.47)
+
+
+@pytest.fixture(scope="module")
+def experiment():
+    model = Model((TRUTH, Arx(a=(-0.6,), b=(0.4,), delay=2.0), Offset()), 2e-4, 10.0, 1e-5)
+    rng = np.random.default_rng(1)
+    records = []
+    loops = excitation.triangle(LIMITS, (1.0, 0.7, 0.4), 1.0)
+    noise = excitation.noise(LIMITS, 1.0, 200.0, 2.0, 0.5, 1)
+    for name, u in (("triangle", loops), ("noise", noise), ("validation", 0.8 * loops)):
+        record = Record(u, u, 2e-4, name)
+        y = model.simulate(record)[0] + 1e-10 * rng.standard_normal(u.size)
+        records.append(Record(u, y, 2e-4, name))
+    return Experiment(tuple(records))
+
+
+def test_its_start_comes_from_its_own_loops():
+    v = np.concatenate([excitation.triangle(DriveLimits(sample_period=1e-3), (1.0, 0.6, 0.3), 1.0)]) / 10.0
+    (w,) = _outputs(TRUTH, v)
+    found = PrandtlIshlinskii().started([Loop(v, w + 0.2)])
+    assert np.std(_outputs(found, v)[0] - w) < 0.02 * np.ptp(w)
+    with pytest.raises(IdentificationError, match="triangle"):
+        PrandtlIshlinskii().started([Loop(np.ones(9), np.ones(9), start=1.0)])
+
+
+def test_it_is_identified_by_its_class_alone(experiment):
+    found = identify(experiment, hysteresis=PrandtlIshlinskii, orders=(1, 1))
+    assert isinstance(found.model.hysteresis, PrandtlIshlinskii)
+    assert found.free_run_percent < 0.3
+    assert found.free_run_percent < 0.5 * identify(experiment, orders=(1, 1)).free_run_percent
+    assert found.model[Arx.name].dc_gain == pytest.approx(1.0, rel=1e-6)  # the gauge is held for its gains too
+
+
+def test_a_chain_without_one_says_so():
+    bare = Model((Arx(b=(1.0,)),), 2e-4)
+    assert not bare.has_hysteresis
+    with pytest.raises(ModelError, match="expected one"):
+        _ = bare.hysteresis
+
+
+def test_the_exact_operator_takes_the_place_of_the_published_one():
+    published = Model((PublishedBoucWen(A=-0.5), Arx(b=(1.0,))), 2e-4)
+    assert exact(published).hysteresis == BoucWen(A=-0.5)
+    with pytest.raises(ModelError, match="expected 1"):
+        exact(published.with_hysteresis(PublishedBoucWen(n=2.0)))
+
+
+@pytest.mark.parametrize("operator", [BoucWen(), PublishedBoucWen(), TRUTH], ids=lambda o: o.name)
+def test_the_output_is_proportional_to_the_gains(operator):
+    v = 0.8 * np.sin(np.linspace(0.0, 12.0, 500))
+    (once,), (twice,) = _outputs(operator, v), _outputs(operator.scaled(2.0), v)
+    assert np.allclose(twice, 2.0 * once, rtol=1e-12)
+    small = np.array([0.0, 1e-6])
+    (w,) = _outputs(operator, small)
+    assert (w[1] - w[0]) / 1e-6 == pytest.approx(operator.turning_slope, rel=1e-4)
+
+
+def test_no_room_above_the_catalogue_names_an_effect_in_a_string():
+    """Who asks for a role or a class is not touched by another effect; a name in a string would be."""
+    names = {effect.name for effect in CHAIN}
+    found = []
+    for path in (p for room in ROOMS for p in (SOURCE / room).rglob("*.py")):
+        tree, where = ast.parse(path.read_text(encoding="utf-8")), str(path.relative_to(SOURCE))
+        prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
+                word = node.value.partition(".")[0]
+                if word in names and (where, node.value) not in OTHER_MEANINGS:
+                    found.append(f"{where}:{node.lineno}: '{node.value}'")
+    assert not found, "\n".join(found)
+
+
+def _outputs(operator, v):
+    return outputs(operator, [Loop(v, v, start=float(v[0]))])
