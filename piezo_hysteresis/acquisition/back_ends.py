@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from ..errors import ParameterError, RecordingError, StageError
 from ..parameter import Parameter, Row, Setting
 from ..stage.hidden import hidden_effect
@@ -16,6 +14,7 @@ from ..stage.plant import PlantParameters
 from ..stage.replay import ReplayStage
 from ..stage.simulated import SimulatedMemoryStage, SimulatedStage
 from ..stage.stage import Stage
+from ..yaml_file import read_yaml
 from .devices import GCS2, NIDAQMX, open_gcs2, open_nidaqmx
 
 
@@ -79,11 +78,11 @@ def _plant_values(values: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _read_mapping(path: Path) -> Mapping[str, Any]:
     try:
-        mapping = yaml.safe_load(path.read_text(encoding="utf-8"))
+        mapping = read_yaml(path)
+    except RecordingError as error:
+        raise StageError(f"simulated.plant_file: {error}") from None
     except OSError as error:
         raise StageError(f"simulated.plant_file: cannot read {path} ({error.strerror})") from None
-    except (yaml.YAMLError, ValueError, RecursionError):
-        raise StageError(f"simulated.plant_file: {path} is no YAML, expected plant parameters by name") from None
     if not isinstance(mapping, Mapping):
         raise StageError(f"simulated.plant_file: {path} holds no mapping, expected plant parameters by name")
     return mapping

@@ -6,11 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from ..errors import ParameterError, RecordingError
 from ..stage.hidden import hidden_effect
 from ..stage.plant import PlantParameters
+from ..yaml_file import read_yaml
 
 
 def add_plant_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,11 +41,9 @@ def _read(path: str | None) -> PlantParameters:
     if path is None:
         return PlantParameters()
     try:
-        mapping = yaml.safe_load(Path(path).expanduser().read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror or error}, expected a YAML file") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ParameterError(f"{path}: broken YAML ({' '.join(str(error).split())[:120]})") from None
+        mapping = read_yaml(Path(path).expanduser())
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise RecordingError(f"{path}: {error.strerror}, expected a YAML file") from None
     if not isinstance(mapping, dict):
         raise ParameterError(f"{path}: got a {type(mapping).__name__}, expected part.quantity: value")
     return PlantParameters.from_mapping(mapping)

@@ -184,6 +184,8 @@ def _named(format: str) -> Format:
 def _format(path: Path, name: str | None) -> Format:
     if not path.exists():
         raise RecordingError(f"{path}: no such file or folder, expected a recording")
+    if not (path.is_file() or path.is_dir()):
+        raise RecordingError(f"{path}: got a pipe or a device, expected a file or a folder")
     if name is not None:
         return _named(name)
     for chosen in FORMATS.values():

@@ -8,15 +8,17 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-import yaml
-
 from ...errors import RecordingError
 from ...record import Notice
+from ...yaml_file import read_regular_file
 from .mcap_file import McapFile
 from .sqlite_file import SqliteFile
 
 REORDERING_HORIZON = 2_000_000_000
 """Messages of a file are at most this far from time order [ns]; recorders write them as they arrive."""
+
+_LONGEST_METADATA = 1 << 22
+"""Bytes of ``metadata.yaml`` in which the compression is looked for."""
 
 
 class Message(NamedTuple):
@@ -122,12 +124,8 @@ def _order(file: Path) -> tuple[int, str]:
 
 
 def _message_compression(path: Path) -> bool:
-    metadata = path / "metadata.yaml"
-    if not metadata.is_file():
-        return False
     try:
-        information = yaml.safe_load(metadata.read_text(errors="replace"))["rosbag2_bagfile_information"]
-        mode = information.get("compression_mode", "")
-        return isinstance(mode, str) and mode.lower() == "message"
-    except (yaml.YAMLError, TypeError, KeyError, AttributeError, ValueError, RecursionError):
+        metadata = read_regular_file(path / "metadata.yaml", _LONGEST_METADATA)
+    except (OSError, RecordingError):
         return False  # metadata are not needed to read a bag
+    return re.search(rb"""(?im)^\s*compression_mode:\s*["']?message["']?\s*$""", metadata) is not None

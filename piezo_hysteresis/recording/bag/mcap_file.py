@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -11,14 +12,27 @@ from typing import BinaryIO
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Message, Schema
-from mcap.stream_reader import get_chunk_data_stream
 
 from ...errors import RecordingError
 from ...record import Notice
 
 MAGIC = b"\x89MCAP0\r\n"
+"""First and last bytes of a file."""
+
 _HEAD = struct.Struct("<BQ")
-_LARGEST_EXPANSION = 1000
+"""Kind and length of a record."""
+
+_LARGEST_RATIO = 1000
+"""Bytes that one compressed byte of a chunk may hold."""
+
+_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+"""Kinds of records that a chunk may hold."""
+
+LARGEST_CHUNK = 1 << 26
+"""Bytes that one chunk may unpack to."""
+
+LARGEST_EXPANSION = 100
+"""Bytes that a file may unpack to, for each of its own, beyond one `LARGEST_CHUNK`; samples compress to a tenth."""
 
 
 class McapFile:
@@ -34,6 +48,7 @@ class McapFile:
         self.definitions: dict[str, str] = {}
         self._channels: dict[int, tuple[str, str]] = {}
         self._schemas: dict[int, str] = {}
+        self._room = 0
 
     def messages(self) -> Iterator[tuple[str, str, int, bytes]]:
         """Topic, type, time [ns] and bytes of every message.
@@ -45,6 +60,7 @@ class McapFile:
         """
         self.notices.clear()
         size = self.path.stat().st_size
+        self._room = LARGEST_CHUNK + LARGEST_EXPANSION * size
         with self.path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
                 raise RecordingError(f"{self.path}: got other first bytes than those of an MCAP file")
@@ -73,14 +89,16 @@ class McapFile:
             chunk = Chunk.read(ReadDataStream(io.BytesIO(body)))
             data = chunk.data
             if whole:
-                if chunk.uncompressed_size > _LARGEST_EXPANSION * (len(data) + 1):
+                self._room -= chunk.uncompressed_size
+                declares = chunk.uncompressed_size
+                if declares > min(LARGEST_CHUNK, _LARGEST_RATIO * (len(data) + 1)) or self._room < 0:
                     raise RecordingError("chunk declares more than its bytes can hold")
-                stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-                data = stream.read(length) if length else b""
+                data = unpacked(chunk)
             elif chunk.compression:
                 return
-            inside = list(_framed(io.BytesIO(data), len(data)))
-            for opcode, body, whole in inside:
+            for opcode, body, whole in _framed(io.BytesIO(data), len(data)):
+                if opcode not in _IN_CHUNKS:
+                    raise RecordingError(f"chunk holds a record of kind {opcode}, expected schemas, channels, messages")
                 if whole:
                     yield from self._record(opcode, body)
         elif whole:
@@ -101,6 +119,33 @@ class McapFile:
             channel = Channel.read(stream)
             if channel.message_encoding == "cdr":
                 self._channels[channel.id] = (channel.topic, self._schemas.get(channel.schema_id, ""))
+
+
+def unpacked(chunk: Chunk) -> bytes:
+    """The records of a chunk, never more bytes than it declares.
+
+    Raises
+    ------
+    RecordingError
+        If it unpacks to more or fewer bytes, or to others than it was written with.
+    """
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd":
+        import zstandard  # as mcap does: only needed for bags that are compressed
+
+        with zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).stream_reader(chunk.data) as stream:
+            data = stream.read(size + 1)
+    elif chunk.compression == "lz4":
+        import lz4.frame
+
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+    elif chunk.compression:
+        raise RecordingError(f"chunk is compressed by '{chunk.compression}', expected zstd, lz4 or nothing")
+    else:
+        data = chunk.data
+    if len(data) != size or (chunk.uncompressed_crc and chunk.uncompressed_crc != zlib.crc32(data)):
+        raise RecordingError(f"chunk has {len(data)} bytes that are not the {size} it was written with")
+    return data
 
 
 def _framed(file: BinaryIO, size: int) -> Iterator[tuple[int, bytes, bool]]:

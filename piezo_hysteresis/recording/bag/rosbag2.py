@@ -134,9 +134,8 @@ def _read_samples(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Not
             continue
         try:
             if message.type == TYPE:
-                streams.setdefault(space, SampleStream(layout.sample_period)).add(
-                    BlockMessage.from_cdr(message.raw), message.time_ns
-                )
+                block = BlockMessage.from_cdr(message.raw)
+                streams.setdefault(space, SampleStream(layout.sample_period)).add(block, message.time_ns)
             elif message.type == STRING:
                 names.setdefault(space, PhaseNames()).add(message.raw, message.time_ns)
         except Exception:  # the decoder raises whatever it likes on damaged bytes

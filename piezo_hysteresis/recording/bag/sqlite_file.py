@@ -12,7 +12,22 @@ from ...errors import RecordingError
 from ...record import Notice
 
 _TOPICS = "SELECT id, name, type FROM topics WHERE serialization_format = 'cdr'"
+"""Names and types of the topics."""
+
 _MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+"""Messages in the order in which they were recorded."""
+
+_DEFINITIONS = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+"""Definitions of the message types, in bags later than those of Humble."""
+
+_SIDECARS = ("-wal", "-shm", "-journal")
+"""Endings of the files that SQLite may keep beside a database."""
+
+_STEPS_BETWEEN_CHECKS = 1000
+"""Steps of the database engine between two looks at their number."""
+
+_STEPS, _STEPS_PER_BYTE = 1_000_000, 20
+"""Steps of the database engine that reading may take; a row takes about twenty, and no row is shorter than a byte."""
 
 
 class SqliteFile:
@@ -32,21 +47,35 @@ class SqliteFile:
             If the file is no rosbag2 database.
         """
         self.notices.clear()
-        with closing(self._connection()) as database:
+        size = self._size()
+        with closing(self._connection(size)) as database:
             try:
+                _require_tables(database)
                 topics = {int(i): (str(name), str(kind)) for i, name, kind in database.execute(_TOPICS)}
                 rows = database.execute(_MESSAGES)
+                self._read_definitions(database)
             except (sqlite3.Error, TypeError, ValueError) as error:
                 raise RecordingError(f"{self.path}: damaged or not a rosbag2 database ({error})") from None
-            self._read_definitions(database)
             try:
                 for topic, time_ns, data in rows:
                     if topic in topics and isinstance(data, bytes) and isinstance(time_ns, int):
+                        size -= len(data)
+                        if size < 0:  # pages or default values that are used again and again
+                            raise sqlite3.DatabaseError("its messages are longer than the file")
                         yield *topics[topic], time_ns, data
             except (sqlite3.Error, MemoryError) as error:
                 self.notices.append(Notice("cut", f"{self.path.name} is damaged ({error}): read up to there"))
 
-    def _connection(self) -> sqlite3.Connection:
+    def _size(self) -> int:
+        """Bytes of the file and of its write-ahead log; RecordingError where one of them is a pipe or a device."""
+        files = [self.path, *(self.path.with_name(self.path.name + end) for end in _SIDECARS)]
+        strange = [file.name for file in files if file.exists() and not file.is_file()]
+        if strange:
+            raise RecordingError(f"{self.path}: {strange[0]} is no regular file, expected a rosbag2 database")
+        return sum(file.stat().st_size for file in files if file.exists())
+
+    def _connection(self, size: int) -> sqlite3.Connection:
+        """The database, allowed only as much memory and as many steps as a file of `size` bytes can need."""
         place = f"file:{quote(str(self.path.absolute()))}?mode=ro"
         try:
             connection = sqlite3.connect(place, uri=True)
@@ -54,12 +83,31 @@ class SqliteFile:
         except sqlite3.Error:
             # the write-ahead log of a killed recorder cannot be opened in a read-only folder
             connection = sqlite3.connect(place + "&immutable=1", uri=True)
+        connection.execute("PRAGMA trusted_schema = OFF")
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(size, 1 << 16))
+        connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+        left = iter(range((_STEPS + _STEPS_PER_BYTE * size) // _STEPS_BETWEEN_CHECKS))
+        connection.set_progress_handler(lambda: next(left, None) is None, _STEPS_BETWEEN_CHECKS)
         connection.text_factory = lambda raw: raw.decode("utf-8", "replace")
         return connection
 
     def _read_definitions(self, database: sqlite3.Connection) -> None:
-        try:
-            rows = database.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
+        if "message_definitions" in _kinds(database):  # bags of Humble carry no definitions
+            rows = database.execute(_DEFINITIONS)
             self.definitions.update({str(k): str(text) for k, encoding, text in rows if encoding == "ros2msg"})
-        except sqlite3.Error:
-            return  # bags of Humble carry no definitions
+
+
+def _kinds(database: sqlite3.Connection) -> dict[str, str]:
+    """Name of everything in the database that can be read to its kind: table, view, virtual or shadow."""
+    return {str(row[1]): str(row[2]) for row in database.execute("PRAGMA main.table_list")}
+
+
+def _require_tables(database: sqlite3.Connection) -> None:
+    """Views, virtual tables and computed columns run what their author wrote: RecordingError on them."""
+    kinds = _kinds(database)
+    for name in ("topics", "messages", "message_definitions"):
+        kind = kinds.get(name, "table")
+        if kind != "table":
+            raise RecordingError(f"'{name}' is a {kind}, expected a table as rosbag2 writes it")
+        if any(row[6] for row in database.execute(f"PRAGMA main.table_xinfo({name})")):
+            raise RecordingError(f"'{name}' has computed columns, expected a table as rosbag2 writes it")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,13 @@ from ..table.read_options import ReadOptions
 from .mat_variables import MatVariables
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""First bytes of a file."""
+
 _LARGEST_EXPANSION = 1100
+"""Bytes that one compressed byte can hold at most."""
+
+LARGEST_CHUNK = 1 << 26
+"""Bytes that are unpacked at once from a compressed array."""
 
 
 def is_hdf5(path: Path) -> bool:
@@ -89,8 +97,17 @@ class Hdf5Variables(MatVariables):
         if name not in set(self):
             raise KeyError(name)
         dataset = self._file[name.replace(".", "/")]
-        if dataset.dtype.kind not in "fiub":
-            raise RecordingError(f"{name}: got {dataset.dtype}, expected numbers or text")
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # a type of the file that numpy doubts is no type of ours
+            kind = dataset.dtype
+        if kind.kind not in "fiub":
+            raise RecordingError(f"{name}: got {kind}, expected numbers or text")
+        if dataset.external or dataset.is_virtual:
+            raise RecordingError(f"{name}: its numbers lie in other files, expected a file that holds them")
+        if dataset.chunks is not None and math.prod(dataset.chunks) * kind.itemsize > LARGEST_CHUNK:
+            raise RecordingError(
+                f"{name}: got chunks of {dataset.chunks}, expected at most {LARGEST_CHUNK} bytes in one"
+            )
         size = dataset.size * dataset.dtype.itemsize
         if size > _LARGEST_EXPANSION * (dataset.id.get_storage_size() + 1000):
             raise RecordingError(f"{name}: declares {size} bytes, more than the file can hold")

@@ -40,6 +40,8 @@ class Npz:
     def read(self, path: Path, layout: ReadOptions) -> Experiment:
         """The phases in the order of their file numbers."""
         files = [path] if path.is_file() else sorted(path.glob("*.npz"), key=_order)
+        if strange := [file.name for file in files if not file.is_file()]:
+            raise RecordingError(f"{path}: {strange[0]} is no regular file, expected .npz files only")
         records: list[Record] = []
         notices: list[Notice] = []
         if len(files) > 1 and not isinstance(layout.phases, str | None):

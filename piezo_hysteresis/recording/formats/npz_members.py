@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Iterator
 from typing import IO, Any
@@ -43,7 +44,7 @@ class NpzMembers:
         """Number of samples of an array, from its header."""
         with self._archive.open(self._member(name)) as stream:
             shape, _ = self._header(name, stream)
-        return int(np.prod([int(n) for n in shape], dtype=object))
+        return math.prod(shape)
 
     def samples(self, name: str, part: slice, average: int) -> Samples:
         """A part of a one-dimensional array, so many samples averaged into one, without reading it as a whole.
@@ -99,7 +100,9 @@ class NpzMembers:
         shape, _, dtype = _MAGIC_READERS[version](stream)
         if dtype.hasobject:
             raise RecordingError(f"{name}: got pickled objects, expected numbers or text")
-        declared = int(np.prod([int(n) for n in shape], dtype=object)) * dtype.itemsize
+        if not all(type(n) is int and n >= 0 for n in shape):
+            raise RecordingError(f"{name}: got shape {shape}, expected whole numbers of samples")
+        declared = math.prod(shape) * dtype.itemsize
         if declared > self._member(name).file_size or declared > self._budget:
             raise RecordingError(f"{name}: declares {declared} bytes, more than the file can hold")
         return shape, dtype

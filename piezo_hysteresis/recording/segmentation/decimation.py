@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 
 from ...errors import RecordingError
+from ...yaml_file import read_yaml
 
 FILE = "decimate.yaml"
 """Beside the storage files in the folder of the bag."""
@@ -31,11 +32,11 @@ def load_decimation(folder: Path) -> dict[str, int]:
         If the file is there but does not map names to whole numbers.
     """
     try:
-        factors = yaml.safe_load((folder / FILE).read_text(encoding="utf-8"))
+        factors = read_yaml(folder / FILE)
     except (FileNotFoundError, NotADirectoryError):
         return {}
-    except (OSError, ValueError, RecursionError, yaml.YAMLError):  # ValueError: dates that do not exist
-        raise RecordingError(f"{folder / FILE}: cannot be read, expected phase names and whole numbers") from None
+    except RecordingError as error:
+        raise RecordingError(f"{error}; expected phase names and whole numbers") from None
     whole = isinstance(factors, dict) and all(type(n) is int and n >= 1 for n in factors.values())
     if not whole:
         raise RecordingError(f"{folder / FILE}: got something else, expected phase names and whole numbers")

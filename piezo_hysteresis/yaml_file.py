@@ -1,0 +1,81 @@
+"""Settings from YAML files that people write; a file can be wrong, but reading it takes neither memory nor time."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from .errors import RecordingError
+
+LONGEST = 1 << 16
+"""Largest settings file that is read [bytes]."""
+
+
+class _PlainLoader(yaml.SafeLoader):  # type: ignore[misc]  # yaml carries no types
+    """Plain values only: an alias can make nine lines as large as the memory."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.YAMLError("an alias is not allowed, write the value out")
+        return super().compose_node(parent, index)
+
+
+def read_regular_file(path: Path, longest: int) -> bytes:
+    """Up to `longest` bytes of a regular file; never waits for a pipe or a device.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    longest : int
+        Number of bytes that are read at most.
+
+    Raises
+    ------
+    OSError
+        If it cannot be opened.
+    RecordingError
+        If it is a folder, a pipe or a device.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise RecordingError(f"{path}: got a folder, a pipe or a device, expected a regular file")
+    with open(descriptor, "rb") as file:
+        return file.read(longest)
+
+
+def read_yaml(path: Path) -> Any:
+    """The content of a settings file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; `FileNotFoundError` is left to the caller, who knows whether it may be missing.
+
+    Raises
+    ------
+    FileNotFoundError, NotADirectoryError
+        If there is no such file.
+    RecordingError
+        If it cannot be read, is longer than `LONGEST`, or is no plain YAML.
+    """
+    try:
+        raw = read_regular_file(path, LONGEST + 1)
+    except (FileNotFoundError, NotADirectoryError):
+        raise
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}, expected a YAML file") from None
+    if len(raw) > LONGEST:
+        raise RecordingError(f"{path}: got more than {LONGEST} bytes, expected a YAML file with settings")
+    try:
+        return yaml.load(raw.decode("utf-8"), _PlainLoader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: dates that do not exist
+        reason = " ".join(str(error).split())[:120]
+        raise RecordingError(f"{path}: broken YAML ({reason})") from None
