@@ -20,6 +20,7 @@ COMMANDS = {
     "identify": "identify a model from an experiment",
     "validate": "judge a model in free run on an experiment",
     "diagnose": "say where a model is wrong and which effect is missing",
+    "compensate": "turn a model round: the drive voltage for a wanted displacement",
     "report": "write one page about an experiment and its models",
     "import": "turn a foreign recording into an experiment folder",
     "effects": "the catalogue of physical effects",

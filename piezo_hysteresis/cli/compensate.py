@@ -1,0 +1,195 @@
+"""``piezo compensate``: the drive voltage that makes a stage follow a path, and the error to expect.
+
+Nothing is played: the command is written to a file, beside what can be had of the path and how far the stage will be
+off. Send it with the driver node, or with a program of your own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..compensation import Limits, Plan, plan
+from ..errors import ModelError, RecordingError
+from ..model import model_file
+from ..recording.formats.wanted_path import read_path
+from ..report.json_file import write_json
+from ..report.tables.table import Table
+from .terminal import console, show
+
+MOST_PARTS = 3
+"""Parts of a path that are told one by one."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("compensate", description=__doc__)
+    parser.add_argument("model", metavar="MODEL", help="model file")
+    parser.add_argument("path", metavar="PATH", help="CSV (time_s,displacement_um) or NPZ with the wanted displacement")
+    parser.add_argument("-o", "--output", metavar="FILE", default="command.npz", help="default: command.npz")
+    parser.add_argument("--voltage-min", metavar="V", type=float, default=0.0, help="default: 0")
+    parser.add_argument("--voltage-max", metavar="V", type=float, default=10.0, help="default: 10")
+    parser.add_argument("--max-slew-rate", metavar="V/S", type=float, default=math.inf, help="default: no limit")
+    parser.add_argument(
+        "--rest-voltage", metavar="V", type=float, default=0.0, help="voltage at which the stage rests before"
+    )
+    parser.add_argument("--approach", metavar="S", type=float, default=0.05, help="way to the path (default: 0.05 s)")
+    parser.add_argument("--approximate", action="store_true", help="leave out effects that cannot be turned round")
+    parser.add_argument("--allow-partial", action="store_true", help="write the command of a path that is out of reach")
+    parser.add_argument("--figures", metavar="FOLDER", help="write the figure with its data")
+    parser.add_argument("--json", metavar="FILE", help="result for machines")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Plan, print and save; returns 0, or 1 where part of the path cannot be had.
+
+    Raises
+    ------
+    PiezoError
+        On a model or a path that cannot be read, or a chain that cannot be turned round.
+    """
+    model = model_file.load(args.model)
+    wanted, period = read_path(args.path)
+    resampled = period is not None and abs(period - model.sample_period) > 1e-6 * model.sample_period
+    if resampled and period is not None:
+        if period < model.sample_period:
+            raise ModelError(
+                f"{args.path}: got a sample period of {period:g} s, expected {model.sample_period:g} s (the model's) "
+                "or more"
+            )
+        count = 1 + int((wanted.size - 1) * period / model.sample_period * (1.0 + 1e-12))
+        wanted = np.interp(model.sample_period * np.arange(count), period * np.arange(wanted.size), wanted)
+    limits = Limits(args.voltage_min, args.voltage_max, args.max_slew_rate)
+    found = plan(
+        model,
+        wanted,
+        limits,
+        start=model.rest(args.rest_voltage),
+        approach=args.approach,
+        approximate=args.approximate,
+    )
+    if args.json is not None:
+        write_json(args.json, answer(found))
+    if args.figures is not None:
+        _draw(found, Path(args.figures).expanduser())
+    show(_table(found))
+    out = console()
+    if resampled:
+        out.print(f"note: the path was interpolated to the model's sample period, {model.sample_period:g} s")
+    for name in found.left_out:
+        out.print(f"caution: {name} has no inverse and was left out; the error above holds what that costs")
+    for name in found.not_on_path:
+        out.print(f"note: {name} does not depend on the drive and is not compensated")
+    for line in refusal(found):
+        out.print(f"caution: {line}")
+    if not found.reachability.is_whole and not args.allow_partial:
+        out.print("no command was written; change the path, or give --allow-partial to write what the limits allow")
+        return 1
+    _save(found, Path(args.output).expanduser())
+    out.print(f"wrote {args.output}")
+    return 0 if found.reachability.is_whole else 1
+
+
+def refusal(found: Plan) -> list[str]:
+    """What cannot be had, and the nearest path that can; empty where all can."""
+    parts = found.reachability.parts
+    lines = [str(part) for part in parts[:MOST_PARTS]]
+    if len(parts) > MOST_PARTS:
+        lines.append(f"{len(parts) - MOST_PARTS} more parts like these cannot be had")
+    nearest = found.reachability.nearest
+    if nearest is None:
+        return lines
+    ways = []
+    if nearest.offset is not None:
+        ways.append(f"moved by {1e6 * nearest.offset:+.4g} µm")
+    if nearest.amplitude is not None:
+        ways.append(f"with {100.0 * nearest.amplitude:.4g} % of its amplitude about its middle")
+    if nearest.band is not None:
+        ways.append(f"without content above {nearest.band:.3g} Hz")
+    return [*lines, f"the path can be had {', or '.join(ways)}" if ways else "no shift or scale makes it reachable"]
+
+
+def answer(found: Plan) -> dict[str, Any]:
+    """The result for machines."""
+    nearest = found.reachability.nearest
+    return {
+        "schema": 1,
+        "samples": int(found.voltage.size),
+        "sample_period_s": found.sample_period,
+        "preview_samples": found.preview,
+        "preview_s": found.preview * found.sample_period,
+        "path_begins_at_sample": found.begin,
+        "range_m": found.range,
+        "voltage_min_V": float(found.voltage.min()),
+        "voltage_max_V": float(found.voltage.max()),
+        "largest_slew_V_per_s": found.largest_slew,
+        "expected_error": dict(found.expected.as_dict()),
+        "reachable": found.reachability.is_whole,
+        "unreachable": [
+            {
+                "begin_s": p.begin,
+                "end_s": p.end,
+                "largest_m": p.largest,
+                "limit": p.limit,
+                "needed_min_V": p.needed_min,
+                "needed_max_V": p.needed_max,
+                "needed_slew_V_per_s": p.needed_slew,
+                "after_loop": p.after_loop,
+            }
+            for p in found.reachability.parts
+        ],
+        "nearest": None
+        if nearest is None
+        else {"offset_m": nearest.offset, "amplitude": nearest.amplitude, "band_hz": nearest.band},
+        "left_out": list(found.left_out),
+        "not_on_path": list(found.not_on_path),
+    }
+
+
+def _table(found: Plan) -> Table:
+    expected, span = found.expected, found.range
+
+    def error(value: float | None) -> str:
+        if value is None:
+            return "not stated"
+        return f"{1e9 * value:.2f} nm" + (f", {100.0 * value / span:.4f} % of the path's range" if span else "")
+
+    rows = (
+        ("drive voltage", f"{found.voltage.min():.4g} to {found.voltage.max():.4g} V"),
+        ("largest slew", f"{found.largest_slew:.4g} V/s"),
+        ("duration", f"{found.voltage.size * found.sample_period:.4g} s, {found.voltage.size} samples"),
+        ("preview", f"{found.preview} samples, {1e3 * found.preview * found.sample_period:.3g} ms"),
+        ("error left by the plan", error(expected.planned)),
+        ("free-run error of the model", error(expected.free_run)),
+        ("expected error, rms", error(expected.total)),
+    )
+    return Table("Plan", ("", ""), rows)
+
+
+def _save(found: Plan, place: Path) -> None:
+    arrays: dict[str, Any] = {
+        "voltage": found.voltage,
+        "sample_period": np.float64(found.sample_period),
+        "expected_displacement": found.predicted,
+        "wanted_displacement": found.wanted,
+        "path_begin": np.int64(found.begin),
+    }
+    draft = place.with_name(place.name + ".tmp")
+    try:
+        with draft.open("wb") as file:
+            np.savez(file, **arrays)
+        draft.replace(place)
+    except OSError as error:
+        raise RecordingError(f"{place}: cannot be written ({error.strerror or error})") from None
+
+
+def _draw(found: Plan, folder: Path) -> None:
+    from ..report.figures.tracking import tracking
+
+    folder.mkdir(parents=True, exist_ok=True)
+    tracking(found).save(folder)

@@ -1,0 +1,83 @@
+"""`ExpectedError`: how far from the path the stage will be, said before anything moves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.model import Model
+from ..record import Record
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterCovariance:
+    """Uncertainty of a model's numbers, as a joint fit states it.
+
+    Parameters
+    ----------
+    names : sequence of str
+        ``"bouc_wen.A"``, …
+    matrix : (q, q) ndarray
+        Covariance, in the units of the numbers.
+    """
+
+    names: Sequence[str]
+    matrix: Array
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedError:
+    """Error to expect on a path, rms [m]; independent parts add up as squares.
+
+    Parameters
+    ----------
+    planned : float
+        What the plan itself leaves: band, limits, effects that were left out or are approximate.
+    free_run : float or None
+        Free-run error of the model on data that were not fitted; None where the model file does not state it.
+    parameters : float or None
+        Spread by the uncertainty of the numbers; None without a covariance.
+    """
+
+    planned: float
+    free_run: float | None
+    parameters: float | None
+
+    @property
+    def total(self) -> float:
+        """Root of the sum of squares [m]. The free-run error holds the parameters' part already."""
+        model = self.free_run if self.free_run is not None else self.parameters or 0.0
+        return float(np.hypot(self.planned, model))
+
+    def as_dict(self) -> Mapping[str, float | None]:
+        """For machines, in metres."""
+        return {
+            "planned_m": self.planned,
+            "free_run_m": self.free_run,
+            "parameters_m": self.parameters,
+            "total_m": self.total,
+        }
+
+
+def free_run_error(model: Model) -> float | None:
+    """What the model file states [m]; None where it states nothing that is a number."""
+    try:
+        value = float(model.provenance["free_run_error"])
+    except (KeyError, ValueError):
+        return None
+    return value if np.isfinite(value) and value >= 0.0 else None
+
+
+def parameter_error(model: Model, voltage: Array, covariance: ParameterCovariance) -> float:
+    """Rms over the drive (n,) [V] of the standard error that the covariance gives the displacement [m]."""
+    record = Record(voltage, np.zeros_like(voltage), model.sample_period)
+    _, slopes = model.sensitivities(record, covariance.names)
+    at = [k for k, name in enumerate(covariance.names) if name in slopes]
+    rows = np.array([slopes[covariance.names[k]] for k in at])
+    variance = np.einsum("ki,kl,li->i", rows, covariance.matrix[np.ix_(at, at)], rows)
+    return float(np.sqrt(max(variance.mean(), 0.0)))

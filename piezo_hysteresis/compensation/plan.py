@@ -1,0 +1,159 @@
+"""`Plan`: the drive for a path, whether the path can be had, and the error to expect; nothing has moved yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ModelError
+from ..model.chain import ChainState
+from ..model.model import Model
+from ..model.samples import samples
+from .band import Band
+from .expected_error import ExpectedError, ParameterCovariance, free_run_error, parameter_error
+from .inverse import Inverse
+from .limits import Limits
+from .reachability import Reachability
+from .reachable import reachable
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Plan:
+    """What would be played, and what is expected of it.
+
+    Parameters
+    ----------
+    wanted : (n,) ndarray
+        The path [m].
+    voltage : (m,) ndarray
+        Drive [V]: the way to the path, the preview, the path, the way back where it was asked for.
+    predicted : (m,) ndarray
+        Displacement under the drive, by the whole model [m].
+    begin : int
+        Sample of the drive at which the path begins.
+    sample_period : float
+        [s]
+    reachability : Reachability
+        Of the way and the path; times from the start of the path.
+    expected : ExpectedError
+        Along the path.
+    left_out, not_on_path : tuple of str
+        Effects that the inverse does not hold.
+    preview : int
+        Samples by which the drive is ahead.
+    end : ChainState
+        State of the model after the drive.
+    """
+
+    wanted: Array
+    voltage: Array
+    predicted: Array
+    begin: int
+    sample_period: float
+    reachability: Reachability
+    expected: ExpectedError
+    left_out: tuple[str, ...]
+    not_on_path: tuple[str, ...]
+    preview: int
+    end: ChainState
+
+    @property
+    def path_predicted(self) -> Array:
+        """Displacement expected along the path, shape (n,) [m]."""
+        return self.predicted[self.begin : self.begin + self.wanted.size]
+
+    @property
+    def largest_slew(self) -> float:
+        """Steepest change of the drive [V/s]."""
+        return float(np.abs(np.diff(self.voltage)).max(initial=0.0)) / self.sample_period
+
+    @property
+    def range(self) -> float:
+        """Of the path [m]."""
+        return float(np.ptp(self.wanted))
+
+    def with_voltage(self, voltage: Array, predicted: Array, end: ChainState) -> Plan:
+        """The same path with another drive, of the same length."""
+        return replace(self, voltage=voltage, predicted=predicted, end=end)
+
+
+def smooth_way(begin: float, end: float, count: int) -> Array:
+    """From one level to another without a kink, shape (count,); the first sample is `begin`."""
+    return np.asarray(begin + (end - begin) * (0.5 - 0.5 * np.cos(np.pi * np.arange(count) / max(count, 1))))
+
+
+def plan(
+    model: Model,
+    wanted: ArrayLike,
+    limits: Limits,
+    *,
+    start: ChainState | None = None,
+    approach: float = 0.05,
+    band: Band | None = None,
+    approximate: bool = False,
+    covariance: ParameterCovariance | None = None,
+) -> Plan:
+    """Drive for a path, by the model alone.
+
+    Parameters
+    ----------
+    model : Model
+        What the stage does.
+    wanted : (n,) array_like
+        Displacement at the model's sample period [m].
+    limits : Limits
+        Of the drive.
+    start : ChainState, optional
+        State of the model now. Default: at rest at 0 V, or at the limit that is nearest to it.
+    approach : float
+        Duration of the smooth way from where the stage is to the first sample of the path [s].
+    band : Band, optional
+        Low-pass of the path. Default `Band.of` the model's sample period.
+    approximate : bool
+        Leave out effects that cannot be turned round.
+    covariance : ParameterCovariance, optional
+        Uncertainty of the model's numbers.
+
+    Raises
+    ------
+    ModelError
+        On a path that is empty or not finite, or a chain that cannot be turned round.
+    """
+    y = samples(wanted, "displacement")
+    if not approach >= 0.0:
+        raise ModelError(f"approach: got {approach!r} s, expected zero or more")
+    state = start or model.rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
+    band = band or Band.of(model.sample_period)
+    at = float(model.run([state.inputs[0]], state)[0][0])
+    way = smooth_way(at, float(y[0]), round(approach / model.sample_period))
+    whole = np.concatenate((way, y))
+    found = reachable(model, limits, whole, start=state, band=band, approximate=approximate)
+    late = way.size * model.sample_period
+    parts = tuple(replace(part, begin=part.begin - late, end=part.end - late) for part in found.parts)
+    found = replace(found, parts=parts)
+    inverse = Inverse(model, limits, band=band, approximate=approximate)
+    predicted, end = model.run(found.voltage, state)
+    begin = way.size + inverse.preview
+    off = predicted[begin : begin + y.size] - y
+    expected = ExpectedError(
+        float(np.sqrt(np.mean(off**2))),
+        free_run_error(model),
+        None if covariance is None else parameter_error(model, found.voltage, covariance),
+    )
+    return Plan(
+        y,
+        found.voltage,
+        predicted,
+        begin,
+        model.sample_period,
+        found,
+        expected,
+        inverse.left_out,
+        inverse.not_on_path,
+        inverse.preview,
+        end,
+    )

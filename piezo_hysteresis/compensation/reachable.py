@@ -1,0 +1,166 @@
+"""`reachable`: which part of a path cannot be had, where, by how much, and the nearest path that can."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..model.chain import ChainState
+from ..model.model import Model
+from ..model.samples import samples
+from .band import Band
+from .inverse import Inverse
+from .limits import Limits
+from .reachability import NearestPath, Reachability, UnreachablePart
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-4
+"""Share of the path's range below which a deviation is none."""
+
+STEPS = 8
+"""Halvings in the search for the nearest path, after the first trial that works."""
+
+FIRST_TRIALS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 0.99)
+"""Shares of the largest change that are tried first."""
+
+
+def reachable(
+    model: Model,
+    limits: Limits,
+    wanted: ArrayLike,
+    *,
+    start: ChainState | None = None,
+    band: Band | None = None,
+    approximate: bool = False,
+    search: bool = True,
+) -> Reachability:
+    """Which part of a path the limits of the drive allow, by the model alone.
+
+    Parameters
+    ----------
+    model : Model
+        What the stage does.
+    limits : Limits
+        Of the drive.
+    wanted : (n,) array_like
+        Displacement at the model's sample period [m].
+    start : ChainState, optional
+        State of the model before the path. Default: at rest at 0 V, or at the limit that is nearest to it.
+    band, approximate
+        As for `Inverse`.
+    search : bool
+        Look for the nearest path, too.
+
+    Raises
+    ------
+    ModelError
+        As `Inverse`.
+    """
+    y = samples(wanted, "displacement")
+    state = start or model.rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
+    limited = Inverse(model, limits, band=band, approximate=approximate)
+    free = Inverse(model, Limits(), band=band, approximate=approximate)
+    given, reached = _followed(limited, y, state)
+    needed, aim = _followed(free, y, state)
+    span = float(np.ptp(y)) or float(np.abs(y).max()) or model.displacement_scale
+    off = reached - aim
+    parts = _parts(off, needed, span, limits, model, limited.preview, aim)
+    nearest = None
+    if parts and search:
+        nearest = _nearest(model, limits, y, state, band, approximate)
+    return Reachability(parts, nearest, reached, given)
+
+
+def _followed(inverse: Inverse, y: Array, state: ChainState) -> tuple[Array, Array]:
+    """Drive for a path, and what the model does under it while the path lasts."""
+    u, _ = inverse.command(y, inverse.resume(state))
+    reached, _ = inverse.model.run(u, state)
+    return u, reached[inverse.preview :]
+
+
+def _parts(
+    off: Array, needed: Array, span: float, limits: Limits, model: Model, preview: int, aim: Array
+) -> tuple[UnreachablePart, ...]:
+    period = model.sample_period
+    bad = np.flatnonzero(np.abs(off) > TOLERANCE * span)
+    if not bad.size:
+        return ()
+    gap = max(1, round(2e-3 / period))
+    ends = np.flatnonzero(np.diff(bad) > gap)
+    begins = np.concatenate((bad[:1], bad[ends + 1]))
+    stops = np.concatenate((bad[ends], bad[-1:]))
+    found = []
+    for a, b in zip(begins, stops, strict=True):
+        here = needed[a : b + preview + 1]
+        low, high = float(here.min()), float(here.max())
+        slew = float(np.abs(np.diff(here)).max(initial=0.0)) / period
+        beyond = {
+            "voltage_min": limits.voltage_min - low,
+            "voltage_max": high - limits.voltage_max,
+            "max_slew_rate": (slew - limits.max_slew_rate) * period,
+        }
+        limit = max(beyond, key=lambda name: beyond[name])
+        worst = a + int(np.abs(off[a : b + 1]).argmax())
+        lowest = model.at(period).rest(limits.voltage_min) if np.isfinite(limits.voltage_min) else None
+        resting = None if lowest is None else float(model.run([limits.voltage_min], lowest)[0][0])
+        found.append(
+            UnreachablePart(
+                period * float(a),
+                period * float(b + 1),
+                float(off[worst]),
+                low,
+                high,
+                slew,
+                limit,
+                limit == "voltage_min" and resting is not None and bool(aim[worst] >= resting - TOLERANCE * span),
+            )
+        )
+    return tuple(found)
+
+
+def _nearest(
+    model: Model, limits: Limits, y: Array, state: ChainState, band: Band | None, approximate: bool
+) -> NearestPath:
+    span, middle = float(np.ptp(y)), 0.5 * float(y.min() + y.max())
+
+    def is_whole(path: Array, low_pass: Band | None = band) -> bool:
+        return reachable(
+            model, limits, path, start=state, band=low_pass, approximate=approximate, search=False
+        ).is_whole
+
+    at_start = float(model.run([state.inputs[0]], state)[0][0])
+
+    def led(path: Array) -> Array:
+        """The path with a way from where the stage is."""
+        lead = max(1, round(0.05 / model.sample_period))
+        rise = 0.5 - 0.5 * np.cos(np.pi * np.arange(lead) / lead)
+        return np.concatenate((at_start + (path[0] - at_start) * rise, path))
+
+    shifts = [_smallest(lambda c, s=s: is_whole(led(y + s * c)), span or model.displacement_scale) for s in (1, -1)]  # type: ignore[misc]
+    offsets = [s * c for s, c in zip((1.0, -1.0), shifts, strict=True) if c is not None]
+    shrink = _smallest(lambda c: is_whole(led(middle + (1.0 - c) * (y - middle))), 1.0)
+    usual = Band.of(model.sample_period)
+    lower = _smallest(
+        lambda c: is_whole(led(y), Band(usual.passed * 2.0 ** (-8.0 * c), usual.stopped * 2.0 ** (-8.0 * c), 0.02)), 1.0
+    )
+    return NearestPath(
+        min(offsets, key=abs, default=None),
+        None if shrink is None or shrink >= 1.0 else 1.0 - shrink,
+        None if lower is None else usual.passed * 2.0 ** (-8.0 * lower),
+    )
+
+
+def _smallest(works: Callable[[float], bool], most: float) -> float | None:
+    """Smallest change up to `most` that works; None where none of `FIRST_TRIALS` does. Too large a one may not."""
+    tried = [0.0, *(most * share for share in FIRST_TRIALS)]
+    found = next((k for k in range(1, len(tried)) if works(tried[k])), None)
+    if found is None:
+        return None
+    low, high = tried[found - 1], tried[found]
+    for _ in range(STEPS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if works(middle) else (middle, high)
+    return high

@@ -1,0 +1,91 @@
+"""`read_path`: a displacement that is wanted, from CSV or NPZ."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordingError
+from ..table.table import named_column
+from ..table.units import si_factor
+
+Array = NDArray[np.float64]
+
+JITTER = 1e-3
+"""Deviation of a time from its place, in sample periods, above which the times are not even."""
+
+
+def read_path(path: str | Path) -> tuple[Array, float | None]:
+    """Displacement (n,) [m] and its sample period [s]; None where the file holds no times.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        CSV with a header, e.g. ``time_s,displacement_um``, or NPZ with the keys ``displacement`` [m] and optionally
+        ``sample_period`` [s].
+
+    Raises
+    ------
+    RecordingError
+        If there is no such file, no displacement in it, or times that are not even.
+    """
+    place = Path(path).expanduser()
+    try:
+        return _from_npz(place) if place.suffix == ".npz" else _from_csv(place)
+    except OSError as error:
+        if isinstance(error, RecordingError):
+            raise
+        raise RecordingError(f"{place}: {error.strerror or error}, expected a path as CSV or NPZ") from None
+
+
+def _from_npz(place: Path) -> tuple[Array, float | None]:
+    try:
+        with np.load(place, allow_pickle=False) as held:
+            if "displacement" not in held:
+                raise RecordingError(f"{place}: got {', '.join(held) or 'nothing'}, expected a key 'displacement' [m]")
+            period = float(held["sample_period"]) if "sample_period" in held else None
+            return _checked(place, np.asarray(held["displacement"], dtype=np.float64)), period
+    except (ValueError, TypeError) as error:
+        raise RecordingError(f"{place}: no NPZ file that can be read ({error}), expected numbers") from None
+
+
+def _from_csv(place: Path) -> tuple[Array, float | None]:
+    try:
+        with place.open(newline="", encoding="utf-8") as file:
+            rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+    except (UnicodeError, csv.Error) as error:
+        raise RecordingError(f"{place}: no CSV that can be read ({error})") from None
+    titles = [named_column(title) for title in rows[0]] if rows else []
+    at = {channel: k for k, (channel, _) in enumerate(titles)}
+    if "displacement" not in at:
+        raise RecordingError(
+            f"{place}: got the columns {', '.join(rows[0]) if rows else 'none'}, "
+            "expected a header with a displacement and its unit, e.g. time_s,displacement_um"
+        )
+
+    def column(channel: str) -> Array:
+        k = at[channel]
+        factor = si_factor(channel, titles[k][1] or {"time": "s", "displacement": "m"}[channel])
+        try:
+            return factor * np.array([float(row[k]) for row in rows[1:]])
+        except (ValueError, IndexError):
+            raise RecordingError(f"{place}: column '{rows[0][k]}' holds something else than numbers") from None
+
+    wanted = _checked(place, column("displacement"))
+    if "time" not in at or wanted.size < 2:
+        return wanted, None
+    time = column("time")
+    period = float(time[-1] - time[0]) / (time.size - 1)
+    off = np.abs(time - time[0] - period * np.arange(time.size))
+    if not period > 0.0 or not (off <= JITTER * period + 1e-12 * abs(time[-1])).all():
+        raise RecordingError(f"{place}: the times are not evenly spaced; expected one sample period for the whole path")
+    return wanted, period
+
+
+def _checked(place: Path, wanted: Array) -> Array:
+    if wanted.ndim != 1 or wanted.size == 0 or not np.isfinite(wanted).all():
+        raise RecordingError(f"{place}: got {wanted.size} values of displacement, expected one row of finite numbers")
+    return wanted

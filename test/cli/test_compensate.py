@@ -1,0 +1,94 @@
+"""``piezo compensate``: from a path in a file to a command in a file, or a refusal that says what can be had."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.effects import Arx, BoucWen, SofteningOfOneMode
+from piezo_hysteresis.model import model_file
+from piezo_hysteresis.model.model import Model
+
+PERIOD = 2e-5
+MODEL = Model(
+    (BoucWen(), Arx(a=[-1.2, 0.6], b=[0.05, 0.1, 0.05 / 3], delay=2)), PERIOD, 10.0, 1e-5, {"free_run_error": "5e-09"}
+)
+
+
+@pytest.fixture
+def model(tmp_path):
+    return model_file.save(MODEL, tmp_path / "model.yaml")
+
+
+def write(place, low, high, period=PERIOD, duration=0.06):
+    t = np.arange(round(duration / period)) * period
+    y = low + (high - low) * 0.5 * (1.0 - np.cos(2 * np.pi * 50.0 * t))
+    np.savetxt(place, np.c_[t, y], delimiter=",", header="time_s,displacement_um", comments="")
+    return 1e-6 * y
+
+
+def test_the_command_drives_the_model_along_the_path(piezo, model, tmp_path):
+    wanted = write(tmp_path / "path.csv", 1.0, 3.0)
+    words = ("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz")
+    done = piezo(*words, "--json", tmp_path / "plan.json", "--figures", tmp_path / "figures")
+    assert done.status == 0, done.err
+    answer = json.loads((tmp_path / "plan.json").read_text())
+    with np.load(tmp_path / "command.npz") as held:
+        u, begin = held["voltage"], int(held["path_begin"])
+        np.testing.assert_allclose(held["wanted_displacement"], wanted, rtol=1e-12)
+    reached, _ = MODEL.run(u, MODEL.rest(0.0))
+    off = reached[begin : begin + wanted.size] - wanted
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(answer["expected_error"]["planned_m"])
+    assert answer["expected_error"]["free_run_m"] == 5e-9 and answer["reachable"] is True
+    assert "expected error" in done.out and (tmp_path / "figures" / "tracking.png").stat().st_size > 5000
+
+
+def test_out_of_reach_writes_nothing_and_says_what_can_be_had(piezo, model, tmp_path):
+    write(tmp_path / "path.csv", 0.0, 3.0)
+    words = ("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz")
+    done = piezo(*words)
+    assert done.status == 1 and not (tmp_path / "command.npz").exists()
+    assert "below the minimum" in done.out and "moved by +" in done.out
+    assert piezo(*words, "--allow-partial").status == 1
+    with np.load(tmp_path / "command.npz") as held:
+        assert held["voltage"].min() >= 0.0
+
+
+def test_a_slower_path_is_interpolated_and_a_faster_one_refused(piezo, model, tmp_path):
+    write(tmp_path / "slow.csv", 1.0, 3.0, period=1e-3)
+    done = piezo("compensate", model, tmp_path / "slow.csv", "-o", tmp_path / "c.npz")
+    assert done.status == 0 and "interpolated" in done.out
+    write(tmp_path / "fast.csv", 1.0, 3.0, period=1e-5)
+    done = piezo("compensate", model, tmp_path / "fast.csv", "-o", tmp_path / "c.npz")
+    assert done.status == 2 and "or more" in done.err
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("time_s,voltage_V\n0,1\n", "displacement"),
+        ("time_s,displacement_um\n0,1\n1,x\n", "numbers"),
+        ("time_s,displacement_um\n0,1\n1,2\n5,3\n", "evenly"),
+        ("displacement_um\nnan\n", "finite"),
+        ("", "displacement"),
+    ],
+)
+def test_a_file_that_holds_no_path_is_bad_input(piezo, model, tmp_path, text, reason):
+    (tmp_path / "path.csv").write_text(text)
+    done = piezo("compensate", model, tmp_path / "path.csv")
+    assert done.status == 2 and reason in done.err
+
+
+def test_an_effect_without_an_inverse_is_refused_by_name(piezo, tmp_path):
+    softened = replace(MODEL, effects=(*MODEL.effects, SofteningOfOneMode(k3=0.05)))
+    path = model_file.save(softened, tmp_path / "softened.yaml")
+    write(tmp_path / "path.csv", 1.0, 3.0)
+    words = ("compensate", path, tmp_path / "path.csv", "-o", tmp_path / "command.npz")
+    done = piezo(*words)
+    assert done.status == 2 and "softening_of_one_mode" in done.err
+    done = piezo(*words, "--approximate", "--json", tmp_path / "plan.json")
+    assert done.status == 0 and "left out" in done.out
+    assert json.loads((tmp_path / "plan.json").read_text())["expected_error"]["planned_m"] > 1e-11

@@ -1,0 +1,96 @@
+"""What a plan says before anything moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.compensation import Limits, ParameterCovariance, plan, reachable
+from piezo_hysteresis.compensation.expected_error import free_run_error, parameter_error
+from piezo_hysteresis.effects import Creep
+from piezo_hysteresis.errors import ModelError
+
+from .published import PERIOD, stage, swing, triangle
+
+UNIPOLAR = Limits(0.0, 10.0)
+
+
+def test_a_path_within_reach_is_planned_to_the_band() -> None:
+    y = triangle(50.0, 2e-6, 6e-6, 3)
+    found = plan(stage(Creep(gamma=0.01)), y, UNIPOLAR)
+    assert found.reachability.is_whole and found.reachability.nearest is None
+    assert found.voltage.size == found.predicted.size == y.size + found.begin
+    off = found.path_predicted - y
+    assert found.expected.planned == pytest.approx(np.sqrt(np.mean(off**2)))
+    assert found.expected.planned < 5e-4 * found.range
+    assert found.expected.free_run == 5e-9
+    assert found.expected.total == pytest.approx(np.hypot(found.expected.planned, 5e-9))
+    assert np.abs(np.diff(found.predicted[: found.begin])).max() < 2e-8, "no jump on the way there"
+
+
+def test_zero_after_a_loop_on_unipolar_drive_needs_a_negative_voltage() -> None:
+    y = swing(50.0, 0.0, 6e-6, 2)
+    model = stage()
+    found = reachable(model, UNIPOLAR, y)
+    assert not found.is_whole
+    first = found.parts[0]
+    assert first.limit == "voltage_min" and first.needed_min < 0.0 and first.after_loop and first.largest > 0.0
+    assert 0.015 < first.begin < 0.02 < first.end < 0.025, "at the end of the first loop, not at its start"
+    assert "below the minimum" in str(first)
+    nearest = found.nearest
+    assert nearest is not None and nearest.offset is not None and nearest.amplitude is not None
+    assert nearest.offset > 0.0 and 0.0 < nearest.amplitude < 1.0
+    middle = 0.5 * (y.min() + y.max())
+    for other in (y + nearest.offset, middle + nearest.amplitude * (y - middle)):
+        assert plan(model, other, UNIPOLAR).reachability.is_whole
+    less = plan(model, y + 0.5 * nearest.offset, UNIPOLAR)
+    assert not less.reachability.is_whole, "the nearest is no farther than it must be"
+    assert reachable(model, Limits(-2.0, 10.0), y).is_whole
+
+
+def test_too_high_and_too_fast_are_told_apart() -> None:
+    model = stage()
+    high = reachable(model, Limits(0.0, 4.0), swing(20.0, 1e-6, 12e-6, 1), search=False)
+    assert {p.limit for p in high.parts} >= {"voltage_max"}
+    fast = plan(model, triangle(200.0, 2e-6, 6e-6, 4), Limits(0.0, 10.0, 1e3)).reachability
+    assert {p.limit for p in fast.parts} == {"max_slew_rate"}
+    assert max(p.needed_slew for p in fast.parts) > 1e3
+
+
+def test_the_error_to_expect_holds_the_covariance() -> None:
+    model = stage()
+    u = 3.0 * (1.0 - np.cos(np.arange(2000) / 100.0))
+    spread = 0.01
+    covariance = ParameterCovariance(["bouc_wen.p2"], np.array([[spread**2]]))
+    rms = parameter_error(model, u, covariance)
+    moved = model.with_values({"bouc_wen.p2": model.values()["bouc_wen.p2"] + spread})
+    change = moved.run(u, moved.rest(0.0))[0] - model.run(u, model.rest(0.0))[0]
+    assert rms == pytest.approx(np.sqrt(np.mean(change**2)), rel=1e-3)
+    found = plan(model, triangle(50.0, 2e-6, 6e-6, 2), UNIPOLAR, covariance=covariance)
+    assert found.expected.parameters is not None and found.expected.parameters > 0.0
+
+
+def test_a_model_without_a_stated_error_says_so() -> None:
+    from dataclasses import replace
+
+    assert free_run_error(replace(stage(), provenance={})) is None
+    assert free_run_error(replace(stage(), provenance={"free_run_error": "good"})) is None
+
+
+def test_a_path_that_is_none_is_refused() -> None:
+    for path in ([], [np.nan], [[0.0]]):
+        with pytest.raises(ModelError):
+            plan(stage(), path, UNIPOLAR)
+    with pytest.raises(ModelError, match="approach"):
+        plan(stage(), [0.0], UNIPOLAR, approach=-1.0)
+
+
+def test_the_way_begins_where_the_stage_is() -> None:
+    model = stage()
+    _, state = model.run(3.0 * (1.0 - np.cos(np.arange(1500) / 90.0)), model.rest(0.0))
+    _, state = model.run(np.full(2000, state.inputs[0]), state)
+    y = np.full(500, 4e-6)
+    found = plan(model, y, UNIPOLAR, start=state)
+    assert abs(found.voltage[0] - state.inputs[0]) < 0.02
+    assert np.abs(found.path_predicted - y).max() < 1e-10
+    assert found.sample_period == PERIOD
