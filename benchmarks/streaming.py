@@ -39,10 +39,10 @@ from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.identification.protocol.excitation import sine, triangle
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_file import save
-from piezo_hysteresis.nodes.identification.bag_recorder import TOPICS
 from piezo_hysteresis.nodes.messages.cloud import from_cloud
 from piezo_hysteresis.nodes.messages.conversions import from_stamp
 from piezo_hysteresis.nodes.runtime.executor import make_executor
+from piezo_hysteresis.nodes.topics import TOPICS
 from piezo_hysteresis.recording.bag.bag import Bag
 
 NODES = ("driver_node", "model_node")

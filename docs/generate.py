@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import rooms
+import topics
 
 from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
 from piezo_hysteresis.acquisition.settings import DRIVER, IN_FORCE
@@ -141,7 +142,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "in_force": lambda: settings(replace(row, name=f"in_force.{row.name}") for row in IN_FORCE),
     "model_node": lambda: settings(MODEL),
     "identification_node": lambda: settings(IDENTIFICATION),
-    "topics": lambda: from_ros("Topics"),
+    "topics": lambda: table("topic | type | unit | QoS | rate | by", topics.rows()),
     "services": lambda: from_ros("Services"),
     "plant": lambda: settings(PlantParameters.table()),
     "rooms": lambda: table("folder | what it holds", rooms.folder_rows()),
@@ -157,7 +158,8 @@ def pages() -> dict[Path, str]:
     """Every page that holds something generated, with the text it should have."""
     marked = [p for p in (DOCS.parent / "README.md", *sorted(DOCS.glob("*.md"))) if p.exists()]
     made = {p: filled(p.read_text()) for p in marked if MARKED.search(p.read_text())}
-    return {DOCS / "catalogue.md": catalogue(), DOCS / "images" / "rooms.svg": rooms.picture(), **made}
+    policy = {topics.POLICY: topics.policy(topics.POLICY.read_text())}
+    return {DOCS / "catalogue.md": catalogue(), DOCS / "images" / "rooms.svg": rooms.picture(), **policy, **made}
 
 
 def main() -> int:

@@ -33,7 +33,7 @@ UNDOCUMENTED = 229
 """Constants without a docstring that are still allowed."""
 LONGEST_SUBJECT = 72
 """Characters of the first line of a commit message."""
-SUBJECTS_SINCE = "2026-11-22T19:30:00+00:00"
+SUBJECTS_SINCE = "2026-11-22T20:40:00+00:00"
 """Commits written before are older than the rule on subjects."""
 
 

@@ -22,8 +22,8 @@ from piezo_hysteresis.acquisition.streaming import Delivery
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.nodes.driver.publishers import DriverTopics
-from piezo_hysteresis.nodes.identification.bag_recorder import TOPICS
 from piezo_hysteresis.nodes.model.publishers import ModelTopics
+from piezo_hysteresis.nodes.topics import TOPICS
 from piezo_hysteresis.online.predictor import Predictor
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -66,7 +66,7 @@ def published():
 def check(topic: str, field: str, published: dict[str, JointState]) -> None:
     """`field` as ``data``, ``position[i]`` or ``name/position``."""
     assert topic.startswith(AXIS)
-    kind = TOPICS[topic.removeprefix(AXIS)][0]
+    kind = TOPICS[topic.removeprefix(AXIS)].type
     if kind is Float64:
         assert field == "data"
         return
@@ -136,10 +136,10 @@ def test_every_panel_of_foxglove_is_in_its_layout():
 
 def test_a_recorder_that_follows_the_file_hears_every_topic_and_misses_nothing():
     profiles = yaml.safe_load((CONFIG / "record_qos.yaml").read_text())
-    assert {name for name, (_, quality) in TOPICS.items() if not is_live(quality)} <= {n[1:] for n in profiles}
+    assert {name for name, topic in TOPICS.items() if not is_live(topic.quality)} <= {n[1:] for n in profiles}
     assert "/command" in profiles
     for name, profile in profiles.items():
-        quality = TOPICS[name[1:]][1]
+        quality = TOPICS[name[1:]].quality
         assert profile["history"] == "keep_last"
         assert profile["depth"] >= 10 * quality.depth or profile["durability"] == "transient_local"
         assert profile["reliability"] == "reliable"

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
-from piezo_hysteresis.nodes.identification.bag_recorder import TOPICS
+from piezo_hysteresis.nodes.topics import TOPICS
 
 pytestmark = pytest.mark.nodes
 

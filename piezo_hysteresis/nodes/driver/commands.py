@@ -12,7 +12,7 @@ from ...errors import PiezoError, StageError
 from ..messages.conversions import from_stamp, waveform_from_cloud
 from ..messages.phase_text import phase_name
 from ..runtime.node_clock import now
-from ..runtime.qos import COMMAND
+from ..topics import subscribe
 from .diagnostics import DriverDiagnostics
 from .publishers import DriverTopics
 
@@ -36,8 +36,8 @@ class DriverCommands:
     def __init__(self, node: Node, diagnostics: DriverDiagnostics) -> None:
         self._node, self._diagnostics = node, diagnostics
         self._attached: tuple[DriverSession, DriverTopics] | None = None
-        node.create_subscription(PointCloud2, "command", self._on_command, COMMAND)
-        node.create_subscription(Float64, "set_voltage", self._on_set_voltage, COMMAND)
+        subscribe(node, "command", self._on_command)
+        subscribe(node, "set_voltage", self._on_set_voltage)
         node.create_service(Trigger, "~/stop", self._on_stop)
 
     def attach(self, session: DriverSession, topics: DriverTopics) -> None:

@@ -11,6 +11,7 @@ from rclpy.node import Node
 from ...acquisition.streaming import StreamingAcquisition
 from ..messages.conversions import diagnostic
 from ..runtime.sending import send
+from ..topics import DIAGNOSTICS, advertise
 
 
 class DriverDiagnostics:
@@ -25,7 +26,7 @@ class DriverDiagnostics:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: stage"
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = advertise(node, DIAGNOSTICS)
         self._state = (DiagnosticStatus.STALE, "not configured", "")
         self._acquisition: StreamingAcquisition | None = None
         self._target = 0.0

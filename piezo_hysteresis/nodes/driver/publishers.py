@@ -5,7 +5,6 @@ from __future__ import annotations
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
 
 from ...acquisition.drive import Event, EventKind, Phase
@@ -13,8 +12,8 @@ from ...acquisition.sample_block import SampleBlock
 from ...acquisition.streaming import Delivery
 from ..messages.conversions import diagnostic, live, to_stamp
 from ..messages.samples import SampleWriter
-from ..runtime.qos import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
 from ..runtime.sending import is_heard, send
+from ..topics import advertise, advertise_lifecycle
 
 _STATES = {EventKind.BEGAN: "playing", EventKind.DONE: "done", EventKind.STOPPED: "stopped"}
 
@@ -40,14 +39,14 @@ class DriverTopics:
         self._next_live = 0
         self._first: dict[int, int] = {}
         self._writer = SampleWriter()
-        self._samples = node.create_lifecycle_publisher(
-            PointCloud2, "samples", SAMPLES, qos_overriding_options=QoSOverridingOptions.with_default_policies()
+        self._samples = advertise_lifecycle(
+            node, "samples", qos_overriding_options=QoSOverridingOptions.with_default_policies()
         )
-        self._voltage = node.create_lifecycle_publisher(Float64, "voltage", COMMAND)
-        self._displacement = node.create_lifecycle_publisher(Float64, "displacement", COMMAND)
-        self._live = node.create_lifecycle_publisher(JointState, "live", COMMAND)
-        self._phase = node.create_lifecycle_publisher(String, "phase", LATCHED)
-        self._status = node.create_publisher(DiagnosticStatus, "command_status", COMMAND_STATUS)
+        self._voltage = advertise_lifecycle(node, "voltage")
+        self._displacement = advertise_lifecycle(node, "displacement")
+        self._live = advertise_lifecycle(node, "live")
+        self._phase = advertise_lifecycle(node, "phase")
+        self._status = advertise(node, "command_status")
         self._node = node
 
     @property

@@ -6,37 +6,14 @@ import time
 from collections.abc import Collection
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import JointState, PointCloud2
-from std_msgs.msg import Float64, String
+from rclpy.qos import ReliabilityPolicy
 
 from ...errors import RecordError, RecordingError
 from ...recording import BagWriter
 from ..messages.samples import SampleReader
 from ..runtime.node_clock import now
-from ..runtime.qos import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES
-
-TOPICS = {
-    "samples": (PointCloud2, SAMPLES),
-    "predicted_samples": (PointCloud2, SAMPLES),
-    "command": (PointCloud2, COMMAND),
-    "command_status": (DiagnosticStatus, COMMAND_STATUS),
-    "phase": (String, LATCHED),
-    "model": (String, LATCHED),
-    "status": (DiagnosticStatus, LATCHED),
-    "set_voltage": (Float64, COMMAND),
-    "voltage": (Float64, COMMAND),
-    "displacement": (Float64, COMMAND),
-    "prediction": (Float64, COMMAND),
-    "residual": (Float64, COMMAND),
-    "residual_rms": (Float64, COMMAND),
-    "live": (JointState, COMMAND),
-    "predicted_live": (JointState, COMMAND),
-    "/diagnostics": (DiagnosticArray, QoSProfile(depth=10)),
-}
-"""Topics of an axis: type and quality of service."""
+from ..topics import TOPICS, subscribe
 
 
 class BagRecorder:
@@ -94,21 +71,20 @@ class BagRecorder:
         self._bag.close()
 
     def _subscribe(self, name: str) -> object:
-        kind, quality = TOPICS[name]
-        topic = self._node.resolve_topic_name(name)
+        described = TOPICS[name]
+        topic, quality = self._node.resolve_topic_name(name), described.quality
         self._bag.add_topic(
             topic,
-            f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}",
+            described.type_name,
             depth=quality.depth,
             reliable=quality.reliability == ReliabilityPolicy.RELIABLE,
-            transient_local=quality.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+            transient_local=described.is_latched,
         )
-        deep = QoSProfile(depth=DEEP.depth, reliability=quality.reliability, durability=quality.durability)
 
         def write(message: bytes) -> None:
             self._write(name, topic, message)
 
-        return self._node.create_subscription(kind, topic, write, deep, raw=True)
+        return subscribe(self._node, name, write, deep=True, raw=True)
 
     def _write(self, name: str, topic: str, message: bytes) -> None:
         if name == "samples":

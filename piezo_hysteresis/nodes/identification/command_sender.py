@@ -8,12 +8,11 @@ from collections.abc import Callable
 from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
 from rclpy.node import Node
-from sensor_msgs.msg import PointCloud2
 
 from ...identification.protocol.protocol import ProtocolPhase
 from ..messages.conversions import command_to_cloud
-from ..runtime.qos import COMMAND
 from ..runtime.sending import is_taken_by, send
+from ..topics import advertise
 
 _LONGEST_WAY = 2.0
 """Wait for a waveform that is on its way when it is called off [s]."""
@@ -30,7 +29,7 @@ class CommandSender:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._publisher = node.create_publisher(PointCloud2, "command", COMMAND)
+        self._publisher = advertise(node, "command")
         self._thread: threading.Thread | None = None
         self._called_off = threading.Event()
 

@@ -16,7 +16,7 @@ from ...errors import PiezoError
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import ProtocolPhase
 from ..messages.conversions import values_of
-from ..runtime.qos import COMMAND, COMMAND_STATUS
+from ..topics import subscribe
 from .command_sender import CommandSender
 
 _NAMES = ("sample_period", "voltage_min", "voltage_max", "safe_voltage", "max_slew_rate", "ramp_rate")
@@ -58,8 +58,8 @@ class DriverClient:
         self._parameters = AsyncParameterClient(node, driver)
         self._stop = node.create_client(Trigger, f"{driver}/stop")
         self._command = CommandSender(node)
-        node.create_subscription(DiagnosticStatus, "command_status", self._on_status, COMMAND_STATUS)
-        node.create_subscription(Float64, "voltage", self._on_voltage, COMMAND)
+        subscribe(node, "command_status", self._on_status)
+        subscribe(node, "voltage", self._on_voltage)
         node.create_timer(_POLL_INTERVAL, self._poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property

@@ -25,8 +25,8 @@ from ...parameter import Row, Setting
 from ...recording.segmentation.decimation import save_decimation
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
-from ..runtime.qos import LATCHED
 from ..runtime.sending import send
+from ..topics import advertise
 from .driver_client import DriverClient
 from .fit_process import FitProcess, Job, diagnosis, identification
 from .protocol_runner import Progress, campaign
@@ -60,7 +60,7 @@ class IdentificationNode(Node):
         declare(self, IDENTIFICATION)
         self._status = IdentificationStatus(self)
         self._driver = DriverClient(self, self._value("driver"))
-        self._models = self.create_publisher(String, "model", LATCHED)
+        self._models = advertise(self, "model")
         self._job: Generator[Progress] | None = None
         self._last: Path | None = None
         self._served = ServedModel(self, START)

@@ -7,8 +7,8 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ..messages.conversions import diagnostic
-from ..runtime.qos import LATCHED
 from ..runtime.sending import send
+from ..topics import DIAGNOSTICS, advertise
 from .protocol_runner import Progress
 
 
@@ -29,8 +29,8 @@ class IdentificationStatus:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: identification"
-        self._publisher = node.create_publisher(DiagnosticStatus, "status", LATCHED)
-        self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = advertise(node, "status")
+        self._diagnostics = advertise(node, DIAGNOSTICS)
         self.experiment = ""
         self._shown: DiagnosticStatus | None = None
         self._show(DiagnosticStatus.OK, "idle", "nothing is under way")

@@ -15,6 +15,7 @@ from ...model.model_parameters import model_hash
 from ...online.predictor import Predictor
 from ..messages.conversions import diagnostic
 from ..runtime.sending import send
+from ..topics import DIAGNOSTICS, advertise
 
 _LONGEST_REASON = 500
 """Characters of a reason that are told again every second."""
@@ -37,7 +38,7 @@ class ModelDiagnostics:
     def __init__(self, node: Node, warn: float, error: float) -> None:
         self._node, self._warn, self._error = node, warn, error
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: prediction"
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = advertise(node, DIAGNOSTICS)
         self._problem = self._refused = ""
         self._problems = 0
         self._stage = ""

@@ -9,7 +9,6 @@ from pathlib import Path
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
-from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -25,7 +24,7 @@ from ..messages.samples import SampleReader
 from ..runtime.node_clock import now
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
-from ..runtime.qos import DEEP, LATCHED
+from ..topics import subscribe
 from .diagnostics import ModelDiagnostics
 from .publishers import ModelTopics
 
@@ -58,8 +57,8 @@ class ModelNode(Node):
             self._load(self._values["model_file"])
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._apply)
-        self.create_subscription(String, "model", self._on_model, LATCHED)
-        self.create_subscription(PointCloud2, "samples", self._on_samples, DEEP, raw=True)
+        subscribe(self, "model", self._on_model)
+        subscribe(self, "samples", self._on_samples, deep=True, raw=True)
         self.create_service(Trigger, "~/zero", self._on_zero)
 
     def _on_samples(self, message: bytes) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64
 
 from ...acquisition.sample_block import SampleBlock
@@ -13,8 +12,8 @@ from ...model.model_parameters import hash_number
 from ...online.predictor import Prediction, Predictor
 from ..messages.conversions import live, to_stamp
 from ..messages.samples import PredictionWriter
-from ..runtime.qos import COMMAND, SAMPLES
 from ..runtime.sending import is_heard, send
+from ..topics import advertise
 
 
 class ModelTopics:
@@ -31,16 +30,13 @@ class ModelTopics:
         self._next_live = 0
         self._named: tuple[Model, int] | None = None
         self._writer = PredictionWriter()
-        self._samples = node.create_publisher(
-            PointCloud2,
-            "predicted_samples",
-            SAMPLES,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        self._samples = advertise(
+            node, "predicted_samples", qos_overriding_options=QoSOverridingOptions.with_default_policies()
         )
-        self._prediction = node.create_publisher(Float64, "prediction", COMMAND)
-        self._residual = node.create_publisher(Float64, "residual", COMMAND)
-        self._rms = node.create_publisher(Float64, "residual_rms", COMMAND)
-        self._live = node.create_publisher(JointState, "predicted_live", COMMAND)
+        self._prediction = advertise(node, "prediction")
+        self._residual = advertise(node, "residual")
+        self._rms = advertise(node, "residual_rms")
+        self._live = advertise(node, "predicted_live")
 
     def publish(self, block: SampleBlock, answer: Prediction, predictor: Predictor) -> None:
         """Publish what a model says about a block, all of whose samples count."""

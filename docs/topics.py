@@ -1,0 +1,64 @@
+"""What `make docs` takes from the table of topics: the table of the pages, and the rights in the SROS2 policy."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from piezo_hysteresis.nodes.topics import ALL, ANYONE, TOPICS, Topic
+
+POLICY = Path(__file__).parents[1] / "config" / "sros2_policy.xml"
+"""Access control for one axis."""
+NODES = ("driver", "model", "identification")
+"""Nodes of the package that publish at all times."""
+RECORDERS = ("identification", "operator")
+"""Keys that may take every topic of an axis."""
+OF_ROS = {"publish": ("/rosout", "/parameter_events"), "subscribe": ("/clock",)}
+"""Topics of ROS itself that every node of the package uses."""
+PROFILE = re.compile(r'(<profile ns="/stage_x" node="(\w+?)(?:_node)?">)(.*?)(</profile>)', re.DOTALL)
+"""One key of the policy, with the word of its node."""
+RIGHT = re.compile(r'(<topics (publish|subscribe)="ALLOW">\n).*?( *</topics>)', re.DOTALL)
+"""The topics that a key may publish, or subscribe to."""
+
+
+def rows() -> Iterator[tuple[str, ...]]:
+    """Cells of the table of topics."""
+    for topic in TOPICS.values():
+        kind = topic.type_name.replace("/msg/", "/")
+        yield f"`{topic.name}`", kind, topic.unit, quality(topic), topic.rate, topic.by
+
+
+def quality(topic: Topic) -> str:
+    """Quality of service in words."""
+    return f"reliable, {'transient local, ' if topic.is_latched else ''}keep last {topic.quality.depth}"
+
+
+def may(key: str, right: str) -> list[str]:
+    """Names that a key of the policy may publish, or subscribe to."""
+    names = list(OF_ROS[right]) if key in NODES or right == "publish" else []
+    for topic in TOPICS.values():
+        if right == "publish":
+            by_node = topic.by == key or key in topic.senders or (topic.by == ALL and key in NODES)
+            allowed = by_node or (topic.by == ANYONE and key == "operator")
+        else:
+            looks = key == "observer" and topic.by != ANYONE
+            allowed = key in topic.readers or key in RECORDERS or looks
+        if allowed:
+            names.append(topic.name)
+    if key == "driver" and right == "publish":
+        names.append("driver_node/transition_event")  # the state of a lifecycle node
+    return names
+
+
+def policy(text: str) -> str:
+    """The policy with the topics of every key made anew."""
+
+    def profile(found: re.Match[str]) -> str:
+        def right(block: re.Match[str]) -> str:
+            lines = (f"            <topic>{name}</topic>\n" for name in may(found[2], block[2]))
+            return block[1] + "".join(lines) + block[3]
+
+        return found[1] + RIGHT.sub(right, found[3]) + found[4]
+
+    return PROFILE.sub(profile, text)

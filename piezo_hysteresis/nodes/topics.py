@@ -1,0 +1,135 @@
+"""`TOPICS`: every topic of an axis, written down once.
+
+Publishers, subscriptions and the recorder take name, type and quality of service from here. `make docs` writes the
+tables of topics and the rights in ``config/sros2_policy.xml`` from it; a test holds ``config/record_qos.yaml`` to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.lifecycle import LifecycleNode
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Float64, String
+
+from .runtime.qos import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES
+
+ANYONE = "anyone"
+"""Publisher of the topics by which a stage is moved: every program that holds the right."""
+ALL = "all"
+"""Publisher of the topics that every node of the package publishes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One topic of an axis.
+
+    Parameters
+    ----------
+    name : str
+        Relative to the namespace of the axis, or absolute.
+    type : type
+        Class of its messages.
+    quality : rclpy.qos.QoSProfile
+        Quality of service of its publishers.
+    unit : str
+        Unit of its values; empty where it carries none.
+    rate : str
+        How often a message comes; empty where that is up to the publisher.
+    by : str
+        Node that publishes it, `ANYONE` or `ALL`.
+    senders : tuple of str
+        Nodes of the package that publish it besides.
+    readers : tuple of str
+        Nodes that always subscribe to it; the recorder of the identification node takes every topic.
+    """
+
+    name: str
+    type: Any
+    quality: QoSProfile
+    unit: str
+    rate: str
+    by: str
+    senders: tuple[str, ...] = ()
+    readers: tuple[str, ...] = ()
+
+    @property
+    def type_name(self) -> str:
+        """Type as the command line writes it: ``std_msgs/msg/Float64``."""
+        return f"{self.type.__module__.split('.')[0]}/msg/{self.type.__name__}"
+
+    @property
+    def is_latched(self) -> bool:
+        """True where a late joiner gets what was published before."""
+        return bool(self.quality.durability == DurabilityPolicy.TRANSIENT_LOCAL)
+
+    @property
+    def deep(self) -> QoSProfile:
+        """Quality of service of a subscription that must not miss a message while the machine is busy."""
+        return QoSProfile(depth=DEEP.depth, reliability=self.quality.reliability, durability=self.quality.durability)
+
+
+DIAGNOSTICS = "/diagnostics"
+"""Topic of the health of all nodes of a system."""
+
+TOPICS: dict[str, Topic] = {
+    topic.name: topic
+    for topic in (
+        Topic(
+            "samples", PointCloud2, SAMPLES, "V, m, s", "one block per `block_duration` (10 ms)", "driver",
+            readers=("driver", "model"),
+        ),
+        Topic("voltage", Float64, COMMAND, "V", "`live_rate` (50 Hz)", "driver"),
+        Topic("displacement", Float64, COMMAND, "m", "`live_rate`", "driver"),
+        Topic("live", JointState, COMMAND, "V, m", "`live_rate`", "driver"),
+        Topic("phase", String, LATCHED, "", "at every change", "driver"),
+        Topic("command", PointCloud2, COMMAND, "V", "", ANYONE, senders=("identification",), readers=("driver",)),
+        Topic("set_voltage", Float64, COMMAND, "V", "", ANYONE, readers=("driver",)),
+        Topic("command_status", DiagnosticStatus, COMMAND_STATUS, "", "at every event", "driver"),
+        Topic("predicted_samples", PointCloud2, SAMPLES, "m, s", "as `samples`", "model"),
+        Topic("prediction", Float64, COMMAND, "m", "`live_rate`", "model"),
+        Topic("residual", Float64, COMMAND, "m", "`live_rate`", "model"),
+        Topic("residual_rms", Float64, COMMAND, "m", "`live_rate`", "model"),
+        Topic("predicted_live", JointState, COMMAND, "V, m", "`live_rate`", "model"),
+        Topic("model", String, LATCHED, "", "at every new model", "identification", readers=("model",)),
+        Topic("status", DiagnosticStatus, LATCHED, "", "at every step", "identification"),
+        Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL),
+    )
+}  # fmt: skip
+"""Topics of an axis by name, in the order of the docs."""
+
+
+def advertise(node: Node, name: str, **options: Any) -> Any:
+    """A publisher of one of `TOPICS`."""
+    topic = TOPICS[name]
+    return node.create_publisher(topic.type, topic.name, topic.quality, **options)
+
+
+def advertise_lifecycle(node: LifecycleNode, name: str, **options: Any) -> Any:
+    """A publisher of one of `TOPICS` that is silent while its node is not active."""
+    topic = TOPICS[name]
+    return node.create_lifecycle_publisher(topic.type, topic.name, topic.quality, **options)
+
+
+def subscribe(node: Node, name: str, callback: Callable[[Any], None], *, deep: bool = False, raw: bool = False) -> Any:
+    """A subscription to one of `TOPICS`.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    name : str
+        Of the topic.
+    callback : callable
+        Called with every message.
+    deep : bool
+        Miss no message while the machine is busy.
+    raw : bool
+        Take messages as they came over the wire, as bytes.
+    """
+    topic = TOPICS[name]
+    return node.create_subscription(topic.type, topic.name, callback, topic.deep if deep else topic.quality, raw=raw)
