@@ -7,6 +7,8 @@
 from .band import Band
 from .expected_error import ExpectedError, ParameterCovariance
 from .inverse import Inverse, InverseState
+from .learning import IterativeLearning, LearningRound, learn
+from .learning_filter import LearningFilter, ResponseCheck
 from .limits import Limits
 from .plan import Plan, plan
 from .reachability import NearestPath, Reachability, UnreachablePart
@@ -17,12 +19,17 @@ __all__ = [
     "ExpectedError",
     "Inverse",
     "InverseState",
+    "IterativeLearning",
+    "LearningFilter",
+    "LearningRound",
     "Limits",
     "NearestPath",
     "ParameterCovariance",
     "Plan",
     "Reachability",
+    "ResponseCheck",
     "UnreachablePart",
+    "learn",
     "plan",
     "reachable",
 ]

@@ -1,0 +1,170 @@
+"""`learn`: rounds of play, measure, correct, until nothing but noise is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ModelError
+from ..model.chain import ChainState
+from ..model.model import Model
+from ..model.samples import samples
+from .learning_filter import LearningFilter
+from .limits import Limits
+from .plan import Plan, plan
+
+Array = NDArray[np.float64]
+
+AT_NOISE = 1.1
+"""Measured error over noise, rms in the band of learning, below which the rest is noise."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LearningRound:
+    """What one round measured.
+
+    Parameters
+    ----------
+    plan : Plan
+        What was played.
+    measured : (n,) ndarray
+        Displacement along the path [m].
+    rms : float
+        Error along the path, noise included [m].
+    expected : float
+        What was predicted for this round before it was played [m].
+    """
+
+    plan: Plan
+    measured: Array
+    rms: float
+    expected: float
+
+
+class IterativeLearning:
+    """Corrects the reference of a path by the error that was measured, round by round.
+
+    The correction goes through the inverse of the model, as the path itself does: hysteresis, creep and dynamics are
+    known already, and a round need only remove what the model misses.
+
+    Parameters
+    ----------
+    model : Model
+        What the stage does, as far as is known.
+    first : Plan
+        Of the path.
+    limits : Limits
+        Of the drive.
+    filter : LearningFilter, optional
+        Default: up to 1.2 kHz at 50 kHz sampling, the same share at another rate.
+    noise : float
+        Rms of the sensor noise [m]. Rounds stop there.
+    approximate : bool
+        As for `plan`.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        first: Plan,
+        limits: Limits,
+        filter: LearningFilter | None = None,
+        *,
+        noise: float = 0.0,
+        approximate: bool = False,
+    ) -> None:
+        if not noise >= 0.0:
+            raise ModelError(f"noise: got {noise!r} m, expected zero or more")
+        rate = 1.0 / model.sample_period
+        self.filter = filter or LearningFilter(model.sample_period, 0.024 * rate, 0.06 * rate)
+        self.model, self.limits, self.noise, self.approximate = model, limits, noise, approximate
+        self.wanted = first.wanted
+        self.next: Plan | None = first
+        """What is to be played next; None once `reason` says why not."""
+        self.reason = ""
+        self.rounds: list[LearningRound] = []
+        self._reference = first.wanted.copy()
+        self._expected = first.expected.total
+
+    @property
+    def best(self) -> LearningRound:
+        """The round with the smallest measured error."""
+        return min(self.rounds, key=lambda r: r.rms)
+
+    def update(self, measured: Array, start: ChainState | None = None) -> Plan | None:
+        """Take in what `next` gave, and plan another round if it is predicted to be better.
+
+        Parameters
+        ----------
+        measured : (m,) ndarray
+            Displacement [m], sample by sample beside the drive of `next`.
+        start : ChainState, optional
+            State of the model before the round to come; default at rest, as for `plan`.
+
+        Raises
+        ------
+        ModelError
+            On another number of samples, or where no round is left.
+        """
+        if self.next is None:
+            raise ModelError(f"learning: has ended ({self.reason}), expected no more measurements")
+        y = samples(measured, "displacement")
+        played = self.next
+        if y.size != played.voltage.size:
+            raise ModelError(f"learning: got {y.size} samples, expected the {played.voltage.size} of the drive")
+        along = y[played.begin : played.begin + self.wanted.size]
+        error = self.wanted - along
+        before = self.rounds[-1] if self.rounds else None
+        self.rounds.append(LearningRound(played, along, float(np.sqrt(np.mean(error**2))), self._expected))
+        if before is not None and self.rounds[-1].rms >= before.rms:
+            self._end("the last round was no better than the one before")
+            return None
+        correction, left, now = self.filter.correct(error, self.noise)
+        if now <= self.noise * np.sqrt(max(AT_NOISE**2 - 1.0, 0.0)) * self._share_of_band():
+            self._end("the error is at the noise of the sensor")
+            return None
+        if left >= now:
+            self._end("another round is predicted to be no better")
+            return None
+        self._reference = self._reference + correction
+        following = plan(
+            self.model, self._reference, self.limits, start=start, approximate=self.approximate,
+            approach=(played.begin - played.preview) * played.sample_period,
+        )  # fmt: skip
+        if not following.reachability.is_whole and played.reachability.is_whole:
+            self._end("the corrected path is out of reach")
+            return None
+        self._expected = float(np.sqrt(max(self.rounds[-1].rms ** 2 - now**2, 0.0) + left**2))
+        self.next = following
+        return following
+
+    def _end(self, reason: str) -> None:
+        self.next, self.reason = None, reason
+
+    def _share_of_band(self) -> float:
+        """Share of white noise, rms, that lies in the band of the filter."""
+        frequency = np.linspace(0.0, 0.5 / self.model.sample_period, 1000)
+        return float(np.sqrt(np.mean(self.filter.at(frequency) > 0.0)))
+
+
+def learn(learning: IterativeLearning, play: Callable[[Array], Array], rounds: int = 2) -> IterativeLearning:
+    """Play the first plan and up to `rounds` corrections of it.
+
+    Parameters
+    ----------
+    learning : IterativeLearning
+        With the first plan.
+    play : callable
+        Plays a drive (m,) [V] on the stage, settled at the voltage of the plan's start, and returns the displacement
+        (m,) [m].
+    rounds : int
+        Corrections at most.
+    """
+    for _ in range(rounds + 1):
+        if learning.next is None:
+            break
+        learning.update(play(learning.next.voltage))
+    return learning

@@ -1,0 +1,132 @@
+"""`LearningFilter`: how much of an error a round corrects at which frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ResponseCheck:
+    """Measured response of the stage over that of the model, with its uncertainty.
+
+    Parameters
+    ----------
+    frequency : (k,) ndarray
+        Rising [Hz].
+    ratio : (k,) complex ndarray
+        Ĝ/G.
+    deviation : (k,) ndarray
+        Standard deviation of the ratio, relative to it.
+    """
+
+    frequency: Array
+    ratio: NDArray[np.complex128]
+    deviation: Array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LearningFilter:
+    """Gain of the correction by frequency.
+
+    A round turns the error E into (1 − L R) E, with R the response of stage and inverse together. The error shrinks
+    where |1 − L R| < 1; the gain L falls to zero where that is not sure by two standard deviations.
+
+    Parameters
+    ----------
+    sample_period : float
+        [s]
+    passed, stopped : float
+        The gain is `gain` up to `passed` and tapers to zero at `stopped`, by a raised cosine [Hz].
+    gain : float
+        Largest gain, above 0 and at most 1.
+    check : ResponseCheck, optional
+        Of the identified response; default: it is taken as right.
+    margin : float
+        |1 − L R| with two standard deviations must stay below 1 − margin · L.
+
+    Raises
+    ------
+    ModelError
+        If the numbers contradict one another, or no frequency is left at which a round converges.
+    """
+
+    sample_period: float
+    passed: float = 1200.0
+    stopped: float = 3000.0
+    gain: float = 0.9
+    check: ResponseCheck | None = None
+    margin: float = 0.05
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.gain <= 1.0 or not 0.0 < self.passed < self.stopped or not 0.0 < self.margin < 1.0:
+            raise ModelError(
+                f"learning: got gain {self.gain:g}, {self.passed:g} to {self.stopped:g} Hz, margin {self.margin:g}, "
+                "expected 0 < gain <= 1, 0 < passed < stopped, 0 < margin < 1"
+            )
+        if not self.at(np.linspace(0.0, self.stopped, 200)).any():
+            raise ModelError(
+                "learning: convergence is sure at no frequency; identify the response of the stage better first"
+            )
+
+    def at(self, frequency: Array) -> Array:
+        """Gain L at frequencies [Hz], shape (k,)."""
+        f = np.abs(np.asarray(frequency, dtype=np.float64))
+        share = np.clip((f - self.passed) / (self.stopped - self.passed), 0.0, 1.0)
+        gain = self.gain * (0.5 + 0.5 * np.cos(np.pi * share))
+        return np.asarray(np.where(self._factor(f, gain) <= 1.0 - self.margin * gain, gain, 0.0))
+
+    def factor(self, frequency: Array) -> Array:
+        """Bound of |1 − L R| at frequencies [Hz]: by how much at most an error is multiplied in a round."""
+        return self._factor(np.asarray(frequency, dtype=np.float64), self.at(frequency))
+
+    def _factor(self, f: Array, gain: Array) -> Array:
+        ratio, spread = np.ones(f.size, dtype=np.complex128), np.zeros(f.size)
+        if self.check is not None:
+            own = self.check
+            ratio = np.interp(f, own.frequency, own.ratio.real) + 1j * np.interp(f, own.frequency, own.ratio.imag)
+            spread = np.abs(ratio) * np.interp(f, own.frequency, own.deviation)
+        return np.asarray(np.abs(1.0 - gain * ratio) + 2.0 * gain * spread)
+
+    def correct(self, error: Array, noise: float) -> tuple[Array, float, float]:
+        """Correction for an error, and what a round is predicted to leave.
+
+        Parameters
+        ----------
+        error : (n,) ndarray
+            Wanted − measured along the path [m].
+        noise : float
+            Rms of the sensor noise, taken as white [m].
+
+        Returns
+        -------
+        correction : (n,) ndarray
+            To be added to the reference [m].
+        left : float
+            Rms of the error predicted after the round, without the noise of that measurement [m].
+        now : float
+            Rms of the present error without noise, in the band of the filter [m].
+        """
+        n = error.size
+        whole = np.concatenate((error, error[::-1]))  # mirrored, so that a path that does not close leaves no step
+        size = whole.size
+        spectrum = np.fft.rfft(whole)
+        gain = self.at(np.asarray(np.fft.rfftfreq(size, self.sample_period), dtype=np.float64))
+        power = np.abs(spectrum) ** 2
+        floor = size * noise**2
+        smooth = np.convolve(power, np.ones(5) / 5.0, mode="same")
+        known = np.maximum(0.0, 1.0 - 3.0 * floor / np.maximum(smooth, 1e-300)) if floor > 0.0 else np.ones(power.size)
+        weight = gain * known
+        correction = np.fft.irfft(weight * spectrum, size)[:n]
+        signal = np.maximum(0.0, power - floor)
+        in_band = gain > 0.0
+        left = np.sum(((1.0 - weight) ** 2 * signal + weight**2 * np.minimum(floor, power))[in_band])
+        now = np.sum(signal[in_band])
+        scale = 2.0 / size**2
+        return correction, float(np.sqrt(scale * left)), float(np.sqrt(scale * now))

@@ -1,0 +1,97 @@
+"""Rounds of learning: they converge where that is sure, stop at the noise, and never play what is predicted worse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.compensation import IterativeLearning, LearningFilter, Limits, ResponseCheck, learn, plan
+from piezo_hysteresis.effects import Creep, HysteresisMemory
+from piezo_hysteresis.errors import ModelError
+
+from .published import PERIOD, stage, swing
+
+LIMITS = Limits(0.0, 10.0)
+WANTED = swing(50.0, 2e-6, 8e-6, 3)
+TRUTH = stage(Creep(gamma=0.01), HysteresisMemory(c=(0.03,) * 8))
+
+
+def stage_with_noise(noise: float, seed: int = 0):
+    rng = np.random.default_rng(seed)
+
+    def play(u: np.ndarray) -> np.ndarray:
+        assert u.min() >= 0.0 and u.max() <= 10.0
+        y, _ = TRUTH.run(u, TRUTH.rest(0.0))
+        return y + noise * rng.normal(size=u.size)
+
+    return play
+
+
+def learning(noise: float = 0.0, filter: LearningFilter | None = None) -> IterativeLearning:
+    model = stage()
+    return IterativeLearning(model, plan(model, WANTED, LIMITS), LIMITS, filter, noise=noise)
+
+
+def test_two_rounds_remove_what_the_model_misses() -> None:
+    got = learn(learning(), stage_with_noise(0.0), rounds=2)
+    rms = [r.rms / np.ptp(WANTED) for r in got.rounds]
+    assert len(rms) == 3 and rms[0] > 0.02
+    assert rms[1] < 0.1 * rms[0] and rms[2] < 3e-4
+    assert got.best is got.rounds[-1]
+
+
+def test_rounds_stop_at_the_noise_and_copy_little_of_it() -> None:
+    noise = 5e-4 * np.ptp(WANTED)
+    got = learn(learning(noise), stage_with_noise(noise), rounds=20)
+    assert got.next is None and got.reason and len(got.rounds) < 8
+    y, _ = TRUTH.run(got.best.plan.voltage, TRUTH.rest(0.0))
+    begin = got.best.plan.begin
+    left = np.sqrt(np.mean((y[begin : begin + WANTED.size] - WANTED) ** 2))
+    assert left < 0.7 * noise
+
+
+def test_every_round_is_predicted_to_be_better_before_it_is_played() -> None:
+    got = learn(learning(), stage_with_noise(0.0), rounds=6)
+    for before, after in zip(got.rounds[:-1], got.rounds[1:], strict=True):
+        assert after.expected < before.rms
+
+
+def test_a_round_that_got_worse_is_the_last() -> None:
+    got = learning()
+    worse = np.random.default_rng(1)
+    first = got.next
+    assert first is not None
+    got.update(stage_with_noise(0.0)(first.voltage))
+    second = got.next
+    assert second is not None
+    assert got.update(second.predicted + 1e-6 * worse.normal(size=second.voltage.size)) is None
+    assert "no better" in got.reason and got.best is got.rounds[0]
+    with pytest.raises(ModelError, match="ended"):
+        got.update(second.predicted)
+
+
+def test_the_gain_is_zero_where_the_response_makes_convergence_unsure() -> None:
+    frequency = np.array([0.0, 500.0, 600.0, 700.0, 800.0, 5000.0])
+    turned = np.array([1.0, 1.0, -1.0, -1.0, 1.0, 1.0]).astype(complex)
+    found = LearningFilter(PERIOD, check=ResponseCheck(frequency, turned, np.full(6, 0.01)))
+    assert (found.at(np.array([100.0, 400.0, 1000.0])) > 0.8).all()
+    assert not found.at(np.array([620.0, 650.0, 690.0])).any()
+    inside = np.linspace(0.0, 4000.0, 500)
+    assert (found.factor(inside) <= 1.0).all()
+    unsure = ResponseCheck(frequency, np.ones(6, dtype=complex), np.full(6, 0.8))
+    with pytest.raises(ModelError, match="sure at no frequency"):
+        LearningFilter(PERIOD, check=unsure)
+
+
+def test_the_gain_tapers_to_zero() -> None:
+    gain = LearningFilter(PERIOD).at(np.linspace(0.0, 5000.0, 2000))
+    assert gain[0] == 0.9 and gain[-1] == 0.0 and (np.diff(gain) <= 1e-12).all() and np.abs(np.diff(gain)).max() < 0.01
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    with pytest.raises(ModelError, match="gain"):
+        LearningFilter(PERIOD, gain=1.5)
+    with pytest.raises(ModelError, match="noise"):
+        learning(noise=-1.0)
+    with pytest.raises(ModelError, match="samples"):
+        learning().update(np.zeros(10))
