@@ -12,13 +12,13 @@ import time
 from pathlib import Path
 
 import numpy as np
-from rclpy.node import Node
 
 from piezo_hysteresis.nodes.identification.bag_recorder import BagRecorder
+from piezo_hysteresis.nodes.runtime.guarded_node import GuardedNode
 from piezo_hysteresis.nodes.runtime.process import run
 
 
-class Recorder(Node):
+class Recorder(GuardedNode):
     """A node that records until it ends."""
 
     def __init__(self) -> None:

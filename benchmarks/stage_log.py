@@ -51,6 +51,12 @@ class StageLog:
         """Drivers that were started."""
         return int(np.isnan(self.voltages).sum())
 
+    def shift_clock(self, offset: float) -> None:
+        """Let the clock of the computer be off by so much [s], as drivers see it."""
+        draft = self._path.with_name("clock.tmp")
+        draft.write_text(str(offset))
+        draft.replace(f"{self._path}.clock")
+
     def check(self) -> None:
         """Every sample is inside the limits, and no steeper than allowed, from the safe voltage of every start on."""
         voltages = self.voltages

@@ -18,12 +18,12 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.executors import ExternalShutdownException
-from rclpy.node import Node
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.runtime.executor import make_executor, spin_until
+from piezo_hysteresis.nodes.runtime.guarded_node import GuardedNode
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS
 from piezo_hysteresis.nodes.runtime.sending import is_taken_by, send
 
@@ -52,7 +52,7 @@ def main(namespace: str, sample_period: float, waveform: Path) -> None:
     """
     cloud = command_to_cloud(np.load(waveform), sample_period, "")
     rclpy.init()
-    node, executor = Node("sender", namespace=namespace), make_executor()
+    node, executor = GuardedNode("sender", namespace=namespace), make_executor()
     publisher = node.create_publisher(PointCloud2, "command", COMMAND)
     states: dict[str, Future[str]] = {}
 
@@ -76,7 +76,7 @@ def main(namespace: str, sample_period: float, waveform: Path) -> None:
             cloud.header.frame_id = name
             ended = states[name] = Future()
             send(publisher, cloud)
-            spin_until(executor, ended)
+            spin_until(executor, ended, node)
             if ended.result() != "done":
                 break
 

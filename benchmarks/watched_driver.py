@@ -2,11 +2,14 @@
 
     python watched_driver.py LOG --ros-args …
 
+Where a file LOG.clock is there, the clock of the computer is off by the seconds in it, for this process alone.
+
 A start of the process is a NaN in the log; a driver that is killed can leave no sample out, since the samples of a
 block are with the operating system before the stage sees them.
 """
 
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +17,8 @@ import numpy as np
 
 from piezo_hysteresis.acquisition import back_ends
 from piezo_hysteresis.nodes.driver import driver_node
+
+CLOCK = time.time_ns
 
 SIMULATED = back_ends.BACK_ENDS["simulated"]
 
@@ -36,7 +41,20 @@ class Watched:
         self._log.write(np.array([self._stage.voltage]).tobytes())
 
 
+def shifted(offset):
+    """The clock of the computer, off by the seconds in a file."""
+
+    def time_ns():
+        try:
+            return CLOCK() + round(float(offset.read_text()) * 1e9)
+        except (OSError, ValueError):
+            return CLOCK()
+
+    return time_ns
+
+
 if __name__ == "__main__":
+    time.time_ns = shifted(Path(f"{sys.argv[1]}.clock"))
     with Path(sys.argv[1]).open("ab", buffering=0) as log:
         log.write(np.array([np.nan]).tobytes())
         watched = replace(SIMULATED, open=lambda *values: Watched(SIMULATED.open(*values), log))

@@ -108,7 +108,8 @@ def settings(rows: Iterable[Row]) -> str:
     for row in rows:
         if isinstance(row, Setting):
             value = str(row.value).lower() if isinstance(row.value, bool) else str(row.value)
-            lines.append((f"`{row.name}`", value, "", ", ".join(row.choices), row.meaning))
+            allowed = f"{row.lower} … {row.upper}" if row.is_number else ", ".join(row.choices)
+            lines.append((f"`{row.name}`", value, "", allowed, row.meaning))
         else:
             bounds = "" if math.isinf(row.upper) else f"{number(row.lower)} … {number(row.upper)}"
             lines.append((f"`{row.name}`", default(row), row.unit, bounds, row.meaning))

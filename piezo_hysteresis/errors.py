@@ -16,8 +16,32 @@
 from __future__ import annotations
 
 
+def printable(text: str) -> str:
+    r"""One line that any terminal shows as it is: what cannot be printed stands as its escape.
+
+    Control characters, line breaks, and marks that change the direction of writing are escaped: text from a message, a
+    file or a device can neither forge a line of a log nor steer a terminal.
+
+    Examples
+    --------
+    >>> print(printable("E-727\n[ERROR] forged"))
+    E-727\n[ERROR] forged
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "backslashreplace").decode() for c in text)
+
+
+def reason_of(error: BaseException) -> str:
+    """An exception in one line: what a PiezoError says, or what fault of this program it is."""
+    return str(error) if isinstance(error, PiezoError) else printable(f"fault of this program: {error!r}")
+
+
 class PiezoError(Exception):
-    """Whatever this package raises on purpose; one line that a user can act on."""
+    """Whatever this package raises on purpose; one line that a user can act on, whatever text of others is in it."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 class ParameterError(PiezoError, ValueError):

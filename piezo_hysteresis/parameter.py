@@ -124,19 +124,44 @@ class Setting:
         One line for its description.
     choices : tuple of str
         The words that are accepted; any where empty.
+    lower, upper : int
+        Inclusive bounds of a number.
+
+    Raises
+    ------
+    ParameterError
+        If the default is not acceptable itself.
     """
 
     name: str
     value: str | bool | int
     meaning: str
     choices: tuple[str, ...] = ()
+    lower: int = -(2**63)
+    upper: int = 2**63 - 1
+
+    def __post_init__(self) -> None:
+        self.check(self.value)
+
+    @property
+    def is_number(self) -> bool:
+        """True for a number of something; a switch is none."""
+        return type(self.value) is int
 
     def check(self, value: object, prefix: str = "") -> str | bool | int:
-        """Return `value` if it is one of the choices and of the type of the default; ParameterError otherwise."""
+        """Return `value` if it is of the type of the default, one of the choices, and inside the bounds.
+
+        Raises
+        ------
+        ParameterError
+            Otherwise.
+        """
         if type(value) is not type(self.value):
             raise ParameterError(f"{prefix}{self.name}: got {value!r}, expected a {type(self.value).__name__}")
         if self.choices and value not in self.choices:
             raise ParameterError(f"{prefix}{self.name}: got {value!r}, expected one of {', '.join(self.choices)}")
+        if isinstance(value, int) and not self.lower <= value <= self.upper:
+            raise ParameterError(f"{prefix}{self.name}: got {value}, expected {self.lower} to {self.upper}")
         return value
 
 

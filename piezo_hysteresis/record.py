@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg.blas import ddot  # numpy's would warn of squares that are too large
 
-from .errors import RecordError
+from .errors import RecordError, printable
 
 Samples = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class Record:
     sample_period : float
         Time between samples [s], positive. In phases slower than the model the samples are block averages.
     phase : str
-        Phase name, e.g. ``"triangle"``.
+        Phase name, e.g. ``"triangle"``, made printable.
     start_time : float
         Time of the first sample since the start of the experiment [s].
     continues : bool
@@ -103,9 +103,9 @@ class Record:
         if not (np.isfinite(period) and period > 0):
             raise RecordError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
         put(self, "sample_period", period)
+        put(self, "phase", printable(self.phase))
         for name in ("start_time", "initial_voltage"):
-            number = getattr(self, name)
-            if number is not None and not np.isfinite(number):
+            if (number := getattr(self, name)) is not None and not np.isfinite(number):
                 raise RecordError(f"{name}: got {number!r}, expected a finite number")
 
     @property
@@ -133,11 +133,8 @@ class Record:
         start, stop, step = part.indices(self.size)
         if step != 1 or stop <= start:
             raise RecordError(f"slice {part}: expected a non-empty contiguous part of {self.size} samples")
-        return self.with_channels(
-            lambda channel: channel[start:stop],
-            start_time=self.start_time + start * self.sample_period,
-            continues=self.continues if start == 0 else True,
-        )
+        begin = self.start_time + start * self.sample_period
+        return self.with_channels(lambda c: c[start:stop], start_time=begin, continues=self.continues or start > 0)
 
     def with_channels(self, change: Callable[[Samples], Samples], **fields: Any) -> Record:
         """Every channel that is there changed alike, and the other fields given replaced.
@@ -194,7 +191,7 @@ class Notice:
     kind : str
         Stable word: ``gap``, ``clipped``, ``non_finite``, ``duplicate``, ``not_at_rest``, ``units``, …
     message : str
-        One plain line.
+        One plain line, made printable.
     phase : str
         Phase it was found in; empty for the whole experiment.
     severe : bool
@@ -205,6 +202,9 @@ class Notice:
     message: str
     phase: str = ""
     severe: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "message", printable(self.message))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

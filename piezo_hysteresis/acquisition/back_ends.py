@@ -40,11 +40,17 @@ class BackEnd:
 _PLANT = PlantParameters.table()
 
 _SIMULATED: tuple[Row, ...] = (
-    Setting("seed", 0, "fixes noise and random phases"),
+    Setting("seed", 0, "fixes noise and random phases", lower=0, upper=2**31 - 1),
     Setting("memory", False, "true for a stage with on-board memory: upload, run, read"),
-    Setting("longest_block", 32768, "samples that the memory holds"),
+    Setting("longest_block", 32768, "samples that the memory holds", lower=2, upper=2**31 - 1),
     Parameter("dead_time", "t_d", "s", 0.05, 0.0, 100.0, "time that arming takes", "simulated plant"),
-    Setting("hidden_effect", -1, "seed that draws one effect to hide in the plant; -1: nothing hidden"),
+    Setting(
+        "hidden_effect",
+        -1,
+        "seed that draws one effect to hide in the plant; -1: nothing hidden",
+        lower=-1,
+        upper=2**31 - 1,
+    ),
     Setting("plant_file", "", "YAML file of plant parameters, which then count instead of the ones below"),
     Setting("hysteresis.operator", "bouc_wen", "hysteresis of the plant", ("bouc_wen", "prandtl_ishlinskii")),
     *_PLANT,
@@ -53,7 +59,7 @@ _SIMULATED: tuple[Row, ...] = (
 _REPLAY: tuple[Row, ...] = (
     Setting("experiment", "", "path of the recording"),
     Setting("repeat", False, "begin again after the last sample"),
-    Setting("subscribers", 0, "begin when so many subscribers of samples are there"),
+    Setting("subscribers", 0, "begin when so many subscribers of samples are there", lower=0, upper=1000),
 )
 
 

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from ..errors import IdentificationError, PiezoError
+from ..errors import IdentificationError, PiezoError, printable
 
 COMMANDS = {
     "simulate": "play a protocol to a simulated stage and record it",
@@ -73,7 +73,7 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
 
 
 def _told(message: object, status: int) -> int:
-    print(f"piezo: {' '.join(str(message).split())}", file=sys.stderr)
+    print(f"piezo: {printable(' '.join(str(message).split()))}", file=sys.stderr)
     return status
 
 

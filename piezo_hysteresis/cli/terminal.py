@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 
+from ..errors import printable
 from ..record import Notice
 from ..report.tables.table import Table
 
@@ -33,7 +34,7 @@ def show(*tables: Table | None) -> None:
         for column, heading in enumerate(table.header):
             drawn.add_column(heading, justify="right" if column in table.numeric else "left", header_style="underline")
         for row in table.rows:
-            drawn.add_row(*row)
+            drawn.add_row(*map(printable, row))
         out = console()
         out.print(drawn)
         if table.note:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import StageError
+from ..errors import StageError, printable
 
 Samples = NDArray[np.float64]
 
@@ -23,6 +23,7 @@ class Description:
     ----------
     name : str
         Model and serial number, or what is simulated; unique per device, so that a driver can lock it.
+        What cannot be printed, of a device that names itself, becomes its escape.
     streaming : bool
         True for a `StreamingStage`, False for a `MemoryStage`.
     sample_period_min, sample_period_max : float
@@ -74,6 +75,7 @@ class Description:
     ignores_drive: bool = False
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "name", printable(self.name))
         for low, high in (
             ("sample_period_min", "sample_period_max"),
             ("voltage_min", "safe_voltage"),

@@ -2,7 +2,9 @@
 
 import os
 import resource
+import shutil
 import signal
+import subprocess
 
 import numpy as np
 import pytest
@@ -98,6 +100,83 @@ def test_where_nothing_may_be_written_nothing_moves(running):
         identification.root.with_name("moved").rename(identification.root)
     lab.wait(lambda: len(samples.blocks) > begin + 20, "blocks after it")
     assert all(np.ptp(block.voltage) < 1e-3 for block in samples.blocks[begin:])
+
+
+def deleted(folder):
+    shutil.rmtree(folder)
+
+
+def moved(folder):
+    folder.rename(folder.with_name("moved_away"))
+
+
+def replaced(folder):
+    """The file of the bag is another one of the same name."""
+    (file,) = folder.glob("*.mcap")
+    file.unlink()
+    file.touch()
+
+
+@pytest.mark.parametrize("lose", [deleted, moved, replaced])
+def test_a_recording_that_is_lost_ends_the_run_within_a_second_of_samples(running, lose):
+    lab, samples, identification = running
+    at_rest(lab, samples)
+    assert identification.ask("identify").success
+    identification.await_state("running")
+    lab.wait(lambda: samples.newest.voltage[-1] > 1.0, "motion")
+    statuses = lab.statuses()
+    lose(identification.newest())
+    end = samples.newest.index[-1] + 1.5 / PERIOD
+    told = identification.await_state("failed").message
+    assert "deleted or moved" in told
+    lab.wait(lambda: statuses and values_of(statuses[-1])["state"] == "stopped", "the stop of the driver")
+    lab.wait(lambda: samples.newest.index[-1] > end, "the samples after it")
+    inside = samples.index <= end
+    assert samples.voltage[inside][-1] < samples.voltage[inside].max(), "on its way to the safe voltage"
+    at_rest(lab, samples)
+    assert identification.process.is_running
+    assert not identification.ask("abort").success
+    shutil.rmtree(identification.root / "moved_away", ignore_errors=True)
+
+
+def test_abort_of_a_run_whose_recording_has_gone_ends_no_node(running):
+    """Abort at once, before the recorder itself has noticed."""
+    lab, samples, identification = running
+    for _ in range(3):
+        at_rest(lab, samples)
+        assert identification.ask("identify").success
+        identification.await_state("running")
+        lab.wait(lambda: samples.newest.voltage[-1] > 1.0, "motion")
+        client = lab.node.create_client(Trigger, f"{NODE}/abort")
+        lab.wait(client.service_is_ready, "the service")
+        lab.pause(0.1)
+        deleted(identification.newest())
+        lab.wait(client.call_async(Trigger.Request()).done, "an answer")
+        told = identification.await_state("aborted", "failed").message
+        assert "deleted or moved" in told or "No such file" in told
+    at_rest(lab, samples)
+    assert identification.process.is_running
+
+
+def test_a_real_disk_that_is_full_ends_the_run_and_not_the_node(lab):
+    """A file system of a megabyte, where the machine lets one be mounted."""
+    root = lab.folder / "small_disk"
+    root.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(root)], capture_output=True)
+    if mounted.returncode:
+        pytest.skip(f"no file system can be mounted here: {mounted.stderr.decode().strip()}")
+    try:
+        lab.driver(sample_period=PERIOD)
+        samples = lab.streaming()
+        identification = Identification(lab, root)
+        assert identification.ask("identify").success
+        assert "No space left on device" in identification.await_state("failed").message
+        at_rest(lab, samples)
+        assert read(identification.newest(), include=("idle", "hold")).records
+        assert identification.process.is_running
+        identification.process.end()
+    finally:
+        subprocess.run(["umount", str(root)], check=True)
 
 
 def test_parameters_from_outside_choose_no_place(running):

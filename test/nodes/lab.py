@@ -28,6 +28,7 @@ from std_msgs.msg import String
 from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.messages.samples import samples_from_cloud
+from piezo_hysteresis.nodes.runtime.guarded_node import GuardedNode
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS, LATCHED
 
 PATIENCE = 60.0
@@ -115,6 +116,13 @@ class Samples:
         return whole and np.array_equal(part.voltage[inside], np.asarray(waveform)[at])
 
 
+class LabNode(GuardedNode):
+    """A node of the test's own: what its callbacks raise ends the test."""
+
+    def fault(self, error: Exception) -> None:
+        raise error
+
+
 class Spinning:
     """An executor that spins nodes in a thread of its own until it is ended: only then may they be destroyed."""
 
@@ -146,7 +154,7 @@ class Lab:
         self._others: list[tuple[Node, Spinning]] = []
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
-        self.node = Node("lab", context=self._context)
+        self.node = LabNode("lab", context=self._context)
         self._spinning = Spinning(self._context, self.node)
 
     def start(
@@ -193,9 +201,9 @@ class Lab:
         self._added.append(node)
         return node
 
-    def second_node(self, name: str) -> Node:
+    def second_node(self, name: str) -> LabNode:
         """A node of the test's own in a thread of its own: what it does holds up nobody."""
-        node = Node(name, context=self._context)
+        node = LabNode(name, context=self._context)
         self._others.append((node, Spinning(self._context, node)))
         return node
 

@@ -14,7 +14,7 @@ from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import write
 
-from .witness import Witness
+from ..acquisition.witness import Witness
 
 pytestmark = pytest.mark.nodes
 

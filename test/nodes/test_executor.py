@@ -3,16 +3,19 @@
 import importlib
 import sys
 import threading
+from functools import partial
 
 import pytest
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from piezo_hysteresis.nodes.runtime import executor as own
+from piezo_hysteresis.nodes.runtime.guarded_node import GuardedNode
 
 pytestmark = pytest.mark.nodes
 
@@ -34,7 +37,7 @@ def executor(request, lab, monkeypatch):
 
 
 def test_callbacks_are_served_until_another_thread_says_stop(executor):
-    node, stop, ticks = Node("served"), Future(), []
+    node, stop, ticks = GuardedNode("served"), Future(), []
 
     def tick():
         ticks.append(threading.get_ident())
@@ -43,13 +46,74 @@ def test_callbacks_are_served_until_another_thread_says_stop(executor):
 
     node.create_timer(0.01, tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
     executor.add_node(node)
-    own.spin_until(executor, stop)
+    own.spin_until(executor, stop, node)
     assert len(ticks) >= 3
     assert set(ticks) == {threading.get_ident()}
     node.destroy_node()
 
 
 def test_a_stop_said_before_is_heard(executor):
-    stop = Future()
+    node, stop = GuardedNode("stopped"), Future()
     stop.set_result(None)
-    own.spin_until(executor, stop)
+    own.spin_until(executor, stop, node)
+    node.destroy_node()
+
+
+def test_no_exception_ends_the_serving(executor):
+    """Raised by a timer, a subscription, a service, a task, and where a future is done: each is counted, all go on."""
+    node, stop, served = GuardedNode("faulty"), Future(), []
+    told = "\x1b[2J\nforged line"
+
+    def fail(name, *_):
+        served.append(name)
+        raise ValueError(told)
+
+    node.create_timer(0.05, partial(fail, "timer"), clock=Clock(clock_type=ClockType.STEADY_TIME))
+    node.create_subscription(String, "anything", partial(fail, "subscription"), 10)
+    node.create_service(Trigger, "service", partial(fail, "service"))
+    publisher, client = node.create_publisher(String, "anything", 10), node.create_client(Trigger, "service")
+    answers = []
+
+    def ask():
+        publisher.publish(String(data="x"))
+        if client.service_is_ready():
+            future = client.call_async(Trigger.Request())
+            future.add_done_callback(lambda future: answers.append(future.result()))
+            future.add_done_callback(node.guarded(partial(fail, "future")))
+        executor.create_task(node.guarded(partial(fail, "task")))
+        if min(map(served.count, ("timer", "subscription", "service", "task", "future"))) >= 2:
+            stop.set_result(None)
+
+    node.create_timer(0.05, ask, clock=Clock(clock_type=ClockType.STEADY_TIME))
+    executor.add_node(node)
+    limit = threading.Timer(30.0, lambda: stop.done() or stop.set_result(None))
+    limit.start()
+    own.spin_until(executor, stop, node)
+    limit.cancel()
+    assert {name: served.count(name) >= 2 for name in set(served)} == dict.fromkeys(
+        ("timer", "subscription", "service", "task", "future"), True
+    )
+    assert node.faults == len(served)
+    assert node.recent_fault.startswith("fault of this program: ValueError")
+    assert node.recent_fault.isprintable()
+    assert {(answer.success, answer.message) for answer in answers} == {(False, node.recent_fault)}
+    node.destroy_node()
+
+
+def test_a_fault_of_the_executor_itself_is_told(executor):
+    node, stop = GuardedNode("odd"), Future()
+
+    class Odd:
+        """An executor that fails twice before it serves."""
+
+        failures = 2
+
+        def spin_until_future_complete(self, future, timeout_sec):
+            if self.failures:
+                self.failures -= 1
+                raise RuntimeError("taking a message failed")
+            future.set_result(None)
+
+    own.spin_until(Odd(), stop, node)
+    assert node.faults == 2
+    node.destroy_node()

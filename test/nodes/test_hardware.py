@@ -75,6 +75,21 @@ class Driven:
         assert self.process.wait() == 0, self.process.output
 
 
+def test_the_name_that_a_controller_tells_forges_no_line(lab):
+    """The answer to *IDN? is the name of the stage: in logs, diagnostics and parameters."""
+    serial = "7\x1b]0;title\x07 [ERROR] forged\x9b2J"
+    with Gcs2Server(Controller(SimulatedStage(seed=3, sample_period=PERIOD), serial=serial)) as server:
+        driven = Driven(lab, "gcs2", gcs2__host=server.host, gcs2__port=server.port, gcs2__amplifier_gain=GAIN)
+        assert "forged" in driven.in_force("stage")
+        assert driven.in_force("stage").isprintable()
+        lab.wait(lambda: any(s.hardware_id for report in list(driven.told) for s in report.status), "its name")
+        named = {s.hardware_id for report in list(driven.told) for s in report.status}
+        assert all(name.isprintable() for name in named)
+        assert driven.samples.newest.stage.isprintable()
+        assert "forged" in driven.process.output
+        assert all(line.isprintable() for line in driven.process.output.split("\n"))
+
+
 def hill(top, size):
     return 0.5 * top * (1 - np.cos(2 * np.pi * np.arange(size) / size))
 

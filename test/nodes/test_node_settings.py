@@ -4,11 +4,37 @@ from pathlib import Path
 
 import pytest
 
+from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
+from piezo_hysteresis.acquisition.settings import DRIVER
+from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.model.parameter_file import parameters
 from piezo_hysteresis.nodes.identification.identification_node import IDENTIFICATION
 from piezo_hysteresis.nodes.model.model_node import MODEL
+from piezo_hysteresis.nodes.runtime.parameters import describe
+from piezo_hysteresis.parameter import Setting
 
 CONFIG = Path(__file__).parents[2] / "config"
+
+ALL = {
+    "driver": DRIVER,
+    "model": MODEL,
+    "identification": IDENTIFICATION,
+    **{word: back_end.rows for word, back_end in BACK_ENDS.items()},
+}
+NUMBERS = {f"{table}.{row.name}": row for table, rows in ALL.items() for row in rows if isinstance(row, Setting)}
+NUMBERS = {name: row for name, row in NUMBERS.items() if row.is_number}
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_numbers_of_something_have_a_range_that_ros_shows_and_python_checks(name):
+    row = NUMBERS[name]
+    (span,) = describe(row).integer_range
+    assert -1 <= span.from_value <= row.value <= span.to_value < 2**32
+    assert row.check(span.from_value) == span.from_value
+    assert row.check(span.to_value) == span.to_value
+    for outside in (span.from_value - 1, span.to_value + 1, True, 1.0):
+        with pytest.raises(ParameterError, match=row.name):
+            row.check(outside)
 
 
 @pytest.mark.parametrize(("file", "rows"), [("model.yaml", MODEL), ("identification.yaml", IDENTIFICATION)])

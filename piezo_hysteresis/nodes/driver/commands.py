@@ -8,7 +8,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from ...acquisition.session import DriverSession
-from ...errors import PiezoError, StageError
+from ...errors import PiezoError, StageError, printable
 from ..messages.conversions import from_stamp, waveform_from_cloud
 from ..messages.phase_text import phase_name
 from ..runtime.node_clock import now
@@ -54,7 +54,7 @@ class DriverCommands:
         return self._attached
 
     def _on_command(self, cloud: PointCloud2) -> None:
-        name, stamp = cloud.header.frame_id[:_LONGEST_NAME], 0
+        name, stamp = printable(cloud.header.frame_id[:_LONGEST_NAME]), 0
         try:
             stamp = from_stamp(cloud.header.stamp)
             session, topics = self._stage()

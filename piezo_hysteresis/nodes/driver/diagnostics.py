@@ -6,10 +6,10 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 
 from ...acquisition.streaming import StreamingAcquisition
 from ..messages.conversions import diagnostic
+from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
 
@@ -19,11 +19,11 @@ class DriverDiagnostics:
 
     Parameters
     ----------
-    node : rclpy.node.Node
+    node : GuardedNode
         The driver; its full name stands before every status.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GuardedNode) -> None:
         self._node = node
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: stage"
         self._publisher = advertise(node, DIAGNOSTICS)
@@ -47,7 +47,9 @@ class DriverDiagnostics:
     def publish(self) -> None:
         """Publish one array with one status."""
         level, message, stage = self._state
-        values: dict[str, object] = {"refused_commands": self.refused}
+        values: dict[str, object] = {"refused_commands": self.refused, "faults": self._node.faults}
+        if fault := self._node.recent_fault:
+            level, message = max(level, DiagnosticStatus.WARN), f"{message}; {fault}"
         acquisition = self._acquisition
         if acquisition is not None:
             tally, now = acquisition.tally, time.monotonic()

@@ -17,7 +17,8 @@ from sensor_msgs.msg import PointCloud2
 from ...acquisition.back_ends import BACK_ENDS
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DRIVER, IN_FORCE, DriverSettings
-from ...errors import PiezoError, StageError
+from ...errors import ParameterError, PiezoError, StageError, reason_of
+from ..runtime.guarded_node import GuardedNode
 from ..runtime.node_clock import now
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
@@ -29,18 +30,31 @@ from .publishers import DriverTopics
 _SILENCE = 1.0
 """Time without a block after which a publisher of samples is taken for dead [s]."""
 
+_SIMULATED_TIME = "use_sim_time"
+"""Parameter of every ROS node: its clock follows /clock."""
 
-class DriverNode(LifecycleNode):
+_OWN_CLOCK = "a driver stamps samples and checks commands by the clock of the computer"
+"""Why a driver refuses it."""
+
+
+class DriverNode(GuardedNode, LifecycleNode):
     """Driver of one axis: topics, services and parameters stand in docs/ros.
 
     Parameters
     ----------
     **options
         As for `rclpy.node.Node`.
+
+    Raises
+    ------
+    ParameterError
+        Where `use_sim_time` is set.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__("driver_node", **options)
+        if self.get_parameter(_SIMULATED_TIME).value:
+            raise ParameterError(f"{_SIMULATED_TIME}: got true, expected false; {_OWN_CLOCK}")
         declare(self, DRIVER)
         for word, back_end in BACK_ENDS.items():
             declare(self, back_end.rows, f"{word}.")
@@ -154,14 +168,14 @@ class DriverNode(LifecycleNode):
         """The acquisition has ended by itself, in its thread: leave the active state from the executor's."""
         self._failure = error
         self._tell_failure(error)
-        self.executor.create_task(self._give_up)
+        self.executor.create_task(self.guarded(self._give_up))
 
     def _give_up(self) -> None:
         if self._state_machine.current_state[1] == "active":
             self.trigger_deactivate()
 
     def _tell_failure(self, error: Exception) -> None:
-        reason = str(error) if isinstance(error, PiezoError) else f"fault of the driver: {error!r}"
+        reason = reason_of(error)
         self.get_logger().error(reason)
         self._diagnostics.state(DiagnosticStatus.ERROR, reason)
 
@@ -188,7 +202,9 @@ class DriverNode(LifecycleNode):
         ours = {row.name for row in DRIVER}
         for name in (parameter.name for parameter in parameters):
             reason = ""
-            if name.startswith("in_force."):
+            if name == _SIMULATED_TIME:
+                reason = f"{name}: {_OWN_CLOCK}"
+            elif name.startswith("in_force."):
                 reason = "" if self._telling else f"{name} tells what holds; set {name.removeprefix('in_force.')}"
             elif self._session is not None and (name in ours or name.split(".")[0] in BACK_ENDS):
                 reason = f"{name} is read at configure; deactivate and clean up the driver, set it, configure"

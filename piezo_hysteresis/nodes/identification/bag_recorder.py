@@ -9,7 +9,7 @@ from pathlib import Path
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
 
-from ...errors import RecordError, RecordingError
+from ...errors import RecordError, RecordingError, reason_of
 from ...recording import BagWriter
 from ..messages.samples import SampleReader
 from ..runtime.node_clock import now
@@ -95,4 +95,6 @@ class BagRecorder:
             self._bag.write(topic, now(self._node), message)
         except RecordingError as error:
             self.failure = error
+        except Exception as error:
+            self.failure = RecordingError(f"the recording ended: {reason_of(error)}")
         self.counts[name] += 1

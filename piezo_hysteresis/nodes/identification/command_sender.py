@@ -9,6 +9,7 @@ from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
 from rclpy.node import Node
 
+from ...errors import reason_of
 from ...identification.protocol.protocol import ProtocolPhase
 from ..messages.conversions import command_to_cloud
 from ..runtime.sending import is_taken_by, send
@@ -37,7 +38,7 @@ class CommandSender:
         """Whether the node `driver` of this namespace takes what is sent; a recorder alone plays nothing."""
         return is_taken_by(driver, self._node, self._publisher)
 
-    def send(self, phase: ProtocolPhase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
+    def send(self, phase: ProtocolPhase, leaving: Callable[[Time], None], lost: Callable[[str], None]) -> None:
         """Send a phase, stamped when it is packed and leaves: its age shall be that of its way.
 
         Parameters
@@ -46,7 +47,7 @@ class CommandSender:
         leaving : callable
             Called with the stamp before the message is published, in the thread.
         lost : callable
-            Called where the middleware did not take the message, in the thread.
+            Called with the reason where the message did not leave, in the thread.
         """
         self.call_off()
         self._called_off.clear()
@@ -61,11 +62,14 @@ class CommandSender:
             self._publisher.wait_for_all_acked(Duration(seconds=_LONGEST_WAY))
             self._thread = None
 
-    def _send(self, phase: ProtocolPhase, leaving: Callable[[Time], None], lost: Callable[[], None]) -> None:
-        cloud = command_to_cloud(phase.voltage, phase.sample_period, phase.name)
-        if self._called_off.is_set():
-            return
-        cloud.header.stamp = self._node.get_clock().now().to_msg()
-        leaving(cloud.header.stamp)
-        if not send(self._publisher, cloud):
-            lost()
+    def _send(self, phase: ProtocolPhase, leaving: Callable[[Time], None], lost: Callable[[str], None]) -> None:
+        try:
+            cloud = command_to_cloud(phase.voltage, phase.sample_period, phase.name)
+            if self._called_off.is_set():
+                return
+            cloud.header.stamp = self._node.get_clock().now().to_msg()
+            leaving(cloud.header.stamp)
+            if not send(self._publisher, cloud):
+                lost("the middleware did not take the waveform")
+        except Exception as error:
+            lost(reason_of(error))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
@@ -16,6 +15,7 @@ from ...errors import PiezoError
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import ProtocolPhase
 from ..messages.conversions import values_of
+from ..runtime.guarded_node import GuardedNode
 from ..topics import subscribe
 from .command_sender import CommandSender
 
@@ -32,7 +32,7 @@ class DriverClient:
 
     Parameters
     ----------
-    node : rclpy.node.Node
+    node : GuardedNode
         The identification node.
     driver : str
         Name of the driver node in the same namespace.
@@ -47,7 +47,7 @@ class DriverClient:
         Index of its first sample, once it plays.
     """
 
-    def __init__(self, node: Node, driver: str) -> None:
+    def __init__(self, node: GuardedNode, driver: str) -> None:
         self._node, self._driver = node, driver
         self.limits: DriveLimits | None = None
         self.state = self.reason = ""
@@ -89,8 +89,8 @@ class DriverClient:
         def leaving(stamp: Time) -> None:
             self._sent, self.state = (phase.name, f"{stamp.sec}.{stamp.nanosec:09d}"), "sent"
 
-        def lost() -> None:
-            self.state, self.reason = "refused", "the middleware did not take the waveform"
+        def lost(reason: str) -> None:
+            self.state, self.reason = "refused", reason
 
         self._command.send(phase, leaving, lost)
 
@@ -99,7 +99,10 @@ class DriverClient:
 
         A phase that is on its way arrives first.
         """
-        self._command.call_off()
+        try:
+            self._command.call_off()
+        except Exception as error:
+            self._node.fault(error)
         self._sent = None
         return self._stop.call_async(Trigger.Request()) if self._stop.service_is_ready() else None
 
@@ -111,7 +114,7 @@ class DriverClient:
             self.limits = None
             return
         self._pending = self._parameters.get_parameters([f"in_force.{name}" for name in _NAMES])
-        self._pending.add_done_callback(self._on_limits)
+        self._pending.add_done_callback(self._node.guarded(self._on_limits))
 
     def _on_limits(self, answer: Future) -> None:
         values = [parameter_value_to_python(value) for value in answer.result().values]

@@ -9,13 +9,12 @@ from pathlib import Path
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from ...effects import HYSTERESIS, Arx, Offset
-from ...errors import ParameterError, PiezoError
+from ...errors import ParameterError, PiezoError, reason_of
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import Protocol, paper, rich, short
 from ...model.model import Model
@@ -23,6 +22,7 @@ from ...model.model_file import dumps, loads, save
 from ...model.model_parameters import PREFIX
 from ...parameter import Row, Setting
 from ...recording.segmentation.decimation import save_decimation
+from ..runtime.guarded_node import GuardedNode
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..runtime.sending import send
@@ -38,7 +38,7 @@ PROTOCOLS: dict[str, Callable[[DriveLimits, int], Protocol]] = {"paper": paper, 
 
 IDENTIFICATION: tuple[Row, ...] = (
     Setting("protocol", "short", "what is played to the stage", tuple(PROTOCOLS)),
-    Setting("seed", 0, "fixes everything random in the protocol"),
+    Setting("seed", 0, "fixes everything random in the protocol", lower=0, upper=2**31 - 1),
     Setting("driver", "driver_node", "name of the driver node in the same namespace; read at start"),
     Setting("experiment", "", "recording for ~/diagnose, inside experiment_root; empty: the last one"),
     Setting(
@@ -52,12 +52,13 @@ START = Model((HYSTERESIS(), Arx(), Offset()), 2e-5)
 _TICK = 0.02
 
 
-class IdentificationNode(Node):
+class IdentificationNode(GuardedNode):
     """Identification of one axis: topics, services and parameters stand in docs/ros."""
 
     def __init__(self) -> None:
         super().__init__("identification_node", allow_undeclared_parameters=True)
         declare(self, IDENTIFICATION)
+        read(self, IDENTIFICATION)
         self._status = IdentificationStatus(self)
         self._driver = DriverClient(self, self._value("driver"))
         self._models = advertise(self, "model")
@@ -83,7 +84,7 @@ class IdentificationNode(Node):
     def end(self) -> None:
         """Abort what is under way, while services still work."""
         if self._job is not None:
-            self._job.close()
+            self._end_job()
             asked = self._driver.stop()
             if asked is not None:
                 self.executor.spin_until_future_complete(asked, timeout_sec=2.0)
@@ -115,9 +116,7 @@ class IdentificationNode(Node):
         if self._job is None:
             response.message = "nothing is under way"
             return response
-        self._job.close()
-        self._job = None
-        self._status.aborted("on request; the stage goes to its safe voltage, the recording is readable")
+        self._status.aborted(self._end_job())
         response.success, response.message = True, "aborted"
         return response
 
@@ -137,9 +136,24 @@ class IdentificationNode(Node):
             self._status.progress(next(self._job))
         except StopIteration:
             self._job = None
-        except PiezoError as error:
+        except Exception as error:
             self._job = None
-            self._status.failed(str(error))
+            if not isinstance(error, PiezoError):
+                self.fault(error)
+            self._status.failed(reason_of(error))
+
+    def _end_job(self) -> str:
+        """Give up what is under way, whatever comes of it; what has become of stage and recording."""
+        job, self._job = self._job, None
+        moves = self._status.state != "fitting"
+        try:
+            if job is not None:
+                job.close()
+        except Exception as error:
+            return f"on request; {reason_of(error)}"
+        if moves:
+            return "on request; the stage goes to its safe voltage, the recording is readable"
+        return "on request; the fit was ended, the stage was left as it is"
 
     def _identify(self, path: Path) -> Generator[Progress]:
         planned: list[Protocol] = []
@@ -165,9 +179,9 @@ class IdentificationNode(Node):
         finally:
             process.close()
         found = loads(outcome.model)
-        save(found, (path if path.is_dir() else path.parent) / f"{job.__name__}.yaml")
         self._served.serve(found)
         send(self._models, String(data=outcome.model))
+        save(found, (path if path.is_dir() else path.parent) / f"{job.__name__}.yaml")
         for line in outcome.summary.splitlines():
             self.get_logger().info(line)
         self._status.done(outcome.verdict)
@@ -197,6 +211,8 @@ class IdentificationNode(Node):
                 if parameter.name in rows:
                     rows[parameter.name].check(parameter.value)
                     self._check_place(parameter)
+                elif parameter.name == "use_sim_time":
+                    raise ParameterError(f"{parameter.name} is read at start; give it then")
                 elif not (parameter.name.startswith(PREFIX) or self.has_parameter(parameter.name)):
                     raise ParameterError(f"{parameter.name} is no parameter of this node, expected {', '.join(rows)}")
         except PiezoError as error:

@@ -7,11 +7,10 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rclpy.node import Node
-
-from ...errors import StageError
+from ...errors import PiezoError, RecordingError, StageError
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import Protocol, ProtocolPhase
+from ..runtime.guarded_node import GuardedNode
 from .bag_recorder import BagRecorder
 from .driver_client import DriverClient
 
@@ -42,15 +41,16 @@ class Progress:
 
 
 def campaign(
-    node: Node, driver: DriverClient, plan: Callable[[DriveLimits], Protocol], path: Path
+    node: GuardedNode, driver: DriverClient, plan: Callable[[DriveLimits], Protocol], path: Path
 ) -> Generator[Progress]:
     """Play and record a protocol; to be resumed at short intervals until it ends.
 
-    Closing the iterator aborts: the driver is asked to go to its safe voltage and the recording is finished.
+    Closing the iterator aborts: the driver is asked to go to its safe voltage, then the recording is finished. So does
+    every failure.
 
     Parameters
     ----------
-    node : rclpy.node.Node
+    node : GuardedNode
         The identification node.
     driver : DriverClient
         The stage.
@@ -72,31 +72,46 @@ def campaign(
     assert driver.limits is not None
     protocol = plan(driver.limits)
     recorder = BagRecorder(node, path)
-    finished = False
     try:
-        seen = recorder.counts
-        yield from _until(
-            lambda: not driver.missing and seen["samples"] > 0 and seen["phase"] > 0,
-            lambda: driver.missing or "samples",
-        )
-        if not driver.is_safe:
-            driver.stop()
-            yield from _until(lambda: driver.is_safe, lambda: "the safe voltage")
-        done = 0.0
-        for number, phase in enumerate(protocol, 1):
-            told = Progress(
-                "running", str(path), done / protocol.summary.duration, f"{number} of {len(protocol)} {phase.name}"
-            )
-            yield from _play(driver, recorder, phase, told)
-            done += phase.duration
-        # what is written lags behind the status while the computer is busy
-        end = driver.first_index + protocol.phases[-1].voltage.size
-        yield from _until(lambda: recorder.holds(end), lambda: "the last samples")
-        finished = True
-    finally:
+        for told in _all_phases(driver, recorder, protocol, path):
+            if recorder.failure is not None:
+                raise recorder.failure
+            yield told
+    except BaseException as error:  # that the iterator was closed, too
+        driver.stop()
+        _close_after(error, recorder)
+        raise
+    recorder.close()
+
+
+def _close_after(error: BaseException, recorder: BagRecorder) -> None:
+    """End the recording of a campaign that failed; where that fails too, both are told."""
+    try:
         recorder.close()
-        if not finished:
-            driver.stop()
+    except RecordingError as lost:
+        both = f"{error}; {lost}" if isinstance(error, PiezoError) else str(lost)
+        raise RecordingError(both) from error
+
+
+def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol, path: Path) -> Generator[Progress]:
+    seen = recorder.counts
+    yield from _until(
+        lambda: not driver.missing and seen["samples"] > 0 and seen["phase"] > 0,
+        lambda: driver.missing or "samples",
+    )
+    if not driver.is_safe:
+        driver.stop()
+        yield from _until(lambda: driver.is_safe, lambda: "the safe voltage")
+    done = 0.0
+    for number, phase in enumerate(protocol, 1):
+        told = Progress(
+            "running", str(path), done / protocol.summary.duration, f"{number} of {len(protocol)} {phase.name}"
+        )
+        yield from _play(driver, recorder, phase, told)
+        done += phase.duration
+    # what is written lags behind the status while the computer is busy
+    end = driver.first_index + protocol.phases[-1].voltage.size
+    yield from _until(lambda: recorder.holds(end), lambda: "the last samples")
 
 
 def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Generator[Progress]:
@@ -122,8 +137,6 @@ def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, tol
             raise StageError(f"phase '{phase.name}': {driver.missing} is gone; /diagnostics and its log tell why")
         if recorder.silence > longest_silence:
             raise StageError(f"phase '{phase.name}': no samples for {longest_silence:g} s; is the driver alive?")
-        if recorder.failure is not None:
-            raise recorder.failure
         if played is None and driver.state == "playing" and recorder.holds(driver.first_index + phase.voltage.size):
             played = time.monotonic()
         if played is not None and time.monotonic() > played + PATIENCE:

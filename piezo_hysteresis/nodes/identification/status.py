@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 
-from ..messages.conversions import diagnostic
+from ..messages.conversions import diagnostic, values_of
+from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
 from .protocol_runner import Progress
@@ -17,7 +17,7 @@ class IdentificationStatus:
 
     Parameters
     ----------
-    node : rclpy.node.Node
+    node : GuardedNode
         The identification node; its full name stands before every status.
 
     Attributes
@@ -26,7 +26,7 @@ class IdentificationStatus:
         Path of the recording that is made or fitted.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GuardedNode) -> None:
         self._node = node
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: identification"
         self._publisher = advertise(node, "status")
@@ -35,6 +35,11 @@ class IdentificationStatus:
         self._shown: DiagnosticStatus | None = None
         self._show(DiagnosticStatus.OK, "idle", "nothing is under way")
         node.create_timer(1.0, self._repeat, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def state(self) -> str:
+        """The word of the state shown last."""
+        return "" if self._shown is None else values_of(self._shown)["state"]
 
     def progress(self, progress: Progress) -> None:
         """Tell where the job under way stands."""
@@ -70,6 +75,15 @@ class IdentificationStatus:
             send(self._publisher, status)
 
     def _repeat(self) -> None:
-        array = DiagnosticArray(status=[self._shown])
+        shown, fault = self._shown, self._node.recent_fault
+        assert shown is not None
+        status = diagnostic(
+            max(shown.level, DiagnosticStatus.WARN) if fault else shown.level,
+            shown.name,
+            f"{shown.message}; {fault}" if fault else shown.message,
+            **values_of(shown),
+            faults=self._node.faults,
+        )
+        array = DiagnosticArray(status=[status])
         array.header.stamp = self._node.get_clock().now().to_msg()
         send(self._diagnostics, array)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header
 
-from ...errors import RecordError
+from ...errors import RecordError, printable
 from .cloud import from_cloud, to_cloud
 
 Samples = NDArray[np.float64]
@@ -66,9 +66,15 @@ def live(stamp: Time, frame_id: str, **values: float) -> JointState:
 
 
 def diagnostic(level: bytes, name: str, message: str, hardware_id: str = "", **values: object) -> DiagnosticStatus:
-    """Status with its values as text; floats with six digits."""
-    pairs = [KeyValue(key=key, value=f"{v:.6g}" if isinstance(v, float) else str(v)) for key, v in values.items()]
-    return DiagnosticStatus(level=level, name=name, message=message, hardware_id=hardware_id, values=pairs)
+    """Status with its values as text, floats with six digits; all of it can be printed, whoever wrote it."""
+    texts = {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in values.items()}
+    return DiagnosticStatus(
+        level=level,
+        name=printable(name),
+        message=printable(message),
+        hardware_id=printable(hardware_id),
+        values=[KeyValue(key=key, value=printable(text)) for key, text in texts.items()],
+    )
 
 
 def values_of(status: DiagnosticStatus) -> dict[str, str]:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
 from ...acquisition.sample_block import SampleBlock
-from ...errors import RecordError
+from ...errors import RecordError, printable
 from .cloud import to_cloud
 from .cloud_stream import CloudReader, CloudWriter, Columns, read_cloud
 from .conversions import PERIOD_TOLERANCE, Samples, from_stamp, to_stamp
@@ -29,6 +29,9 @@ PREDICTED_SAMPLES = {
 
 _END_OF_TIME = 2**31
 """Messages count seconds in 32 bits."""
+
+_LONGEST_STAGE = 200
+"""Characters of the name of a stage that are passed on."""
 
 _LARGEST = {"voltage": 1e4, "displacement": 1.0}
 """What no piezo stage is driven with [V], and no piezo stage moves [m]."""
@@ -75,7 +78,10 @@ class SampleReader:
 
 def _block(columns: Columns) -> SampleBlock:
     block = SampleBlock(
-        from_stamp(columns.stamp), **columns.values, stage=columns.frame_id, follows_gap=not columns.dense
+        from_stamp(columns.stamp),
+        **columns.values,
+        stage=printable(columns.frame_id[:_LONGEST_STAGE]),
+        follows_gap=not columns.dense,
     )
     _require_consecutive(block)
     for name, largest in _LARGEST.items():

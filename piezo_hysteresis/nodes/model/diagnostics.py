@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 
 from ...acquisition.sample_block import SampleBlock
 from ...model.model import Model
 from ...model.model_parameters import model_hash
 from ...online.predictor import Predictor
 from ..messages.conversions import diagnostic
+from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
 
@@ -29,13 +29,13 @@ class ModelDiagnostics:
 
     Parameters
     ----------
-    node : rclpy.node.Node
+    node : GuardedNode
         The model node; its full name stands before every status.
     warn, error : float
         Multiples of the model's free-run error.
     """
 
-    def __init__(self, node: Node, warn: float, error: float) -> None:
+    def __init__(self, node: GuardedNode, warn: float, error: float) -> None:
         self._node, self._warn, self._error = node, warn, error
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: prediction"
         self._publisher = advertise(node, DIAGNOSTICS)
@@ -83,7 +83,7 @@ class ModelDiagnostics:
         self._latency = max(self._latency, (now - block.stamp) * 1e-9 - float(block.time[-1]))
 
     def _publish(self) -> None:
-        values: dict[str, object] = {"problems": self._problems}
+        values: dict[str, object] = {"problems": self._problems, "faults": self._node.faults}
         if self._model is not None:
             values["model"] = model_hash(self._model)
         predictor, received = self._predictor, False
@@ -117,7 +117,10 @@ class ModelDiagnostics:
 
     def _findings(self, received: bool, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
         predictor, promised = self._predictor, self._promised
-        for told in filter(None, (self._refused, self._problem)):
+        clock = self._node.get_clock()
+        if clock.ros_time_is_active and clock.now().nanoseconds == 0:
+            yield DiagnosticStatus.WARN, "use_sim_time is true, and nothing comes on /clock"
+        for told in filter(None, (self._refused, self._problem, self._node.recent_fault)):
             yield DiagnosticStatus.ERROR, told
         if predictor is None or not received:
             yield DiagnosticStatus.STALE, "no samples"

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -21,6 +20,7 @@ from ...online.warmup import compile_kernels
 from ...parameter import Parameter, Row, Setting
 from ...recording.table.time_column import round_period
 from ..messages.samples import SampleReader
+from ..runtime.guarded_node import GuardedNode
 from ..runtime.node_clock import now
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
@@ -39,7 +39,7 @@ MODEL: tuple[Row, ...] = (
 )
 
 
-class ModelNode(Node):
+class ModelNode(GuardedNode):
     """Predictor of one axis: topics, services and parameters stand in docs/ros."""
 
     def __init__(self) -> None:
@@ -134,7 +134,7 @@ class ModelNode(Node):
             for parameter in parameters:
                 if parameter.name == "model_file":
                     _read(str(rows[parameter.name].check(parameter.value)))
-                elif parameter.name in rows:
+                elif parameter.name in (*rows, "use_sim_time"):
                     raise RecordError(f"{parameter.name} is read at start; give it then")
         except PiezoError as error:
             return SetParametersResult(successful=False, reason=str(error))

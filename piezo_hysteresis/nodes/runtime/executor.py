@@ -5,6 +5,8 @@ from __future__ import annotations
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.task import Future
 
+from .guarded_node import GuardedNode
+
 try:
     from rclpy.experimental.events_executor import EventsExecutor
 except ImportError:  # before Kilted there is none
@@ -23,7 +25,15 @@ def make_executor() -> Executor:
     return EventsExecutor()
 
 
-def spin_until(executor: Executor, done: Future) -> None:
-    """Serve callbacks until `done`, which may be set from any thread."""
+def spin_until(executor: Executor, done: Future, node: GuardedNode) -> None:
+    """Serve the callbacks of a node until `done`, which may be set from any thread.
+
+    What is raised on the way, by the executor itself too, is told by the node, and the serving goes on.
+    """
     while not done.done():
-        executor.spin_until_future_complete(done, timeout_sec=_LONGEST_SPIN)
+        try:
+            executor.spin_until_future_complete(done, timeout_sec=_LONGEST_SPIN)
+        except Exception as error:
+            if not node.context.ok():
+                raise
+            node.fault(error)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
 from ...parameter import Row, Setting
@@ -33,7 +33,8 @@ def describe(row: Row) -> ParameterDescriptor:
     """Descriptor of a row: meaning with unit, bounds as range where there are any."""
     if isinstance(row, Setting):
         words = f"one of: {', '.join(row.choices)}" if row.choices else ""
-        return ParameterDescriptor(description=row.meaning, additional_constraints=words)
+        span = [IntegerRange(from_value=row.lower, to_value=row.upper)] if row.is_number else []
+        return ParameterDescriptor(description=row.meaning, additional_constraints=words, integer_range=span)
     ranged = not row.is_array and math.isfinite(row.lower) and math.isfinite(row.upper)
     return ParameterDescriptor(
         description=f"{row.meaning} [{row.unit}]",

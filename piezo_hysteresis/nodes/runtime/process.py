@@ -13,15 +13,21 @@ from typing import TypeVar
 import rclpy
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from ...errors import PiezoError
 from .executor import make_executor, spin_until
+from .guarded_node import GuardedNode
 
-_BAD_START = (InvalidParameterTypeException, InvalidParameterValueException, rclpy_implementation.RCLError)
+_BAD_START = (
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+    PiezoError,
+    rclpy_implementation.RCLError,
+)
 
-AnyNode = TypeVar("AnyNode", bound=Node)
+AnyNode = TypeVar("AnyNode", bound=GuardedNode)
 
 
 def run(
@@ -34,7 +40,8 @@ def run(
     """Make a node and spin it until SIGINT or SIGTERM.
 
     The handlers of rclpy would invalidate the context before anything can be done about it: here both signals only end
-    the spinning, further ones are ignored, and `end` still publishes and serves.
+    the spinning, further ones are ignored, and `end` still publishes and serves. No exception out of a callback ends
+    the node: it is told, and the node goes on.
 
     Parameters
     ----------
@@ -70,7 +77,7 @@ def run(
     executor.add_node(node)
     try:
         begin(node)
-        spin_until(executor, stop)
+        spin_until(executor, stop, node)
     finally:
         try:
             end(node)

@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from ...errors import RecordingError
 from ..checks.error_context import naming
+from .written_file import check_in_place
 
 CHUNK_BYTES = 128 * 1024
 """Messages are indexed and written in chunks of this size; a cut file loses at most the last one. Larger ones are given
@@ -41,7 +42,8 @@ class BagWriter:
     Raises
     ------
     RecordingError
-        If the folder exists or cannot be made, and from every method once the disk is full or gone.
+        If the folder exists or cannot be made, and from every method once the disk is full or gone, or file or folder
+        were deleted, moved, or may not be written any more.
 
     Examples
     --------
@@ -162,6 +164,7 @@ class BagWriter:
         self._check_open()
         with self._ending_on_failure():
             self._write_chunk()
+            check_in_place(self._stream, self._file)
         self._flushed = time.monotonic()
 
     def close(self) -> None:
@@ -196,7 +199,7 @@ class BagWriter:
             with suppress(OSError):  # closing flushes once more what the disk has just refused
                 self._stream.close()
             raise RecordingError(
-                f"{self.path}: {error.strerror or error}; the recording ended, what was written before is readable"
+                f"{self.path}: {error.strerror or error}; the recording ended, what is left of it is readable"
             ) from error
 
     def _write_metadata(self) -> None:

@@ -1,0 +1,90 @@
+"""`GuardedNode`: a node that no exception out of a callback ends, rclpy's own callbacks included."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+from rclpy.node import Node
+
+from ...errors import reason_of
+
+_REMEMBERED = 10.0
+"""Time for which a fault is shown on /diagnostics [s]."""
+
+_LOG_INTERVAL = 0.1
+"""Shortest time between two lines about faults in the log [s]: no stream of faults fills a disk."""
+
+
+class GuardedNode(Node):
+    """Passes on what callbacks raise to `fault`, and goes on.
+
+    Subscriptions, services and timers are guarded where they are made, which is also where rclpy makes those of its
+    own (``/clock``, parameter services). A service that failed answers, with ``success`` false and the reason where its
+    response has such fields.
+
+    Attributes
+    ----------
+    faults : int
+        Exceptions that left a callback so far.
+    """
+
+    faults = 0
+    _newest_fault = ""
+    _fault_time = 0.0
+
+    @property
+    def recent_fault(self) -> str:
+        """The newest fault in one line, for some seconds; empty where there was none."""
+        return self._newest_fault if time.monotonic() - self._fault_time < _REMEMBERED else ""
+
+    def fault(self, error: Exception) -> None:
+        """Count an exception that left a callback, and tell it with the place where it was raised."""
+        places = traceback.extract_tb(error.__traceback__)
+        place = f" ({places[-1].filename}:{places[-1].lineno})" if places else ""
+        self.faults += 1
+        self._newest_fault, self._fault_time = reason_of(error), time.monotonic()
+        self.get_logger().error(f"{self._newest_fault}{place}", throttle_duration_sec=_LOG_INTERVAL)
+
+    def guarded(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """`callback` with its exceptions passed on to `fault`: for tasks and for what is called when a future is done.
+
+        The events executor of some builds crashes where a task raises.
+        """
+
+        @wraps(callback)
+        def call(*arguments: Any) -> Any:
+            try:
+                return callback(*arguments)
+            except Exception as error:
+                self.fault(error)
+                return None
+
+        return call
+
+    def create_subscription(self, msg_type: Any, topic: str, callback: Any, *arguments: Any, **named: Any) -> Any:
+        """As `rclpy.node.Node.create_subscription`, guarded."""
+        return super().create_subscription(msg_type, topic, self.guarded(callback), *arguments, **named)
+
+    def create_timer(self, timer_period_sec: float, callback: Any, *arguments: Any, **named: Any) -> Any:
+        """As `rclpy.node.Node.create_timer`, guarded."""
+        return super().create_timer(timer_period_sec, self.guarded(callback), *arguments, **named)
+
+    def create_service(self, srv_type: Any, srv_name: str, callback: Any, *arguments: Any, **named: Any) -> Any:
+        """As `rclpy.node.Node.create_service`, guarded."""
+
+        @wraps(callback)
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                return callback(request, response)
+            except Exception as error:
+                self.fault(error)
+                refused = srv_type.Response()
+                if hasattr(refused, "success") and hasattr(refused, "message"):
+                    refused.success, refused.message = False, reason_of(error)
+                return refused
+
+        return super().create_service(srv_type, srv_name, answer, *arguments, **named)

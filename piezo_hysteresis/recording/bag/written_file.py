@@ -1,0 +1,32 @@
+"""`check_in_place`: whether a file that is being written is still where it was begun."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import BinaryIO
+
+
+def check_in_place(stream: BinaryIO, path: Path) -> None:
+    """Bytes written to a file that was deleted or moved are refused by nobody: look whether it is there.
+
+    Parameters
+    ----------
+    stream : binary file
+        The file that is written.
+    path : Path
+        Where it was opened.
+
+    Raises
+    ------
+    OSError
+        If it was deleted, moved or replaced, or its folder may not be written any more.
+    """
+    try:
+        is_there = os.path.samestat(path.stat(), os.fstat(stream.fileno()))
+    except (FileNotFoundError, NotADirectoryError):
+        is_there = False
+    if not is_there:
+        raise OSError("deleted or moved while it was written")
+    if not os.access(path.parent, os.W_OK):
+        raise OSError("the folder may not be written any more")

@@ -1,0 +1,59 @@
+"""Texts of others stand in messages, tables and names as one line that steers no terminal."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from piezo_hysteresis.cli.main import main
+from piezo_hysteresis.errors import PiezoError, RecordingError, StageError, printable, reason_of
+from piezo_hysteresis.record import Notice, Record
+from piezo_hysteresis.stage.description import Description
+
+EVIL = "x\x1b]0;title\x07\r\n[ERROR] forged\u202e\x9b2J\x00"
+
+
+@given(st.text())
+def test_anything_becomes_one_printable_line_and_stays_it(text):
+    line = printable(text)
+    assert line.isprintable()
+    assert printable(line) == line
+    assert (line == text) == text.isprintable()
+
+
+@pytest.mark.parametrize("kind", [PiezoError, StageError, RecordingError])
+def test_every_error_is_one_printable_line(kind):
+    assert str(kind(EVIL)) == printable(EVIL)
+    assert reason_of(kind(EVIL)) == printable(EVIL)
+
+
+def test_other_exceptions_are_faults_of_the_program_in_one_line():
+    assert reason_of(KeyError(EVIL)).startswith("fault of this program: KeyError(")
+    assert reason_of(UnicodeError(EVIL)).isprintable()
+
+
+def test_names_from_files_and_devices_are_printable():
+    assert Record([0.0, 1.0], [0.0, 1.0], 1.0, phase=EVIL).phase == printable(EVIL)
+    assert Notice("gap", EVIL).message == printable(EVIL)
+    assert Description(EVIL, True, 1.0, 1.0, 0.0, 1.0).name == printable(EVIL)
+
+
+@pytest.mark.parametrize("where", ["titles", "phases", "cells"])
+def test_a_table_of_others_steers_no_terminal(tmp_path, capfd, where):
+    evil = "x\x1b]0;title\x07\u202e\x9b2J"
+    titles = f"time_s,voltage_V,displacement_m,phase,{evil if where == 'titles' else 'more'}"
+    time = 1e-3 * np.arange(200)
+    rows = [
+        f"{t:.6f},{np.sin(9 * t):.6f},{1e-6 * np.sin(9 * t):.9e},{evil if where == 'phases' else 'p'},1" for t in time
+    ]
+    if where == "cells":
+        rows[100] = f"{time[100]:.6f},{evil},1e-6,p,1"
+    table = tmp_path / "foreign.csv"
+    table.write_text("\n".join((titles, *rows)) + "\n")
+    main(["import", str(table), "-o", str(tmp_path / "out")])
+    main(["import", str(table), "-o", str(tmp_path / "out2"), "--column", "displacement=absent"])
+    main(["identify", str(tmp_path / "out"), "-o", str(tmp_path / "model.yaml")])
+    said = capfd.readouterr()
+    for stream in said:
+        assert all(line.isprintable() for line in stream.split("\n")), stream
+    assert said.out + said.err
