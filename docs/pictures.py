@@ -1,6 +1,7 @@
 """Pictures of docs/tour.md, made from the code they show; `make docs` runs this.
 
 Those of the demo come from what `make demo` has left in a folder: ``python docs/pictures.py --demo demo`` (chromium).
+Those of docs/gap.md take a diagnosis, about a minute: ``python docs/pictures.py gap``.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import gap_pictures
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
@@ -70,10 +72,14 @@ def main() -> None:
     """Draw all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--demo", type=Path, metavar="FOLDER", help="only those of the demo that wrote this folder")
+    parser.add_argument("page", nargs="?", choices=("gap",), help="only the pictures of this page")
     options = parser.parse_args()
     IMAGES.mkdir(exist_ok=True)
     if options.demo is not None:
         of_the_demo(options.demo)
+        return
+    if options.page == "gap":
+        gap_pictures.main(IMAGES)
         return
     with mpl.rc_context(SETTINGS):
         what_a_stage_does().savefig(IMAGES / "what_a_stage_does.png", dpi=110, metadata={"Software": None})
