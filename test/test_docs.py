@@ -16,6 +16,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+FILE = re.compile(r"`((?:[\w.]+/)*[\w.]+\.py)`")
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)#\s]+)(?:#[^)]*)?\)")
 
 
@@ -79,6 +80,13 @@ def test_code_blocks_run(page, workshop, monkeypatch):
 def test_links_lead_somewhere(page):
     dead = [to for to in LINK.findall(page.read_text()) if "://" not in to and not (page.parent / to).exists()]
     assert not dead
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_modules_that_are_named_exist(page):
+    """Relative to the repository, to the package, or to the page."""
+    places = (ROOT, ROOT / "piezo_hysteresis", page.parent)
+    assert [file for file in FILE.findall(page.read_text()) if not any((p / file).exists() for p in places)] == []
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "console")], ids=name)
