@@ -14,7 +14,7 @@ setup(
     maintainer="piezo_hysteresis maintainers",
     maintainer_email="piezo-hysteresis@users.noreply.github.com",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={f"{NAME}.report": ["page.css"]},
+    package_data={f"{NAME}.report": ["page.css", "page.html.jinja"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -24,6 +24,7 @@ setup(
     python_requires=">=3.11",
     install_requires=[
         "h5py",
+        "jinja2",
         "matplotlib",
         "mcap",
         "numba",

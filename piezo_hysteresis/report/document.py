@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator, Mapping, Sequence
-from html import escape
+from functools import cache
 from importlib.resources import files
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from .figures.comparison import ModelComparison
 from .figures.drawing import Drawing
@@ -33,54 +35,25 @@ def document(
     parts : mapping of str to (drawings, tables)
         Heading of every section and what stands under it.
     """
-    merit = "".join(f"<div><dt>{k}</dt><dd>{v}</dd></div>" for k, v in _figures_of_merit(comparison))
-    links = "".join(f'<li><a href="#{h.lower()}">{h}</a></li>' for h in ("Verdict", *parts))
-    sections = "".join(_section(heading, *part) for heading, part in parts.items())
     model = comparison.model
-    chain = "no model" if model is None else " → ".join(e.name for e in model.effects)
-    style = files(__package__).joinpath("page.css").read_text(encoding="utf-8")
-    return f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(title)}</title>
-<style>
-{style}</style>
-</head>
-<body>
-<a class="skip" href="#verdict">Skip to the verdict</a>
-<header><p>{escape(comparison.experiment.source)}</p><h1>{escape(title)}</h1>
-<p>Model: {escape(chain)}</p></header>
-<nav aria-label="Sections"><ul>{links}</ul></nav>
-<main>
-<section id="verdict" aria-labelledby="verdict-h"><h2 id="verdict-h">{escape(verdict.headline)}</h2>
-{"".join(f"<p>{escape(s)}</p>" for s in verdict.sentences)}
-<dl class="figures">{merit}</dl></section>
-{sections}</main>
-<footer><p>Errors are those of free-run simulation: the model sees the drive only, never the measured displacement. Per
-cents are RMS over peak-to-peak displacement of the experiment. The floor of a phase is its sensor noise or 0.03 % of
-range, whichever is larger.</p></footer>
-</body>
-</html>
-"""
-
-
-def _section(heading: str, drawings: Sequence[Drawing], tables: Sequence[Table]) -> str:
-    content = "".join(_figure(d) for d in drawings) + "".join(t.html() for t in tables)
-    name = heading.lower()
-    return f'<section id="{name}" aria-labelledby="{name}-h"><h2 id="{name}-h">{heading}</h2>\n{content}</section>\n'
-
-
-def _figure(drawing: Drawing) -> str:
-    picture, numbers = (base64.b64encode(text.encode()).decode() for text in (drawing.svg(), drawing.csv()))
-    return (
-        f'<h3 id="{drawing.name}">{escape(drawing.title)}</h3>\n<figure aria-labelledby="{drawing.name}">'
-        f'<img alt="{escape(drawing.alternative)}" src="data:image/svg+xml;base64,{picture}">'
-        f"<figcaption>{escape(drawing.caption)} "
-        f'<a class="download" download="{drawing.name}.csv" href="data:text/csv;base64,{numbers}">'
-        f"The numbers of “{escape(drawing.title)}” (CSV)</a></figcaption></figure>\n"
+    return _template().render(
+        title=title,
+        source=comparison.experiment.source,
+        chain="no model" if model is None else " → ".join(e.name for e in model.effects),
+        style=files(__package__).joinpath("page.css").read_text(encoding="utf-8"),
+        verdict=verdict,
+        merit=list(_figures_of_merit(comparison)),
+        parts=parts,
     )
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(
+        loader=PackageLoader(__package__, ""), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
+    )
+    environment.filters["base64"] = lambda text: base64.b64encode(text.encode()).decode()
+    return environment.get_template("page.html.jinja")
 
 
 def _figures_of_merit(comparison: ModelComparison) -> Iterator[tuple[str, str]]:
