@@ -97,7 +97,8 @@ class Plant:
         if "unknown" in self.hidden:
             y = self.hidden["unknown"](self, u, y, t)
         y = y + self.noise * self.stroke * rng.normal(size=u.size) * np.sqrt(min(1.0, NATIVE / period))
-        record = Record(u, y, period, phase=phase, start_time=start_time, other_displacement=other)
+        others = {} if other is None else {"other_displacement": other}
+        record = Record(u, y, period, phase=phase, start_time=start_time, channels=others)
         return record.decimate(averaged) if averaged > 1 else record
 
     def _amplifier(self, u: Array, dt: float, slow: bool) -> tuple[Array, float]:

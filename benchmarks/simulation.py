@@ -28,7 +28,7 @@ def record(size: int) -> Record:
     """Large slow sine with a little noise, every channel filled."""
     voltage = 3.5 + 2.5 * np.sin(np.arange(size) * 2e-3) + np.random.default_rng(0).normal(scale=0.01, size=size)
     zero = np.zeros(size)
-    return Record(voltage, zero, PERIOD, other_displacement=zero, temperature=zero + 293.15)
+    return Record(voltage, zero, PERIOD, channels={"other_displacement": zero, "temperature": zero + 293.15})
 
 
 def measure(model: Model, data: Record, wanted: list[str]) -> tuple[float, float]:

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.linalg.blas import ddot  # numpy's would warn of squares that are too large
+from numpy.typing import ArrayLike
 
+from .channels import ChannelMapping, Samples, are_finite
 from .errors import RecordError, printable
 
-Samples = NDArray[np.float64]
-
-CHANNELS = ("voltage", "displacement", "other_displacement", "temperature")
-"""Of a record, one value per sample."""
-
-
-def are_finite(samples: Samples) -> bool:
-    """Whether every sample, of at least one, is; the sum of squares tells at once, unless it is too large itself."""
-    return math.isfinite(ddot(samples, samples)) or bool(np.isfinite(samples).all())
+__all__ = ["Experiment", "Notice", "Record", "Samples", "are_finite"]
 
 
 def _channel(name: str, values: ArrayLike, length: int | None) -> Samples:
@@ -65,10 +56,9 @@ class Record:
         True where the beginning is missing, so that the initial state is unknown.
     initial_voltage : float, optional
         Voltage at which the stage had settled before the first sample [V]; default the first voltage.
-    other_displacement : (n,) array_like, optional
-        Displacement of the coupled axis [m].
-    temperature : (n,) array_like, optional
-        Stage temperature [K].
+    channels : mapping of str to (n,) array_like, optional
+        What else was measured, e.g. ``other_displacement`` of the coupled axis [m], ``displacement_3``,
+        ``monitor_voltage`` [V], ``temperature`` of the stage [K]; the names are those of `ChannelMapping`.
 
     Raises
     ------
@@ -90,15 +80,15 @@ class Record:
     continues: bool = False
     truncated: bool = False
     initial_voltage: float | None = None
-    other_displacement: Samples | None = None
-    temperature: Samples | None = None
+    channels: Mapping[str, Samples] = field(default_factory=ChannelMapping)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "voltage", _channel("voltage", self.voltage, None))
-        for name in ("displacement", "other_displacement", "temperature"):
-            if getattr(self, name) is not None:
-                put(self, name, _channel(name, getattr(self, name), self.voltage.size))
+        size = self.voltage.size
+        put(self, "displacement", _channel("displacement", self.displacement, size))
+        others = {name: _channel(name, values, size) for name, values in self.channels.items()}
+        put(self, "channels", ChannelMapping(others))
         period = float(self.sample_period)
         if not (np.isfinite(period) and period > 0):
             raise RecordError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
@@ -124,6 +114,16 @@ class Record:
         return np.asarray(self.start_time + self.sample_period * np.arange(self.size))
 
     @property
+    def other_displacement(self) -> Samples | None:
+        """Displacement of the coupled axis [m], shape (n,); None where it was not measured."""
+        return self.channels.get("other_displacement")
+
+    @property
+    def temperature(self) -> Samples | None:
+        """Temperature of the stage [K], shape (n,); None where it was not measured."""
+        return self.channels.get("temperature")
+
+    @property
     def settled_voltage(self) -> float:
         """Voltage at which the stage had settled before the first sample [V]."""
         return float(self.voltage[0]) if self.initial_voltage is None else float(self.initial_voltage)
@@ -137,7 +137,7 @@ class Record:
         return self.with_channels(lambda c: c[start:stop], start_time=begin, continues=self.continues or start > 0)
 
     def with_channels(self, change: Callable[[Samples], Samples], **fields: Any) -> Record:
-        """Every channel that is there changed alike, and the other fields given replaced.
+        """Voltage, displacement and every other channel changed alike, and the other fields given replaced.
 
         Parameters
         ----------
@@ -151,8 +151,12 @@ class Record:
         >>> Record([0.0, 1.0], [0.0, 2e-6], 1e-3).with_channels(np.flip, phase="backwards").voltage.tolist()
         [1.0, 0.0]
         """
-        given = {name: channel for name in CHANNELS if (channel := getattr(self, name)) is not None}
-        return replace(self, **{**{name: change(channel) for name, channel in given.items()}, **fields})
+        changed: dict[str, Any] = {
+            "voltage": change(self.voltage),
+            "displacement": change(self.displacement),
+            "channels": {name: change(values) for name, values in self.channels.items()},
+        }
+        return replace(self, **(changed | fields))
 
     def split(self, *boundaries: int) -> tuple[Record, ...]:
         """Cut at the given sample indices; every part but the first continues the one before it."""

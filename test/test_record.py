@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,7 +24,9 @@ U, Y = np.linspace(0.0, 5.0, 12), np.linspace(0.0, 1e-5, 12)
         (lambda: Record([0.0, np.nan], [0.0, 0.0], 1e-3), "voltage: sample 1 is nan, expected finite"),
         (lambda: Record([0.0, 1.0], [0.0, np.inf], 1e-3), "displacement: sample 1 is inf, expected finite"),
         (lambda: Record([0.0, 1.0], [0.0], 1e-3), "displacement.*2"),
-        (lambda: Record([0.0], [0.0], 1e-3, temperature=[np.nan]), "temperature: sample 0 is nan, expected finite"),
+        (lambda: Record([0.0], [0.0], 1e-3, channels={"temperature": [np.nan]}), "temperature: sample 0 is nan"),
+        (lambda: Record([0.0], [0.0], 1e-3, channels={"current": [1.0]}), "'current', expected one that holds"),
+        (lambda: Record([0.0], [0.0], 1e-3, channels={"voltage": [1.0]}), "channels: got the name 'voltage'"),
         (lambda: Record([0.0], [0.0], 0.0), "sample_period: got 0.0 s, expected a positive time"),
         (lambda: Record([0.0], [0.0], float("nan")), "sample_period: got nan s"),
         (lambda: Record([0.0], [0.0], 1e-3, initial_voltage=float("inf")), "initial_voltage: got inf"),
@@ -46,7 +51,7 @@ def test_a_record_cannot_be_changed():
 
 @given(st.sets(st.integers(1, 11)))
 def test_parts_put_together_are_the_record(cuts):
-    record = Record(U, Y, 1e-3, start_time=2.0, other_displacement=-Y, temperature=290.0 + Y)
+    record = Record(U, Y, 1e-3, start_time=2.0, channels={"other_displacement": -Y, "temperature": 290.0 + Y})
     parts = record.split(*sorted(cuts))
     for name in ("voltage", "displacement", "other_displacement", "temperature"):
         np.testing.assert_array_equal(np.concatenate([getattr(p, name) for p in parts]), getattr(record, name))
@@ -83,3 +88,17 @@ def test_an_array_parameter_names_the_element():
 def test_crossed_bounds_are_no_table():
     with pytest.raises(ParameterError, match="crossed"):
         Parameter("b", "b", "V", 0.0, 1.0, -1.0, "half width of the play", "play operator")
+
+
+def test_channels_are_frozen_cut_and_sent_to_other_processes():
+    record = Record(U, Y, 1e-3, channels={"displacement_3": 2 * Y, "monitor_voltage": U})
+    assert record.other_displacement is None
+    with pytest.raises(TypeError):
+        record.channels["displacement_3"] = Y
+    with pytest.raises(ValueError, match="read-only"):
+        record.channels["displacement_3"][0] = 1.0
+    for other in (pickle.loads(pickle.dumps(record)), copy.deepcopy(record)):
+        assert other.channels.keys() == record.channels.keys()
+        np.testing.assert_array_equal(other.channels["displacement_3"], 2 * Y)
+    np.testing.assert_array_equal(record[2:5].channels["monitor_voltage"], U[2:5])
+    np.testing.assert_array_equal(record.decimate(2).channels["displacement_3"], record.decimate(2).displacement * 2)

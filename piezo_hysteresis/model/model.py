@@ -27,12 +27,6 @@ def _place(effect: Effect) -> tuple[int, int]:
     return int(effect.place), CHAIN.index(type(effect)) if type(effect) in CHAIN else len(CHAIN)
 
 
-def channels_of(record: Record) -> Channels:
-    """The extra channels of a record, by name."""
-    named = {"other_displacement": record.other_displacement, "temperature": record.temperature}
-    return {name: values for name, values in named.items() if values is not None}
-
-
 @dataclass(frozen=True, eq=False)
 class Model:
     """Effects in the order of physics; frozen, ``with_…`` returns a new one.
@@ -220,7 +214,7 @@ class Model:
                 state = chain.rest(record.settled_voltage, record.start_time)
             elif before is not chain:
                 state = chain.resume(state)
-            y, state = chain.run(record.voltage, state, channels_of(record))
+            y, state = chain.run(record.voltage, state, record.channels)
             if index is not None:
                 outputs.append(y)
         return outputs
@@ -255,10 +249,9 @@ class Model:
             elif before is not chain:
                 tangent = chain.resume_tangent(state, tangent)
                 state = chain.resume(state)
-            channels = channels_of(record)
             for start in range(0, record.size, block):
                 part = slice(start, min(start + block, record.size))
-                now, u = chain.channels_in(channels, part), record.voltage[part].copy()
+                now, u = chain.channels_in(record.channels, part), record.voltage[part].copy()
                 y, names, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
                 if index is not None:
                     yield index, part, y, names, slopes

@@ -50,8 +50,8 @@ class ReplayStage:
             )
         self._applied = np.concatenate([r.voltage for r in self._records])
         self._measured = np.concatenate([r.displacement for r in self._records])
-        self._other = _channel([r.other_displacement for r in self._records])
-        self._temperature = _channel([r.temperature for r in self._records])
+        shared = [name for name in self._records[0].channels if all(name in r.channels for r in self._records)]
+        self._channels = {name: np.concatenate([r.channels[name] for r in self._records]) for name in shared}
         self._repeat, self._position, self._closed = repeat, 0, False
         low, high = float(self._applied.min()), float(self._applied.max())
         self._description = Description(
@@ -112,10 +112,8 @@ class ReplayStage:
         end = self._position + count
         self._position = (end - 1) % total + 1 if self._repeat else min(end, total)
 
-        def taken(channel: Samples | None) -> Samples | None:
-            return None if channel is None else channel[index]
-
-        return Acquired(self._applied[index], self._measured[index], taken(self._other), taken(self._temperature))
+        others = {name: values[index] for name, values in self._channels.items()}
+        return Acquired(self._applied[index], self._measured[index], others)
 
     def set_voltage(self, voltage: float) -> None:
         """Ignored: a recording cannot be driven."""
@@ -141,8 +139,3 @@ class ReplayStage:
     def _require_open(self) -> None:
         if self._closed:
             raise StageError(f"{self._description.name}: is closed, expected an open stage; make a new one")
-
-
-def _channel(parts: list[Samples | None]) -> Samples | None:
-    present = [p for p in parts if p is not None]
-    return np.concatenate(present) if len(present) == len(parts) else None

@@ -160,8 +160,7 @@ class Simulation:
             time_before,
             continues=continues,
             initial_voltage=settled,
-            other_displacement=reading.other_displacement,
-            temperature=reading.temperature,
+            channels=reading.channels,
         )
         return record.decimate(average) if average > 1 else record
 

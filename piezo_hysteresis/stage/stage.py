@@ -8,9 +8,11 @@ voltages before the amplifier; a back end that measures behind it divides by `De
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
+from ..channels import ChannelMapping
 from .description import Description, Samples
 
 __all__ = ["Acquired", "Description", "MemoryStage", "Samples", "Stage", "StreamingStage"]
@@ -26,16 +28,13 @@ class Acquired:
         Drive voltage really applied [V].
     displacement : (n,) ndarray
         Measured displacement [m].
-    other_displacement : (n,) ndarray, optional
-        Displacement of the coupled axis [m].
-    temperature : (n,) ndarray, optional
-        Stage temperature [K].
+    channels : mapping of str to (n,) ndarray, optional
+        What else was measured, as in `Record.channels`.
     """
 
     voltage: Samples
     displacement: Samples
-    other_displacement: Samples | None = None
-    temperature: Samples | None = None
+    channels: Mapping[str, Samples] = field(default_factory=ChannelMapping)
 
 
 class Stage(Protocol):

@@ -51,10 +51,10 @@ def test_channels_add_what_they_should_and_nothing_where_they_are_missing() -> N
     other, temperature = 1e-5 * np.cos(np.arange(300) / 9.0), 293.15 + np.linspace(0.0, 2.0, 300)
     coupling, expansion = AxisCoupling(kappa0=0.01, kappa1=50.0), Expansion(kappa=2e-7)
     np.testing.assert_allclose(
-        added(coupling, record(other_displacement=other)), (0.01 + 50 * other) * other, atol=1e-18
+        added(coupling, record(channels={"other_displacement": other})), (0.01 + 50 * other) * other, atol=1e-18
     )
     np.testing.assert_allclose(
-        added(expansion, record(temperature=temperature)), 2e-7 * (temperature - 293.15), atol=1e-18
+        added(expansion, record(channels={"temperature": temperature})), 2e-7 * (temperature - 293.15), atol=1e-18
     )
     for effect in (coupling, expansion):
         np.testing.assert_array_equal(added(effect, record()), 0.0)

@@ -84,8 +84,12 @@ def test_optional_channels_and_flags_come_back(tmp_path, name):
             "noise",
             start_time=k * 50 * 2e-5,
             truncated=k == 0,
-            other_displacement=random.normal(size=50),
-            temperature=random.normal(size=50) + 293.0,
+            channels={
+                "other_displacement": random.normal(size=50),
+                "temperature": random.normal(size=50) + 293.0,
+                "displacement_3": random.normal(size=50),
+                "monitor_voltage": random.normal(size=50),
+            },
         )
         for k in range(3)
     )
@@ -93,8 +97,11 @@ def test_optional_channels_and_flags_come_back(tmp_path, name):
     got = read(tmp_path / name)
     assert_same(got, records)
     for a, b in zip(got, records, strict=True):
-        np.testing.assert_array_equal(a.other_displacement, b.other_displacement)
-        np.testing.assert_array_equal(a.temperature, b.temperature)
+        assert a.channels.keys() == b.channels.keys()
+        for name, values in b.channels.items():
+            np.testing.assert_array_equal(a.channels[name], values)
+        np.testing.assert_array_equal(a.other_displacement, b.channels["other_displacement"])
+        np.testing.assert_array_equal(a.temperature, b.channels["temperature"])
 
 
 def test_phases_are_averaged_on_reading_where_asked(tmp_path):
@@ -103,3 +110,23 @@ def test_phases_are_averaged_on_reading_where_asked(tmp_path):
     (slow,) = read(tmp_path / "e", decimate={"rest": 10})
     assert (slow.size, slow.sample_period, slow.initial_voltage) == (10, 0.01, 7.0)
     np.testing.assert_array_equal(slow.voltage, np.arange(10) * 10 + 4.5)
+
+
+def test_a_bag_carries_a_third_axis(tmp_path):
+    voltage = 3.5 + 2.5 * np.sin(2 * np.pi * 10 * np.arange(400) * 1e-3)
+    third = {"displacement_3": 1e-7 * voltage, "temperature": 293.0 + 0.1 * voltage}
+    record = Record(voltage, 1e-6 * voltage, 1e-3, "sine_10hz", channels=third)
+    write(Experiment((record,)), tmp_path / "bag.mcap")
+    (got,) = read(tmp_path / "bag")
+    assert set(got.channels) == set(third)
+    for name, values in third.items():
+        np.testing.assert_array_equal(got.channels[name], values)
+
+
+def test_a_third_axis_of_a_foreign_table_is_named_by_a_column(tmp_path):
+    rows = np.column_stack((np.arange(400) * 1e-3, np.sin(np.arange(400.0)), np.arange(400.0), np.arange(400.0) / 7))
+    np.savetxt(
+        tmp_path / "t.csv", rows, delimiter=",", header="Time [s],Drive [V],Sensor [um],Axis 3 [nm]", comments=""
+    )
+    (got,) = read(tmp_path / "t.csv", columns={"displacement_3": "Axis 3 [nm]"}, phases="x")
+    np.testing.assert_allclose(got.channels["displacement_3"], rows[:, 3] * 1e-9, rtol=1e-12)

@@ -80,10 +80,10 @@ def test_thermal_drift_depends_on_absolute_time_only(ideal):
     drive = 5 + 5 * np.sin(t)
     np.testing.assert_allclose(difference(warm, ideal(), drive, 1e-3, 5.0), 0.5e-6 * expected, atol=1e-15)
     plant = Plant(warm, 1e-3)
-    temperature = plant.run(np.zeros(4000)).temperature
+    temperature = plant.run(np.zeros(4000)).channels["temperature"]
     np.testing.assert_allclose(temperature, 293.15 + expected, rtol=1e-12)
     plant.settle(3.0)
-    assert plant.run(np.zeros(1)).temperature[0] > temperature[-1], "settling does not cool the stage"
+    assert plant.run(np.zeros(1)).channels["temperature"][0] > temperature[-1], "settling does not cool the stage"
 
 
 def test_gain_drift_is_proportional_to_the_reading(ideal):
@@ -108,9 +108,11 @@ def test_the_other_axis_moves_by_itself_and_couples(ideal):
     drive = 5 + 5 * np.sin(0.01 * np.arange(5000))
     reading = Plant(coupled, TS, seed=2).run(drive)
     own = Plant(ideal(), TS).run(drive)
-    np.testing.assert_allclose(reading.displacement - own.displacement, 0.01 * reading.other_displacement, atol=1e-15)
-    assert np.ptp(reading.other_displacement) > 1e-6
-    assert own.other_displacement is None
+    np.testing.assert_allclose(
+        reading.displacement - own.displacement, 0.01 * reading.channels["other_displacement"], atol=1e-15
+    )
+    assert np.ptp(reading.channels["other_displacement"]) > 1e-6
+    assert "other_displacement" not in own.channels
 
 
 def test_slew_limit_bounds_the_slope_and_lets_slower_drives_pass(ideal):

@@ -67,11 +67,13 @@ def test_driving_a_recording_changes_nothing():
 
 
 def test_channels_are_replayed_where_every_record_has_them():
-    full = Record(VOLTAGE, DISPLACEMENT, 1e-3, other_displacement=2 * DISPLACEMENT, temperature=VOLTAGE + 290)
+    full = Record(
+        VOLTAGE, DISPLACEMENT, 1e-3, channels={"other_displacement": 2 * DISPLACEMENT, "temperature": VOLTAGE + 290}
+    )
     got = ReplayStage([full]).exchange(np.zeros(10))
-    np.testing.assert_array_equal(got.other_displacement, 2 * DISPLACEMENT[:10])
-    np.testing.assert_array_equal(got.temperature, VOLTAGE[:10] + 290)
-    assert ReplayStage([full, RECORDS[0]]).exchange(np.zeros(10)).temperature is None
+    np.testing.assert_array_equal(got.channels["other_displacement"], 2 * DISPLACEMENT[:10])
+    np.testing.assert_array_equal(got.channels["temperature"], VOLTAGE[:10] + 290)
+    assert ReplayStage([full, RECORDS[0]]).exchange(np.zeros(10)).channels == {}
 
 
 def test_recordings_that_cannot_be_replayed_in_one_go_are_refused():

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import periodogram
 from scipy.signal.windows import hann
 
+from ...channels import quantity_of
 from ...identification.records.excitation_content import noise_on_motion
 from ...record import Record
 
@@ -73,8 +74,8 @@ def _scatter(record: Record, period: int, first: int) -> float:
     steps = y[period:] - y[:-period]
     # a period that is no whole number of samples leaves a little of the drive; the other axis need not repeat
     rest = record.voltage[first + period :] - record.voltage[first:-period]
-    other = record.other_displacement
-    seen = [] if other is None else [other[first + period :] - other[first:-period]]
+    others = [values for name, values in record.channels.items() if quantity_of(name) == "displacement"]
+    seen = [other[first + period :] - other[first:-period] for other in others]
     t = record.sample_period * np.arange(steps.size)
     lines = [f for base in MAINS for f in (base, 2 * base, 3 * base) if f * record.sample_period < 0.45]
     hum = [wave(2 * np.pi * f * t) for f in lines for wave in (np.cos, np.sin)]

@@ -14,7 +14,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2
 
 from ...errors import RecordError
-from .cloud import from_cloud, point_type, stored_as, to_cloud, unpacked
+from ...point_cloud import point_type, stored_as, unpacked
+from .cloud import from_cloud, to_cloud
 
 _STAMP = struct.Struct("=iI")
 _STAMP_AT = 4

@@ -11,24 +11,20 @@ from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from ...errors import RecordingError
-from ...record import CHANNELS, Samples
+from ...channels import quantity_of
+from ...point_cloud import packed, point_layout, stored_as, unpacked
+from ...record import Samples
 
 TYPE = "sensor_msgs/msg/PointCloud2"
 
-FIELDS = np.dtype(
-    {
-        "names": ["time", "voltage", "displacement", "index", "phase"],
-        "formats": ["<f8", "<f8", "<f8", "<u4", "<u4"],
-        "offsets": [0, 8, 16, 24, 28],
-        "itemsize": 32,
-    }
-)
-"""Layout of one sample: time [s from the stamp], voltage [V], displacement [m], running index, phase number."""
+FIELDS = {"time": "f8", "voltage": "f8", "displacement": "f8", "index": "u4", "phase": "u4"}
+"""Point of `samples`: time [s from the stamp], voltage [V], displacement [m], running index, phase number."""
 
-_KINDS = dict.fromkeys((*CHANNELS, "time"), "f8") | {"index": "u4", "phase": "u4"}
-_DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-_UINT32, _FLOAT64 = 6, 8
+_REQUIRED = {"voltage": "f8", "displacement": "f8"}
+"""Fields without which a block is none."""
+
+_OPTIONAL = {name: FIELDS[name] for name in ("time", "index", "phase")}
+"""Fields that a block may lack."""
 
 
 @functools.cache
@@ -46,7 +42,7 @@ class BlockMessage:
     stamp_ns : int
         Time from which `time` counts [ns].
     channels : dict of str to (n,) ndarray
-        `voltage` [V], `displacement` [m], and where there are such fields `other_displacement` [m], `temperature` [K].
+        `voltage` [V], `displacement` [m], and where there are such fields what `Record.channels` may hold.
     phase : (n,) ndarray of uint32
         Phase number of every sample; zeros where the message has none.
     time : (n,) ndarray, optional
@@ -76,54 +72,39 @@ class BlockMessage:
 
         Raises
         ------
-        RecordingError
-            If the message has no voltage and displacement, or fewer bytes than it declares.
+        RecordError
+            If the message has no voltage and displacement, or another number of bytes than it declares.
         """
         message: Any = typestore().deserialize_cdr(raw, TYPE)
-        rows, step = int(message.width) * int(message.height), int(message.point_step)
-        if rows == 0 or step == 0 or rows * step > message.data.size:
-            raise RecordingError(f"block of {rows} samples with {step} bytes each has {message.data.size} bytes")
-        fields = {field.name: field for field in message.fields if field.name in _KINDS}
-        if "voltage" not in fields or "displacement" not in fields:
-            names = ", ".join(field.name for field in message.fields)
-            raise RecordingError(f"block has the fields {names}, expected voltage and displacement")
-        layout = np.dtype(
-            {
-                "names": list(fields),
-                "formats": [(">" if message.is_bigendian else "<") + _DATATYPES[f.datatype] for f in fields.values()],
-                "offsets": [f.offset for f in fields.values()],
-                "itemsize": step,
-            }
-        )
-        cloud = np.frombuffer(message.data, layout, rows)
-        columns: dict[str, NDArray[Any]] = {name: cloud[name].astype(_KINDS[name]) for name in fields}
+        others = {field.name: "f8" for field in message.fields if quantity_of(field.name)}
+        dtype, wanted = stored_as(message, _REQUIRED, others | _OPTIONAL)
+        columns = unpacked(message.data, dtype, wanted, finite=False)
         return cls(
             int(message.header.stamp.sec) * 1_000_000_000 + int(message.header.stamp.nanosec),
-            {name: columns[name] for name in CHANNELS if name in columns},
-            columns["phase"] if "phase" in columns else np.zeros(rows, np.uint32),
+            {name: columns[name] for name in (*_REQUIRED, *(others.keys() - _REQUIRED.keys()))},
+            columns["phase"] if "phase" in columns else np.zeros(columns["voltage"].size, np.uint32),
             columns.get("time"),
             columns.get("index"),
             not message.is_dense,
         )
 
     def to_cdr(self, frame_id: str = "") -> bytes:
-        """Serialised PointCloud2 of `FIELDS`, as the driver publishes it."""
-        samples = np.zeros(self.phase.size, FIELDS)
-        samples["voltage"], samples["displacement"] = self.channels["voltage"], self.channels["displacement"]
-        samples["phase"] = self.phase
-        for name in ("time", "index"):
-            values = getattr(self, name)
-            samples[name] = 0 if values is None else values
+        """Serialised PointCloud2 of `FIELDS`, as the driver publishes it, and of the other channels behind them."""
+        none = np.zeros(self.phase.size, np.uint32)
+        numbers: dict[str, Any] = {
+            "time": none if self.time is None else self.time,
+            "index": none if self.index is None else self.index,
+            "phase": self.phase,
+        }
+        layout = FIELDS | dict.fromkeys(sorted(self.channels.keys() - _REQUIRED.keys()), "f8")
+        points = packed(self.channels | numbers, layout)
         kinds = typestore().types
         stamp = kinds["builtin_interfaces/msg/Time"](*divmod(self.stamp_ns, 1_000_000_000))
         field = kinds["sensor_msgs/msg/PointField"]
-        fields = [
-            field(name, int(at), _FLOAT64 if kind == np.float64 else _UINT32, 1)
-            for name, (kind, at, *_) in (FIELDS.fields or {}).items()
-        ]
-        data = np.frombuffer(samples.tobytes(), np.uint8)
+        fields = [field(name, offset, datatype, 1) for name, offset, datatype in point_layout(layout)]
+        data = points.view(np.uint8)
         cloud = kinds[TYPE](
             kinds["std_msgs/msg/Header"](stamp, frame_id),
-            1, samples.size, fields, False, FIELDS.itemsize, data.size, data, not self.follows_pause,
+            1, points.size, fields, False, points.itemsize, data.size, data, not self.follows_pause,
         )  # fmt: skip
         return bytes(typestore().serialize_cdr(cloud, TYPE))

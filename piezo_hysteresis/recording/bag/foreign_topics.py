@@ -17,7 +17,7 @@ from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer, averaged_notice
 from ..segmentation.phases import labelled
 from ..table.column import Column
-from ..table.read_options import CHANNELS, ReadOptions
+from ..table.read_options import ReadOptions, is_channel
 from ..table.time_column import TimeColumn
 from .bag import Bag
 
@@ -82,7 +82,7 @@ def read_topics(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Notic
     places = {
         name: TopicField.parse(str(text))
         for name, text in layout.columns.items()
-        if name in CHANNELS and name != "time"
+        if is_channel(name) and name != "time"
     }
     if not {"voltage", "displacement"} <= places.keys():
         raise RecordingError(f"columns: got {', '.join(layout.columns)}, expected voltage and displacement")

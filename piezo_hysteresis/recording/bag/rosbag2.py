@@ -63,7 +63,7 @@ class Rosbag2:
         """Write the records as the driver would send them, in blocks of 10 ms, to the folder `path` without its ending.
 
         A record that does not continue the one before it is preceded by one idle sample at its settled voltage, as from
-        a driver that was started again. Other channels than voltage and displacement are not written.
+        a driver that was started again. Other channels follow as further fields of the samples.
 
         Raises
         ------
@@ -241,12 +241,13 @@ def _name(stretch: Segment, names: PhaseNames, notices: list[Notice]) -> str:
 def _write_blocks(bag: BagWriter, record: Record, number: int, clock_ns: int, index: int) -> tuple[int, int]:
     """Send one record; return the time and the index behind it."""
     longest = max(1, round(_BLOCK_DURATION / record.sample_period))
+    channels = {"voltage": record.voltage, "displacement": record.displacement, **record.channels}
     for a in range(0, record.size, longest):
         part = slice(a, a + longest)
         n = record.voltage[part].size
         block = BlockMessage(
             clock_ns,
-            {"voltage": record.voltage[part], "displacement": record.displacement[part]},
+            {name: values[part] for name, values in channels.items()},
             np.full(n, number, np.uint32),
             np.asarray(np.arange(n) * record.sample_period),
             (index + a + np.arange(n)).astype(np.uint32),

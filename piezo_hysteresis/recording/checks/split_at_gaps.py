@@ -44,8 +44,8 @@ def split_at_gaps(
     Parameters
     ----------
     channels : mapping of str to (n,) ndarray
-        `voltage` [V] and `displacement` [m], NaN or infinite where nothing was measured; `other_displacement` [m] and
-        `temperature` [K] are optional and left out where they have holes.
+        `voltage` [V] and `displacement` [m], NaN or infinite where nothing was measured; others, as in
+        `Record.channels`, are left out where they have holes.
     sample_period : float
         Time between samples [s].
     breaks : mapping of int to int, optional
@@ -111,8 +111,10 @@ def split_at_gaps(
                 "initial_voltage": None,
             }
         start = begin + (a + int(missing[np.searchsorted(edges, a, "right")])) * sample_period
-        part: dict[str, Any] = {name: values[a:b] for name, values in kept.items()} | labels
-        records.append(Record(voltage[a:b], displacement[a:b], sample_period, start_time=start, **part))
+        others = {name: values[a:b] for name, values in kept.items()}
+        records.append(
+            Record(voltage[a:b], displacement[a:b], sample_period, start_time=start, channels=others, **labels)
+        )
     return records, notices
 
 

@@ -6,11 +6,12 @@ import io
 from csv import writer
 from pathlib import Path
 
+from ...channels import QUANTITIES, quantity_of
 from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
-from ..table.read_options import CHANNELS, LABELS, ReadOptions
+from ..table.read_options import LABELS, ReadOptions, is_channel
 from ..table.table import resolve, table_records
 from ..table.text_cells import Dialect, read_cells
 from ..table.time_column import TimeColumn
@@ -27,7 +28,8 @@ class Csv:
 
     Written with the header ``time_s,voltage_V,displacement_m,phase`` and, only where the records need them, the columns
     `record` (between neighbours of one name), `continues`, `truncated`, `initial_voltage_V`, `sample_period_s`,
-    `other_displacement_m` and `temperature_K`. Numbers are written in full, so that reading gives the same ones.
+    those of `Record.channels` with their unit, e.g. `other_displacement_m` and `temperature_K`. Numbers are written in
+    full, so that reading gives the same ones.
     """
 
     def recognises(self, path: Path) -> bool:
@@ -40,7 +42,7 @@ class Csv:
             dialect = Dialect.sniff(path)
             found = resolve(dialect.header, dialect.width, layout)
             places = found.columns
-            numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
+            numbers = {name: at for name, (at, _) in places.items() if is_channel(name)}
             words = {name: at for name, (at, _) in places.items() if name in LABELS}
             cells = read_cells(path, dialect, numbers, words, layout)
             channels = {name: layout.in_si(name, values, places[name][1]) for name, values in cells.columns.items()}
@@ -67,9 +69,9 @@ class Csv:
             if path.exists():
                 raise RecordingError("exists already; choose another name")
             labels = _labels(experiment)
-            channels = [c for c in CHANNELS[3:] if all(getattr(r, c) is not None for r in experiment)]
+            channels = [c for c in experiment[0].channels if all(c in r.channels for r in experiment)]
             with path.open("w", encoding="utf-8", newline="") as file:
-                titles = [f"{c}_{'m' if 'displacement' in c else 'K'}" for c in channels]
+                titles = [f"{c}_{QUANTITIES[quantity_of(c) or c]}" for c in channels]
                 units = {"initial_voltage": "initial_voltage_V", "sample_period": "sample_period_s"}
                 titles += [units.get(name, name) for name in labels]
                 file.write(",".join(["time_s", "voltage_V", "displacement_m", *titles]) + "\n")
@@ -120,7 +122,7 @@ def _row_end(number: int, record: Record, labels: list[str]) -> str:
 
 
 def _write_record(file: io.TextIOBase, record: Record, channels: list[str], end: str) -> None:
-    columns = [record.time, record.voltage, record.displacement, *(getattr(record, c) for c in channels)]
+    columns = [record.time, record.voltage, record.displacement, *(record.channels[c] for c in channels)]
     for a in range(0, record.size, _ROWS):
         rows = zip(*(column[a : a + _ROWS].tolist() for column in columns), strict=True)
         file.write("".join(",".join(map(repr, row)) + "," + end for row in rows))

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from ...channels import quantity_of
 from ...errors import RecordingError
 from ...record import Experiment, Notice
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
-from ..table.read_options import CHANNELS, ReadOptions
+from ..table.read_options import ReadOptions, is_channel
 from ..table.table import resolve, table_records
 from ..table.text_cells import BLOCK_BYTES, Dialect, decoded, read_cells
 
@@ -43,10 +44,12 @@ class GcsArrayFormat:
             places = resolve(titles, width, ReadOptions(columns=columns, sample_period=1.0)).columns
             separator = int(header.get("SEPARATOR", "32"))
             dialect = Dialect(None if separator in (9, 32) else chr(separator), False, skipped, (), width)
-            numbers = {name: at for name, (at, _) in places.items() if name in CHANNELS}
+            numbers = {name: at for name, (at, _) in places.items() if is_channel(name)}
             cells = read_cells(path, dialect, numbers, {}, layout)
-            units = {"voltage": "V", "displacement": "um", "other_displacement": "um", "time": "s"}
-            channels = {name: layout.in_si(name, column, units.get(name)) for name, column in cells.columns.items()}
+            channels = {
+                name: layout.in_si(name, column, "um" if quantity_of(name) == "displacement" else None)
+                for name, column in cells.columns.items()
+            }
             period = layout.sample_period or float(header.get("SAMPLE_TIME", "nan"))
             rest = layout.with_period(period if period > 0 else None).after_reading(cells.average)
             records, notices = table_records(channels, [], rest, truncated=layout.passes_over)

@@ -14,7 +14,7 @@ from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import DecimatingBuffer, averaged_notice
 from ..table.column_inference import inference_notice, inferred_columns, inferred_period, unit_in
-from ..table.read_options import CHANNELS, LABELS, ReadOptions
+from ..table.read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from ..table.table import table_records
 from .hdf5_variables import Hdf5Variables, is_hdf5
 from .mat5_variables import Mat5Variables
@@ -61,7 +61,8 @@ class Mat:
         structs = {}
         for number, record in enumerate(experiment, 1):
             fields: dict[str, Any] = {"voltage": record.voltage, "displacement": record.displacement}
-            for name in (*CHANNELS[3:], *LABELS):
+            fields |= record.channels
+            for name in LABELS:
                 value = getattr(record, name, None)
                 if value is not None:
                     fields[name] = value
@@ -75,7 +76,9 @@ class Mat:
 def _records(
     variables: MatVariables, prefix: str, layout: ReadOptions, before: Sequence[Record]
 ) -> tuple[list[Record], list[Notice]]:
-    given = {c: str(layout.columns.get(c, prefix + c)) for c in (*CHANNELS, *LABELS)}
+    fields = [name.removeprefix(prefix) for name in variables if name.startswith(prefix)]
+    others = [name for name in (*fields, *layout.columns) if is_channel(name)]
+    given = {c: str(layout.columns.get(c, prefix + c)) for c in (*CHANNELS, *others, *LABELS)}
     places = {c: place for c, place in given.items() if c in layout.columns or place in variables}
     labels = {name: _label(variables[places[name]], places[name]) for name in LABELS if name in places}
     if layout.sample_period is None and "sample_period" not in places and (found := inferred_period(variables)):
@@ -89,8 +92,8 @@ def _records(
     for channel in ("voltage", "displacement"):
         if channel not in places:
             raise RecordingError(f"got {_listed(variables)}, expected {given[channel]}; name it by columns")
-    units = {c: unit_in(place, c) for c, place in places.items() if c in CHANNELS}
-    intakes = {c: _channel(variables, places[c], layout) for c in CHANNELS if c in places}
+    units = {c: unit_in(place, c) for c, place in places.items() if is_channel(c)}
+    intakes = {c: _channel(variables, places[c], layout) for c in units}
     columns = {c: layout.in_si(c, intake.column(0), units[c]) for c, intake in intakes.items()}
     sizes = {name: values.size for name, values in columns.items()}
     if len(set(sizes.values())) > 1:

@@ -17,7 +17,7 @@ from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.decimating_buffer import averaged_notice, shared_averages
 from ..segmentation.phases import labelled
 from ..table.column_inference import inference_notice, inferred_columns, inferred_period, unit_in
-from ..table.read_options import CHANNELS, LABELS, ReadOptions
+from ..table.read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from ..table.time_column import TimeColumn
 from .npz_members import NpzMembers
 
@@ -29,8 +29,9 @@ class Npz:
     """Folder of ``NN_<phase>.npz`` files, or one such file.
 
     Keys `voltage` [V], `displacement` [m], `sample_period` [s], `start_time` [s] and `phase`; optional `continues`,
-    `truncated`, `initial_voltage` [V], `other_displacement` [m], `temperature` [K]. Other keys are ignored, unless
-    `ReadOptions.columns` names them for a channel. Pickled objects are refused.
+    `truncated`, `initial_voltage` [V], and further channels as in `Record.channels`, e.g. `other_displacement` [m],
+    `temperature` [K], `displacement_3` [m]. Other keys are ignored, unless `ReadOptions.columns` names them for a
+    channel. Pickled objects are refused.
     """
 
     def recognises(self, path: Path) -> bool:
@@ -82,11 +83,13 @@ class Npz:
 
 def _places(values: NpzMembers, layout: ReadOptions) -> tuple[dict[str, str], dict[str, str]]:
     """Channel or label to the key that holds it, and those of them that were inferred_columns."""
-    place = {name: str(layout.columns.get(name, name)) for name in (*CHANNELS, *LABELS)}
+    place = {name: str(layout.columns.get(name, name)) for name in (*CHANNELS, *layout.columns, *LABELS)}
     open_ = [c for c in ("voltage", "displacement") if c not in layout.columns and c not in values]
     names = [name for name in values if name not in place.values()]
     guess = {c: names[at] for c, at in inferred_columns(names, (), open_).items()}
-    return place | guess, guess
+    place |= guess
+    others = {name: name for name in values if is_channel(name) and name not in (*place, *place.values())}
+    return others | place, guess
 
 
 def _size(file: Path, layout: ReadOptions) -> int:
@@ -102,7 +105,7 @@ def _phase(file: Path, layout: ReadOptions, average: int, end: float) -> tuple[l
     with zipfile.ZipFile(file) as archive:
         values = NpzMembers(archive, file.stat().st_size)
         place, guess = _places(values, layout)
-        units = {c: unit_in(name, c) for c, name in place.items() if c in CHANNELS}
+        units = {c: unit_in(name, c) for c, name in place.items() if is_channel(c)}
         part = layout.part(values.size(place["voltage"]))
 
         def channel(name: str) -> Samples:
@@ -112,10 +115,11 @@ def _phase(file: Path, layout: ReadOptions, average: int, end: float) -> tuple[l
             return values.number(place[name]) if place[name] in values else default
 
         period, breaks, told = _time_base(values, place, layout, lambda: channel("time"), average)
-        optional = [name for name in ("other_displacement", "temperature") if place[name] in values]
+        size = values.size(place["voltage"])
+        others = [c for c in units if c not in CHANNELS and (c in layout.columns or values.size(place[c]) == size)]
         named = place["phase"] in values or _NUMBERED.match(file.name)
         records, notices = split_at_gaps(
-            {name: channel(name) for name in ("voltage", "displacement", *optional)},
+            {name: channel(name) for name in ("voltage", "displacement", *others)},
             period,
             breaks,
             phase=values.text(place["phase"], _NUMBERED.sub("", file.stem)),
@@ -160,8 +164,9 @@ def _keys(record: Record) -> dict[str, Any]:
         "phase": record.phase,
     }
     keys |= {name: True for name in ("continues", "truncated") if getattr(record, name)}
-    optional = ("initial_voltage", "other_displacement", "temperature")
-    return keys | {name: getattr(record, name) for name in optional if getattr(record, name) is not None}
+    if record.initial_voltage is not None:
+        keys["initial_voltage"] = record.initial_voltage
+    return keys | dict(record.channels)
 
 
 def _order(file: Path) -> tuple[float, str]:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from ...record import Notice
-from .units import UNITS, plain
+from .units import plain, units_of
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$|[\s_,/:]\s*([^\s_,/:\[\]()]+)\s*$")
 _WORDS = {
@@ -27,7 +27,7 @@ def unit_in(title: str, channel: str) -> str | None:
     """
     match = _UNIT.search(title.strip().strip('#"'))
     unit = plain(match[1] or match[2] or "") if match else ""
-    return unit if unit in UNITS.get(channel, {}) else None
+    return unit if unit in units_of(channel) else None
 
 
 def inferred_columns(names: Sequence[str], taken: Iterable[int], wanted: Iterable[str]) -> dict[str, int]:

@@ -8,17 +8,28 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...channels import quantity_of
 from ...errors import RecordingError
 from ...record import Samples
 from .units import si_factor
 
-CHANNELS = ("time", "voltage", "displacement", "other_displacement", "temperature")
-"""What a column of numbers can be."""
+CHANNELS = ("time", "voltage", "displacement")
+"""What a recording must hold, unless its sample period is given; `is_channel` tells what it may hold besides."""
 
 LABELS = ("phase", "record", "continues", "truncated", "initial_voltage", "sample_period", "start_time")
 """What is constant within a record."""
 
 Column = str | int
+"""Title or name of a column, or its number from 1."""
+
+
+def is_channel(name: str) -> bool:
+    """True for the name of a column of numbers: ``time``, or one that holds a quantity (`quantity_of`).
+
+    >>> is_channel("other_displacement"), is_channel("monitor_voltage"), is_channel("initial_voltage")
+    (True, True, False)
+    """
+    return name == "time" or quantity_of(name) is not None
 
 
 @dataclass(frozen=True)
@@ -30,7 +41,7 @@ class ReadOptions:
     axis : str, optional
         Namespace of one stage in a bag that holds several, e.g. ``"/stage_x"``.
     columns : mapping of str to str or int
-        Channel (one of `CHANNELS`) or label (one of `LABELS`) to its place: a column number counted from 1, the name of
+        Channel (see `is_channel`) or label (one of `LABELS`) to its place: a column number counted from 1, the name of
         a column, key or variable, or ``/topic.field[element]`` in a bag.
     units : mapping of str to str or float
         Channel to its unit (``um``, ``nm``, ``mV``, ``ms``, …) or to the SI value of one count.
@@ -66,10 +77,12 @@ class ReadOptions:
     average: int | None = None
 
     def __post_init__(self) -> None:
-        known = (*CHANNELS, *LABELS)
         for name in (*self.columns, *self.units):
-            if name not in known:
-                raise RecordingError(f"columns: got channel '{name}', expected one of {', '.join(known)}")
+            if not (is_channel(name) or name in LABELS):
+                raise RecordingError(
+                    f"columns: got channel '{name}', expected one of {', '.join((*CHANNELS, *LABELS))}, "
+                    "or another name with voltage, displacement or temperature in it, e.g. displacement_2"
+                )
         for name, unit in self.units.items():
             si_factor(name, unit)
         if self.sample_period is not None and not (math.isfinite(self.sample_period) and self.sample_period > 0):

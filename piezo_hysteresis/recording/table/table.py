@@ -6,14 +6,15 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from ...channels import QUANTITIES
 from ...errors import RecordingError
 from ...record import Notice, Record, Samples
 from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.phases import labelled
 from .column_inference import inference_notice, inferred_columns, unit_in
-from .read_options import LABELS, ReadOptions
+from .read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from .time_column import TimeColumn
-from .units import UNITS, plain
+from .units import plain, units_of
 
 Mark = tuple[int, Mapping[str, str]]
 """First row of a record and its labels."""
@@ -29,7 +30,7 @@ def named_column(title: str) -> tuple[str, str | None]:
     for separator in ("[", "(", " ", "_"):
         channel, _, unit = name.rpartition(separator) if separator == "_" else name.partition(separator)
         channel = channel.strip().lower().replace(" ", "_")
-        if plain(unit) in UNITS.get(channel, {}):
+        if plain(unit) in units_of(channel):
             return channel, plain(unit)
     return name.lower(), None
 
@@ -70,7 +71,7 @@ def resolve(titles: Sequence[str], width: int, layout: ReadOptions) -> Places:
     parsed = [named_column(title) for title in titles]
     places: dict[str, tuple[int, str | None]] = {}
     for at, (name, unit) in enumerate(parsed):
-        if (name in UNITS or name in LABELS) and name not in places:
+        if (name in CHANNELS or name in LABELS or _is_further(titles[at], name)) and name not in places:
             places[name] = (at, unit)
     for channel, column in layout.columns.items():
         if isinstance(column, int):
@@ -93,6 +94,11 @@ def resolve(titles: Sequence[str], width: int, layout: ReadOptions) -> Places:
             )
     names = {channel: titles[at].strip() for channel, at in found.items()}
     return Places(places, inference_notice(names, {channel: places[channel][1] for channel in found}))
+
+
+def _is_further(title: str, name: str) -> bool:
+    """True for a plain quantity, and for a title as this package writes it, ``displacement_3_m``."""
+    return name in QUANTITIES or (title.strip().startswith(f"{name}_") and is_channel(name))
 
 
 def _listed(titles: Sequence[str], width: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from ...channels import quantity_of
 from ...errors import RecordingError
 
 _METRE: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "pm": 1e-12}
@@ -12,16 +13,24 @@ _VOLT: Mapping[str, float] = {"V": 1.0, "kV": 1e3, "mV": 1e-3, "uV": 1e-6}
 _SECOND: Mapping[str, float] = {"s": 1.0, "min": 60.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _KELVIN: Mapping[str, float] = {"K": 1.0, "mK": 1e-3}
 
-UNITS: Mapping[str, Mapping[str, float]] = {
+_UNITS: Mapping[str, Mapping[str, float]] = {
     "time": _SECOND,
     "sample_period": _SECOND,
-    "voltage": _VOLT,
     "initial_voltage": _VOLT,
+    "voltage": _VOLT,
     "displacement": _METRE,
-    "other_displacement": _METRE,
     "temperature": _KELVIN,
 }
-"""Channel to the units it may have, each with its SI value."""
+"""Quantity, or label, to the units it may have, each with its SI value."""
+
+
+def units_of(channel: str) -> Mapping[str, float]:
+    """Units that a channel or label may have, each with its SI value; empty for what has none.
+
+    >>> list(units_of("temperature_of_base")), dict(units_of("phase"))
+    (['K', 'mK'], {})
+    """
+    return _UNITS.get(quantity_of(channel) or channel, {})
 
 
 def plain(unit: str) -> str:
@@ -35,7 +44,7 @@ def is_unit(word: str) -> bool:
     >>> is_unit("[µm]"), is_unit("Position")
     (True, False)
     """
-    return any(plain(word) in known for known in UNITS.values())
+    return any(plain(word) in known for known in _UNITS.values())
 
 
 def si_factor(channel: str, unit: str | float) -> float:
@@ -58,7 +67,7 @@ def si_factor(channel: str, unit: str | float) -> float:
     >>> si_factor("displacement", "um"), si_factor("displacement", 2e-6)
     (1e-06, 2e-06)
     """
-    known = UNITS.get(channel, {})
+    known = units_of(channel)
     if isinstance(unit, str):
         if plain(unit) in known:
             return known[plain(unit)]

@@ -26,8 +26,8 @@ class Reading(NamedTuple):
 
     voltage: Samples
     displacement: Samples
-    other_displacement: Samples | None
-    temperature: Samples | None
+    channels: dict[str, Samples]
+    """What else is measured: ``other_displacement`` [m], ``temperature`` [K]."""
 
 
 class Plant:
@@ -109,10 +109,11 @@ class Plant:
         applied = self.parameters.electronics.convert(voltage)
         blocks = [self._run(applied[i : i + _CHUNK]) for i in range(0, applied.size, _CHUNK)]
         self._voltage = float(applied[-1])
-        displacement, other, temperature = zip(*blocks, strict=True)
-        return Reading(applied, np.concatenate(displacement), _joined(other), _joined(temperature))
+        displacements, others = zip(*blocks, strict=True)
+        channels = {name: np.concatenate([block[name] for block in others]) for name in others[0]}
+        return Reading(applied, np.concatenate(displacements), channels)
 
-    def _run(self, applied: Samples) -> tuple[Samples, Samples | None, Samples | None]:
+    def _run(self, applied: Samples) -> tuple[Samples, dict[str, Samples]]:
         e, sensor = self.parameters.environment, self.parameters.sensor
         w = self._bank.run(self._operator.run(self._amplifier.run(applied)))
         x = self._mechanics.run(w)
@@ -123,10 +124,9 @@ class Plant:
         if e.gain_per_kelvin:
             y = y * (1.0 + e.gain_per_kelvin * rise)
         y = sensor.offset + y + e.thermal_expansion * rise + hum + self._noise.run(x.size)
+        channels: dict[str, Samples] = {}
         if other is not None:
-            other = sensor.convert(other + self._other_noise.run(x.size))
-        return sensor.convert(y), other, e.temperature + rise if e.thermometer else None
-
-
-def _joined(blocks: tuple[Samples | None, ...]) -> Samples | None:
-    return None if blocks[0] is None else np.concatenate([b for b in blocks if b is not None])
+            channels["other_displacement"] = sensor.convert(other + self._other_noise.run(x.size))
+        if e.thermometer:
+            channels["temperature"] = e.temperature + rise
+        return sensor.convert(y), channels

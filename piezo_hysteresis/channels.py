@@ -1,0 +1,81 @@
+"""Channels beside voltage and displacement: what may be measured, what it is called, and its unit."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.blas import ddot  # numpy's would warn of squares that are too large
+
+from .errors import RecordError
+
+Samples = NDArray[np.float64]
+
+QUANTITIES: Mapping[str, str] = {"voltage": "V", "displacement": "m", "temperature": "K"}
+"""Quantity that a channel can be, to its SI unit."""
+
+_NAME = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
+"""How a channel may be called: words of small letters and digits."""
+
+
+def are_finite(samples: Samples) -> bool:
+    """Whether every sample, of at least one, is; the sum of squares tells at once, unless it is too large itself."""
+    return math.isfinite(ddot(samples, samples)) or bool(np.isfinite(samples).all())
+
+
+def quantity_of(name: str) -> str | None:
+    """The quantity that a channel name contains as a word; None where it contains none, or two.
+
+    Examples
+    --------
+    >>> quantity_of("other_displacement"), quantity_of("monitor_voltage"), quantity_of("displacement_3")
+    ('displacement', 'voltage', 'displacement')
+    >>> quantity_of("initial_voltage_of_temperature"), quantity_of("phase")
+    (None, None)
+    """
+    if _NAME.fullmatch(name) is None or name == "initial_voltage":  # that one is a number, not a channel
+        return None
+    words = [word for word in name.split("_") if word in QUANTITIES]
+    return words[0] if len(words) == 1 else None
+
+
+class ChannelMapping(Mapping[str, Samples]):
+    """Frozen mapping of channel name to samples, beside the voltage and the displacement of a record.
+
+    Parameters
+    ----------
+    channels : mapping of str to (n,) ndarray
+        A name holds one of `QUANTITIES` as a word, which fixes its unit: ``other_displacement`` [m],
+        ``displacement_3`` [m], ``monitor_voltage`` [V], ``temperature`` [K].
+
+    Raises
+    ------
+    RecordError
+        On a name that holds no quantity, or that the record has already.
+    """
+
+    __slots__ = ("_held",)
+
+    def __init__(self, channels: Mapping[str, Samples] | None = None) -> None:
+        self._held = dict(channels or {})
+        for name in self._held:
+            if name in ("voltage", "displacement") or quantity_of(name) is None:
+                raise RecordError(
+                    f"channels: got the name '{name}', expected one that holds one of {', '.join(QUANTITIES)} "
+                    "as a word, e.g. displacement_2"
+                )
+
+    def __getitem__(self, name: str) -> Samples:
+        return self._held[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._held)
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+    def __repr__(self) -> str:
+        return f"ChannelMapping({', '.join(self._held)})"
