@@ -36,6 +36,7 @@ _ROOMS = {
     "read": "recording",
     "save": "model.model_file",
 }
+"""Public names of the package and the module that each is loaded from when it is first used."""
 
 __all__ = [
     "Experiment",

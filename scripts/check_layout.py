@@ -22,15 +22,14 @@ MOST_MODULES = 16
 MOST_LINES = 250
 """Lines of a module of the package at most."""
 LONGER = {
-    "piezo_hysteresis/record.py": 260,
+    "piezo_hysteresis/identification/steps/dynamics.py": 255,
+    "piezo_hysteresis/record.py": 265,
     "piezo_hysteresis/model/model.py": 290,
     "piezo_hysteresis/online/predictor.py": 295,
     "piezo_hysteresis/recording/bag/rosbag2.py": 260,
-    "piezo_hysteresis/recording/table/text_cells.py": 260,
+    "piezo_hysteresis/recording/table/text_cells.py": 265,
 }
 """Modules that are longer, and how long they may be."""
-UNDOCUMENTED = 229
-"""Constants without a docstring that are still allowed."""
 LONGEST_SUBJECT = 72
 """Characters of the first line of a commit message."""
 SUBJECTS_SINCE = "2026-11-22T20:40:00+00:00"
@@ -43,9 +42,7 @@ def findings() -> Iterator[str]:
     yield from repeated_classes(modules)
     yield from full_folders(list(modules))
     yield from long_files(list(modules))
-    bare = list(bare_constants(modules))
-    if len(bare) > UNDOCUMENTED:
-        yield from bare
+    yield from bare_constants(modules)
     yield from long_subjects()
 
 

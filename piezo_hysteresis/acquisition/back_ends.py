@@ -38,6 +38,7 @@ class BackEnd:
 
 
 _PLANT = PlantParameters.table()
+"""Parameters of the simulated plant."""
 
 _SIMULATED: tuple[Row, ...] = (
     Setting("seed", 0, "fixes noise and random phases", lower=0, upper=2**31 - 1),
@@ -55,12 +56,14 @@ _SIMULATED: tuple[Row, ...] = (
     Setting("hysteresis.operator", "bouc_wen", "hysteresis of the plant", ("bouc_wen", "prandtl_ishlinskii")),
     *_PLANT,
 )
+"""Parameters of the simulated stage."""
 
 _REPLAY: tuple[Row, ...] = (
     Setting("experiment", "", "path of the recording"),
     Setting("repeat", False, "begin again after the last sample"),
     Setting("subscribers", 0, "begin when so many subscribers of samples are there", lower=0, upper=1000),
 )
+"""Parameters of a replayed recording."""
 
 
 def _open_simulated(values: Mapping[str, Any], sample_period: float) -> Stage:

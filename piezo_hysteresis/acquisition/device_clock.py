@@ -7,6 +7,7 @@ import math
 from .time_base import TimeBase
 
 _WINDOW = 100
+"""Blocks of which the earliest tells whether the clock of the device has to be moved."""
 
 
 class DeviceClock:

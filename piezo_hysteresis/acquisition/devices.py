@@ -14,7 +14,9 @@ from ..stage.gcs2.stage import Gcs2Stage
 from ..stage.stage import Stage
 
 _UNVERIFIED = "not verified on a device: docs/hardware.md"
+"""Remark on parameters that no device has confirmed yet."""
 _GCS2, _DAQMX = Gcs2Setup(host="-"), DaqmxSetup(device="-")
+"""Set-ups whose values are the defaults."""
 
 GCS2: tuple[Row, ...] = (
     Setting("host", "", "name or address of the controller"),

@@ -11,6 +11,7 @@ from ..errors import StageError
 from .drive import Drive, Event, EventKind, Phase, Samples
 
 _ENDLESS = 1 << 62
+"""Samples for which a voltage is held where no hold limit is set."""
 
 
 class Playback:

@@ -13,6 +13,7 @@ from ..stage.stage import Description
 from .back_ends import BACK_ENDS
 
 _SOURCE = "driver"
+"""Source of the parameters of the driver."""
 
 DRIVER: tuple[Row, ...] = (
     Setting("stage", "simulated", "back end", tuple(BACK_ENDS)),

@@ -6,9 +6,11 @@ import time
 from collections.abc import Callable
 
 _NANO = 1_000_000_000
+"""Nanoseconds in a second."""
 _TOGETHER = 2e-5
 """Two readings so close count as one moment [s]."""
 _ATTEMPTS = 8
+"""Readings of both clocks, of which the closest pair counts."""
 
 
 def read_together(node_clock: Callable[[], int]) -> tuple[float, int]:

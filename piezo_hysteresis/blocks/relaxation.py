@@ -11,6 +11,7 @@ from .kernel import kernel
 from .linear import AddedBlock
 
 LANES = 4
+"""Elements that are advanced together; their number is filled up to a multiple of it."""
 
 
 class Hold(NamedTuple):

@@ -17,6 +17,7 @@ from .plant_option import add_plant_arguments, plant
 from .terminal import console
 
 _PORT = {"gcs2": 50000, "nidaqmx": 31763}
+"""Default TCP port of every emulated device."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

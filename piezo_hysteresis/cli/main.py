@@ -28,6 +28,7 @@ COMMANDS = {
 """Subcommand to what it does; each lives in a file of its own, loaded only when it is asked for."""
 
 DONE, NOT_IDENTIFIABLE, BAD_INPUT, INTERRUPTED, BROKEN_PIPE = 0, 1, 2, 130, 141
+"""Exit codes of `piezo`."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -14,6 +14,7 @@ from .plant_option import add_plant_arguments, plant
 from .terminal import console, progress
 
 PROTOCOLS = {"paper": protocol.paper, "short": protocol.short, "rich": protocol.rich}
+"""Identification protocols that can be simulated."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -15,6 +15,7 @@ from .residual.localise import ResidualShare
 from .search.selection_result import Rejection, Selection
 
 SCHEMA = 1
+"""Version of the answer for machines."""
 
 
 class Verdict(StrEnum):

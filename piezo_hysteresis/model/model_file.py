@@ -19,6 +19,7 @@ _HEADER = """\
 # Model of a piezo stage: a ROS 2 parameter file, in SI units. Load it with --params-file, or give it to `piezo`.
 # After editing a number by hand, delete the line `hash`.
 """
+"""First lines of a model file."""
 
 _PROVENANCE = {
     "free_run_error": "m; rms on data that were not fitted",
@@ -26,6 +27,7 @@ _PROVENANCE = {
     "data_hash": "of the samples that were fitted",
     "date": "UTC",
 }
+"""Comments beside the entries of the provenance."""
 
 
 def dumps(model: Model) -> str:

@@ -18,10 +18,15 @@ Scalar = bool | int | float | str
 Entry = Scalar | list[Scalar]
 
 _TRUE = {"y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
+"""What rcl reads as true."""
 _FALSE = {"n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
+"""What rcl reads as false."""
 _INTEGER = re.compile(r"[-+]?(0[xX][0-9a-fA-F]{1,15}|[0-9]{1,18})")  # longer ones are doubles to rcl
+"""What rcl reads as an integer."""
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.?[0-9]*)([eE][-+]?[0-9]+)?")
+"""What rcl reads as a double."""
 _SPECIAL = re.compile(r"([-+]?)\.(inf|Inf|INF|nan|NaN|NAN)")
+"""What rcl reads as infinity, or as not a number."""
 
 
 LONGEST_TEXT = 1_000_000

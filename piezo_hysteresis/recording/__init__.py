@@ -171,8 +171,11 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
 
 
 _WITHIN = "begins on a branch of its loop: what came before is not recorded; a settled stage needs initial_voltage"
+"""Message of a record that begins in motion on its loop."""
 _IN_MOTION = "{phases}: the first sample lies on a ramp from {levels}, taken as where the stage had settled"
+"""Message of records that begin on a ramp."""
 _BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
+"""Format that the end of a name stands for."""
 
 
 def _named(format: str) -> Format:

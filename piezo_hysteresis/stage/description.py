@@ -13,6 +13,7 @@ from ..errors import StageError, printable
 Samples = NDArray[np.float64]
 
 _PERIOD_TOLERANCE = 1e-6
+"""Relative difference up to which two sample periods are one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -188,6 +188,7 @@ _DRAWS: dict[str, Draw] = {
     "mains_hum": _hum,
     "axis_coupling": _coupling,
 }
+"""How every effect is drawn at random."""
 
 HIDDEN_EFFECTS: tuple[str, ...] = tuple(_DRAWS)
 """Effects that `hidden_effect` draws from, by their identifiers in the catalogue."""

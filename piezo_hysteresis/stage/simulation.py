@@ -14,7 +14,9 @@ from .description import Description, Samples
 from .plant import Plant, PlantParameters, Reading
 
 _SHORTEST_PERIOD = 1e-6
+"""Shortest sample period of a simulated stage [s]."""
 _LONGEST_PERIOD = 10e-3
+"""Longest sample period of a simulated stage [s]."""
 
 
 class Simulation:

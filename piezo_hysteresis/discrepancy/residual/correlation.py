@@ -20,6 +20,7 @@ CAPTION = (
     "An output-error model is judged by the cross-correlation: beyond its bounds, something that the drive does is not "
     "in the model. Auto-correlation beyond its bounds tells as well of a sensor whose noise is coloured."
 )
+"""How to read the test of whiteness."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -33,6 +33,7 @@ BETTER = 0.9
 OTHER_SHARES = (0.5, 1.5)
 """Shares of the changes that must not do as well as the whole of them."""
 LINEARISATIONS, PRECISE = 9, 1e-3
+"""Linearisations of a fit at most, and relative decrease of the cost at which it has converged."""
 
 
 def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:

@@ -17,6 +17,7 @@ EDGES = {
     "frequency": np.array([0.0, 0.5, 5.0, 25.0, 75.0, 150.0, 250.0, 350.0, 600.0, 1.2e3, 2.5e3, np.inf]),
     "time_since_level_change": np.concatenate(([0.0], np.geomspace(1e-4, 100.0, 13), [np.inf])),
 }
+"""Edges of the bins along every axis."""
 
 
 @dataclass(frozen=True, slots=True)

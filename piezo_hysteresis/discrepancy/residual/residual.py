@@ -22,6 +22,7 @@ from .noise_floor import stroke
 Array = NDArray[np.float64]
 
 SINE = re.compile(r"sine_([0-9.]+)hz")
+"""Phase name of a sine, with its frequency [Hz]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ HOPELESS_BESIDE = 0.6
 AGAIN = 3
 """Refits that begin once more behind dynamics found anew."""
 RESTARTS = 4
+"""Refits of a candidate from other start values at most."""
 WORTHWHILE = 0.8
 """Share of the cost above which beginning anew once more is not worth it."""
 FIRST, LATER = 3, 9

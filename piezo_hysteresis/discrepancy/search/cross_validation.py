@@ -21,6 +21,7 @@ ADEQUATE = 1.5
 RIDGE = 1e-9
 """Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
 TINY = 1e-200
+"""Inner product below which a direction counts as zero."""
 SPOILT = 0.2
 """Error from noise alone, in R², beyond which a record says nothing when it is left out."""
 FARTHEST = 100.0

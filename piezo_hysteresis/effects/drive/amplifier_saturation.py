@@ -14,6 +14,7 @@ from ..extent import Extent
 from ..inversion import Inversion
 
 UNLIMITED = 1e9
+"""Limit that is never reached [V]."""
 
 
 class AmplifierSaturation(Effect):

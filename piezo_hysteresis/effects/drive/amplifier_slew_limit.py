@@ -15,6 +15,7 @@ from ..extent import Extent
 from ..inversion import Inversion
 
 UNLIMITED = 1e9
+"""Slope that is never reached [V/s]."""
 
 
 class AmplifierSlewLimit(Effect):

@@ -13,15 +13,25 @@ import numpy as np
 from .card import INPUTS, Card, CardError
 
 _ANALOG_INPUT, _ANALOG_OUTPUT, _VOLTAGE = 10100, 10102, 10322
+"""NI-DAQmx values: kinds of channel, and of measurement."""
 _KIND_OF_CHANNEL = 0x187F
+"""NI-DAQmx attribute: kind of a channel."""
 _GROUP_BY_CHANNEL = 0
+"""NI-DAQmx value: samples of one channel stand together."""
 _FINITE, _WITHOUT_REGENERATION = 10178, 10158
+"""NI-DAQmx values: finite sampling, and output without regeneration."""
 _REGENERATION, _SAMPLE_CLOCK_RATE = 0x1453, 0x1344
+"""NI-DAQmx attributes: regeneration, and rate of the sample clock."""
 _VERSION = {0x1272: 26, 0x1923: 0, 0x2F22: 0}
+"""NI-DAQmx attributes of the version: major, minor, update."""
 _NAME_OF_TASK, _CHANNELS_OF_TASK = 0x1276, 0x1273
+"""NI-DAQmx attributes: name and channels of a task."""
 _TIMEOUT = (-200284, "Some or all of the samples requested have not yet been acquired.")
+"""Error of a read whose samples did not come in time."""
 _NOT_DONE = (-200560, "Wait Until Done did not indicate that the task was done within the specified timeout.")
+"""Error of a wait for a task that did not end in time."""
 _NO_REGENERATION = (-200077, "Regeneration is not emulated; set out_stream.regen_mode to DONT_ALLOW_REGENERATION.")
+"""Error of a task that is set to regenerate."""
 
 
 @dataclass(slots=True)

@@ -17,10 +17,12 @@ UNDERFLOW, OUT_OF_RANGE, NOT_RUNNING = -200290, -200077, -200278
 """Error numbers of NI-DAQmx."""
 
 INPUTS = ("ai0", "ai1", "ai2")
+"""Analogue inputs of the card."""
 
 _TIMEBASE = 100e6
 """Clock that sample clocks are divided from [Hz]."""
 _LOOP_BACK_DELAY = 2
+"""Samples by which a wired loop back answers later."""
 
 
 class CardError(Exception):

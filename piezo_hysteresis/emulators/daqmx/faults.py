@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..fault import FaultCatalogue
 
 _IN_A_STREAM = "ReadAnalogF64:3"
+"""Call at which a fault begins by default: the third block of a stream."""
 
 FAULTS = FaultCatalogue(
     once={
@@ -28,3 +29,4 @@ FAULTS = FaultCatalogue(
     },
     values={"slow": 5.0, "error": -50103.0},
 )
+"""Faults of the emulated card, with the call at which each begins."""

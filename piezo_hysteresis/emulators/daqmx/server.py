@@ -13,7 +13,9 @@ from .calls import Calls
 from .card import Card, CardError
 
 _LATE = (-200284, "Some or all of the samples requested have not yet been acquired.")
+"""Error of samples that come too late."""
 _RESOURCE_LOST = (-200324, "Device not available for routing. It is possible that it was removed.")
+"""Error of a card that is gone."""
 
 
 class DaqmxServer:

@@ -9,6 +9,7 @@ from .answer import items
 from .refusal import Refusal
 
 AXIS, CHANNEL = "1", 1
+"""The one axis of the emulated controller, and its channel."""
 
 Command = Callable[[list[str]], list[str] | None]
 """Takes the arguments; returns the lines of the answer, None where there is none."""

@@ -31,11 +31,14 @@ from .wave import WaveGenerator
 from .wave_commands import WaveCommands
 
 SERVO_TIME, RECORDER_POINTS = 0x0E000200, 0x16000200
+"""Numbers of controller parameters: servo update time [s], points of the data recorder."""
 STOP, MOVING, READY, RUNNING = "\x18", "\x05", "\x07", "\x09"
+"""Single-byte commands: stop everything, is it moving, is it ready, is the generator running."""
 BYTES = {STOP: "#24", MOVING: "#5", READY: "#7", RUNNING: "#9"}
 """Commands of a single byte, with the name that ``HLP?`` gives them."""
 
 _TABLES, _POINTS, _WAVE_TABLES = 8, 262144, 4
+"""Tables of the data recorder, their points in all, and wave tables."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,3 +25,4 @@ FAULTS = FaultCatalogue(
     },
     values={"slow": 5.0, "error": 17.0},
 )
+"""Faults of the emulated controller, with the command at which each begins."""

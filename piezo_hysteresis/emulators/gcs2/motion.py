@@ -14,6 +14,7 @@ from ..fault import Faults
 from .recorder import Recorder
 
 _LONGEST_REST = 0.2
+"""Longest time at rest that is simulated in one go [s]."""
 
 
 class Motion:

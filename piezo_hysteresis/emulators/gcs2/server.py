@@ -11,7 +11,9 @@ from ...errors import StageError
 from .controller import BYTES, Controller, Reply
 
 _CODE_PAGE = "cp1252"
+"""Character set of GCS."""
 _LONGEST_LINE = 1 << 20
+"""Bytes of a line at most."""
 
 
 class Gcs2Server:

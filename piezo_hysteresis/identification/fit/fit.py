@@ -22,6 +22,7 @@ Progress = Callable[[str, float], None]
 TRUSTED = 1.0
 """Damping up to which a small decrease is a sign of the end."""
 MAX_DAMPING = 1e10
+"""Damping at which a fit gives up."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from ...record import Notice, Samples
 from .regressors import Signals, triangle
 
 _ALL = slice(None)
+"""Every regressor."""
 LARGEST_POLE = 0.99999
 """Radius to which poles on or just outside the unit circle are drawn back."""
 DRAWN_IN = 0.9999

@@ -17,6 +17,7 @@ from .diagnostics import DriverDiagnostics
 from .publishers import DriverTopics
 
 _LONGEST_NAME = 64
+"""Characters of a phase name at most."""
 
 _LOG_INTERVAL = 0.1
 """Shortest time between two lines of one kind in the log [s]: a flood of commands fills no disk."""

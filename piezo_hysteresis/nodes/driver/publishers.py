@@ -16,6 +16,7 @@ from ..runtime.sending import is_heard, send
 from ..topics import advertise, advertise_lifecycle
 
 _STATES = {EventKind.BEGAN: "playing", EventKind.DONE: "done", EventKind.STOPPED: "stopped"}
+"""Word of every event in `command_status`."""
 
 
 class DriverTopics:

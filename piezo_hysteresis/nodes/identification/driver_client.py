@@ -20,8 +20,10 @@ from ..topics import subscribe
 from .command_sender import CommandSender
 
 _NAMES = ("sample_period", "voltage_min", "voltage_max", "safe_voltage", "max_slew_rate", "ramp_rate")
+"""Parameters of the driver under ``in_force.`` that limit a protocol."""
 
 _POLL_INTERVAL = 0.5
+"""Time between two questions to the driver [s]."""
 
 _SAFE_WITHIN = 5e-3
 """Distance from the safe voltage that counts as there [V]: converters round, measured voltages are noisy."""

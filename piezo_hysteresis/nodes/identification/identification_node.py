@@ -45,11 +45,13 @@ IDENTIFICATION: tuple[Row, ...] = (
         "experiment_root", "", "folder of the recordings, read at start; empty: ~/.ros/piezo_hysteresis/<namespace>"
     ),
 )
+"""Parameters of the identification node."""
 
 START = Model((HYSTERESIS(), Arx(), Offset()), 2e-5)
 """Declared, not valid, before there is a result."""
 
 _TICK = 0.02
+"""Time between two looks at the job under way [s]."""
 
 
 class IdentificationNode(GuardedNode):

@@ -18,9 +18,11 @@ from ...point_cloud import point_type, stored_as, unpacked
 from .cloud import from_cloud, to_cloud
 
 _STAMP = struct.Struct("=iI")
+"""Stamp of a header: seconds and nanoseconds."""
 _STAMP_AT = 4
 """A serialised message begins with four bytes on its encoding; the stamp comes next in a cloud."""
 _AFTER_STAMP = _STAMP_AT + _STAMP.size
+"""Bytes of a message before the name of its frame."""
 _LONGEST_END = 4
 """After the data comes `is_dense`, and up to three bytes that say nothing."""
 

@@ -7,6 +7,7 @@ import re
 from ...errors import RecordError
 
 _PHASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+"""What a phase may be called."""
 
 
 def phase_name(frame_id: str) -> str:

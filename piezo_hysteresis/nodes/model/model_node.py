@@ -29,6 +29,7 @@ from .diagnostics import ModelDiagnostics
 from .publishers import ModelTopics
 
 _SOURCE = "model node"
+"""Source of the parameters of the model node."""
 
 MODEL: tuple[Row, ...] = (
     Setting("model_file", "", "path of the first model; a model on the topic `model` replaces it"),
@@ -37,6 +38,7 @@ MODEL: tuple[Row, ...] = (
     Parameter("residual_warn", "k_w", "1", 3.0, 0.0, 1e6, "warns above so many free-run errors of the model", _SOURCE),
     Parameter("residual_error", "k_e", "1", 10.0, 0.0, 1e6, "error above so many free-run errors", _SOURCE),
 )
+"""Parameters of the model node."""
 
 
 class ModelNode(GuardedNode):

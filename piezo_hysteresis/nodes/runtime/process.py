@@ -26,6 +26,7 @@ _BAD_START = (
     PiezoError,
     rclpy_implementation.RCLError,
 )
+"""What rclpy raises on parameters or arguments that do not fit."""
 
 AnyNode = TypeVar("AnyNode", bound=GuardedNode)
 

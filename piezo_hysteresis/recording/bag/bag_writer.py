@@ -25,7 +25,9 @@ FLUSH_INTERVAL = 0.5
 """Longest time for which a message stays in memory while others arrive [s]: no message older than a second is lost."""
 
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
+"""Longest duration of ROS."""
 _EXPECTED = "a folder in which a bag can be written"
+"""What is expected in place of a folder that cannot be written."""
 
 
 class BagWriter:

@@ -16,6 +16,7 @@ from ...point_cloud import packed, point_layout, stored_as, unpacked
 from ...record import Samples
 
 TYPE = "sensor_msgs/msg/PointCloud2"
+"""Type of the messages."""
 
 FIELDS = {"time": "f8", "voltage": "f8", "displacement": "f8", "index": "u4", "phase": "u4"}
 """Point of `samples`: time [s from the stamp], voltage [V], displacement [m], running index, phase number."""

@@ -22,6 +22,7 @@ from ..table.time_column import TimeColumn
 from .bag import Bag
 
 _PLACE = re.compile(r"(?P<topic>/[^.\[\]]+)(\.(?P<fields>[\w.]+))?(\[(?P<element>\d{1,9})\])?")
+"""Where a channel stands: ``/topic.field[element]``."""
 
 
 class TopicField(NamedTuple):

@@ -8,6 +8,7 @@ from ...errors import RecordingError
 from .block_message import typestore
 
 STRING = "std_msgs/msg/String"
+"""Type of the messages."""
 
 
 class PhaseNames:

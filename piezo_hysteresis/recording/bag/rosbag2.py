@@ -27,8 +27,11 @@ IDLE, HOLD = "idle", "hold"
 """What the stage does before the first and after every phase; left out unless `ReadOptions.include` names it."""
 
 _MOVED = 0.01
+"""Share of the largest movement below which a segment counts as resting."""
 _SEVERE_SHARE = 0.05
+"""Share of lost samples from which a phase is not to be trusted."""
 _BLOCK_DURATION = 0.01
+"""Length of the messages that are written [s]."""
 
 
 class Rosbag2:

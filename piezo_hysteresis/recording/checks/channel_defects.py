@@ -12,14 +12,23 @@ FEWEST_LEVELS = 1000
 """Quantisation is told where a channel uses fewer levels than this; below a sixteenth of it nothing rests on it."""
 
 _DRIVE_MOVES = 0.05
+"""Share of the range by which the drive must move for a constant displacement to be a defect."""
 _DRIVE_RETURNS = 0.01
+"""The same at an extreme of the displacement, counted beyond both ends of the run."""
 _RETURN = 0.03
+"""Share of the range by which the displacement must go on and come back while the voltage stands."""
 _ARC = 0.9
+"""Correlation with one arc from which the displacement shows a cut-off turning point."""
 _MISSED = 0.3
+"""Share of the movement that a cut-off turning point would cause, from which it is one."""
 _PARTS = 32
+"""Parts of a run that are averaged."""
 _CONSTANT_SPEED = 0.75
+"""Share of equal increments from which a drive consists of ramps."""
 _SEVERE_SHARE = 0.05
+"""Share of samples from which a defect spoils a phase."""
 _ROUGH_SHARE, _FEW = 0.001, 3
+"""Share and number of samples up to which drop-outs do not spoil a phase."""
 
 
 def channel_defects(record: Record) -> list[Notice]:

@@ -8,16 +8,27 @@ from ...record import Experiment, Notice, Record, Samples
 from ..segmentation.waveform import turning_points
 
 _OPENING = 0.1
+"""Share of the range of the drive up to which it counts as hardly moved."""
 _EXCERPT = 1 << 20
+"""Samples that are looked at."""
 _SWING = 0.02
+"""Least swing of a turning point, share of the range."""
 _INSIDE = 0.1
+"""Distance from the turning points at which a record must begin, share of the range."""
 _SAME = 0.02
+"""Largest difference of two periods, share of the range."""
 _ON_BRANCH = 0.2
+"""Distance from a branch up to which a record begins on it, share of the width of the loop."""
 _NOISE = 8.0
+"""Noise widths that a movement must exceed."""
 _FIRST = 8
+"""Samples of the first movement."""
 _SAME_VOLTAGE = 1e-3
+"""Largest difference of two equal voltages, share of the range."""
 _APART = 0.01
+"""Least difference of two displacements, share of the stroke."""
 _STRAIGHT, _NEAR = 0.1, 0.05
+"""Largest relative change of the step of a ramp; tolerance of its first sample, in steps."""
 _AHEAD = (0.5, 1.0)
 """Samples from where a ramp begins to its first sample: for averages half of one, or a little more."""
 

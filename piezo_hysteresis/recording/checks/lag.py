@@ -15,16 +15,25 @@ LATE = 3e-3
 """Lag that no stage has by itself [s]; a slow sensor filter, or a shifted channel, has."""
 
 _SWING = 0.2
+"""Least swing of a turning point, share of the range."""
 _WINDOWS = 24
+"""Turning points that are used, about."""
 _POINTS = 96
+"""Points around every turning point."""
 _EXCERPT = 1 << 20
+"""Samples that are looked at."""
 _FEWEST = 6
+"""Samples on each side of a turning point at least."""
 _FEWEST_TURNS = 2
 """One turning point alone may look like a lead by the way its loop bends."""
 _EXPLAINED = 0.999
+"""Share of the variance that the lines must explain."""
 _SURE = 4.0
+"""Standard errors by which a lag must exceed zero."""
 _JUMP = 0.3
+"""Largest step of the drive beside a turning point, share of the swing."""
 _BENT = 0.01
+"""Lag that a bent loop may show, share of the swing."""
 _SLOWER, _ALIKE, _SHARED = 10.0, 1.2, 2.0
 """Swings, in lags and in swings of the phase, of others that a lag is compared with; how far it may differ."""
 _SLOW = 20e-3

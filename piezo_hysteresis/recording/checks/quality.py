@@ -23,11 +23,17 @@ FAINT = (4e-8, 1e-12)
 """A smaller displacement per volt [m/V], read by a sensor of less noise [m], is rather one in another unit."""
 
 _SCALE_MISMATCH = 100.0
+"""Ratio of two gains from which a unit must be wrong."""
 _FEWEST_PERIODS = 1.8
+"""Periods from which the frequency of a sine is known."""
 _FREQUENCY_MISMATCH = 0.1
+"""Relative difference of the frequency from the one in the phase name."""
 _MOVING = 0.05
+"""Share of the largest range of the drive from which a record counts as driven."""
 _LEADS = 4.0
+"""Angle by which the displacement must lead the drive [degree]."""
 _SINE = re.compile(r"sine_(\d+(?:\.\d+)?(?:e[+-]?\d+)?)hz")
+"""Phase name of a sine, with its frequency [Hz]."""
 
 
 def inspect(experiment: Experiment) -> tuple[Notice, ...]:

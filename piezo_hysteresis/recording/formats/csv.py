@@ -17,8 +17,11 @@ from ..table.text_cells import Dialect, read_cells
 from ..table.time_column import TimeColumn
 
 _ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
+"""Ends of the names of text tables."""
 _ROWS = 1 << 15
+"""Rows that are written in one go."""
 _LOOK = 1 << 12
+"""Bytes by which a text is told from other files."""
 _EPOCH = 1e8
 """A clock that shows more [s] counts from an epoch, not from the start of the experiment."""
 

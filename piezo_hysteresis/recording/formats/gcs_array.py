@@ -15,6 +15,7 @@ from ..table.table import resolve, table_records
 from ..table.text_cells import BLOCK_BYTES, Dialect, decoded, read_cells
 
 _END = "# END_HEADER"
+"""Last line of the header."""
 
 
 class GcsArrayFormat:

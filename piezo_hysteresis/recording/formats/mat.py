@@ -21,7 +21,9 @@ from .mat5_variables import Mat5Variables
 from .mat_variables import MatVariables
 
 _PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
+"""Where a channel stands: ``name[column]``."""
 _STRUCT = "phase_"
+"""Beginning of the names of the structures that hold phases."""
 
 
 class Mat:

@@ -11,13 +11,18 @@ from typing import BinaryIO
 from ...errors import RecordingError
 
 HEADER = 128
+"""Bytes of the header of a MAT 5 file."""
 MATRIX, COMPRESSED = 14, 15
+"""Kinds of MAT 5 elements: matrix, compressed element."""
 ORDERS = {b"IM": "<", b"MI": ">"}
 """Last bytes of the header to the order of bytes behind it."""
 
 _INT32 = 5
+"""Kind of a MAT 5 element: 32 bit integers."""
 _LARGEST_EXPANSION = 1100
+"""Largest size of an element over that of its compressed form."""
 _DEEPEST = 20
+"""Structures within structures at most."""
 
 
 def check_sizes(path: Path) -> None:

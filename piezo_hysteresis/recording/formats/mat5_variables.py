@@ -19,9 +19,13 @@ from .mat5_sizes import COMPRESSED, HEADER, MATRIX, ORDERS, Inflated, check_size
 from .mat_variables import MatVariables
 
 _LONG = 1 << 20
+"""Numbers from which a matrix is read in part."""
 _REAL = range(6, 16)
+"""Classes of numeric MAT 5 arrays."""
 _COMPLEX = 0x800
+"""Flag of a complex MAT 5 array."""
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+"""Format of every numeric kind of MAT 5 element."""
 
 
 @dataclass(frozen=True, slots=True)

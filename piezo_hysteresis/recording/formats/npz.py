@@ -22,7 +22,9 @@ from ..table.time_column import TimeColumn
 from .npz_members import NpzMembers
 
 _EXPECTED = "an .npz file with voltage, displacement and sample_period"
+"""What is expected in place of a file that cannot be read."""
 _NUMBERED = re.compile(r"\d+[_ -]")
+"""Number in front of the name of a phase."""
 
 
 class Npz:

@@ -14,8 +14,11 @@ from ...record import Samples
 from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
 
 _MAGIC_READERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+"""Readers of the header by version of the format."""
 _LARGEST_EXPANSION = 100
+"""Largest size of the members over that of the file."""
 _SMALL = 1 << 26
+"""Bytes that are always accepted."""
 
 
 class NpzMembers:

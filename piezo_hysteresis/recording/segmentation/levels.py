@@ -14,9 +14,13 @@ LARGEST_NOISE = 0.02
 """Voltages closer than this share of the range are one level."""
 
 _BLOCKS = 20_000
+"""Blocks into which the drive is cut, about."""
 _SHORTEST = 4
+"""Samples of a block at least."""
 _NOISE_WIDTH = 20.0
+"""Noise widths within which voltages are one level."""
 _PEAK = 0.5
+"""Length of a level over that of the shorter movement beside it, below which it is the top of a wave."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,9 @@ from .levels import LARGEST_NOISE, Piece, pieces_of
 from .waveform import phase_name, turning_points
 
 _JUMP = 0.05
+"""Length of the movements over that of the levels up to which the movements are jumps."""
 _MOST = 100
+"""Phases that are proposed at most."""
 
 
 def labelled(

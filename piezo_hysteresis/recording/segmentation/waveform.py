@@ -10,12 +10,19 @@ from numpy.typing import NDArray
 from ...record import Samples
 
 _POINTS = 40_000
+"""Samples in which turning points are searched one by one."""
 _LEAST_SWING = 0.05
+"""Least swing of a turning point, share of the range."""
 _REGULAR = 0.1
+"""Relative difference up to which two periods are alike."""
 _STRAIGHT = 0.03
+"""Largest rms deviation of a straight swing, share of the swing."""
 _OTHER_POWER = 0.005
+"""Largest share of the power outside a sine."""
 _PERIODIC = 0.9
+"""Autocorrelation from which a drive repeats itself."""
 _STILL = 0.01
+"""Median step of a drive of levels at most, share of the range."""
 
 
 def phase_name(voltage: Samples, sample_period: float) -> str:

@@ -9,14 +9,19 @@ from ...record import Notice
 from .units import plain, units_of
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$|[\s_,/:]\s*([^\s_,/:\[\]()]+)\s*$")
+"""Unit at the end of a title: in brackets, or behind a separator."""
 _WORDS = {
     "time": r"time|zeit|\bt\b|\bx value\b",
     "voltage": r"volt|drive|spannung|input|\bu\b|\bv\b|\bu_?in\b|\bv_?in\b",
     "displacement": r"disp|posi|sensor|stroke|weg\b|elong|output|\by\b|\bx\b",
 }
+"""What the title of a channel speaks of."""
 _PERIODS = ("sampleperiod", "ts", "dt", "sampletime", "samplingperiod", "samplingtime", "deltat")
+"""Names of a sample period."""
 _RATES = ("fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate")
+"""Names of a sample rate."""
 _NOT_MEASURED = re.compile(r"command|target|desired|set_?point|reference|error|other", re.IGNORECASE)
+"""Words in the titles of columns that were not measured."""
 
 
 def unit_in(title: str, channel: str) -> str | None:

@@ -22,8 +22,11 @@ BLOCK_BYTES = 1 << 20
 
 
 _COMMENT = ("#", "%")
+"""Beginnings of comment lines."""
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?Z?")
+"""A date with time of day."""
 _YEAR_2000 = np.datetime64("2000-01-01", "ns")
+"""Date from which times are counted."""
 _NO_ROW = (b"#", b"%", b"\n\n", b"\n\r", b"\r\r", b"\n ", b"\n\t", b"\f", b"\v")
 """Bytes without which every line is a row: looking at each line takes longer than reading its numbers."""
 

@@ -9,9 +9,13 @@ from ...channels import quantity_of
 from ...errors import RecordingError
 
 _METRE: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "pm": 1e-12}
+"""Units of length over the metre."""
 _VOLT: Mapping[str, float] = {"V": 1.0, "kV": 1e3, "mV": 1e-3, "uV": 1e-6}
+"""Units of voltage over the volt."""
 _SECOND: Mapping[str, float] = {"s": 1.0, "min": 60.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Units of time over the second."""
 _KELVIN: Mapping[str, float] = {"K": 1.0, "mK": 1e-3}
+"""Units of temperature over the kelvin."""
 
 _UNITS: Mapping[str, Mapping[str, float]] = {
     "time": _SECOND,

@@ -21,6 +21,7 @@ SHORTEST_HOLD = 0.5
 REFERENCE = 0.1
 """Time after the change of level at which creep counts as zero [s]."""
 POINTS = 60
+"""Times drawn."""
 
 
 @styled

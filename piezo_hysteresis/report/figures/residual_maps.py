@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 PER_RECORD = 20_000
 """Samples of every record that enter, so that no phase drowns the others."""
 BINS = 24
+"""Bins along an axis."""
 DECADES = 30.0
 """Rates that span less than this from the slowest to the fastest are drawn on a linear axis."""
 

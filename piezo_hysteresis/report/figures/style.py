@@ -18,13 +18,20 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY = "#1a1a1a", "#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9"
+"""Colours that colour-blind readers tell apart."""
 GREY = "#8c8c8c"
+"""Colour of what stands behind."""
 
 MEASURED: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.4}
+"""Line of what was measured."""
 PREDICTED: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (4, 2)), "linewidth": 1.4}
+"""Line of what the model predicts."""
 BEFORE: dict[str, Any] = {"color": BLUE, "linestyle": (0, (1, 1.2)), "linewidth": 1.4}
+"""Line of the model before."""
 FLOOR: dict[str, Any] = {"color": GREY, "linestyle": (0, (6, 2, 1, 2)), "linewidth": 1.2}
+"""Line of the noise floor."""
 RESIDUAL: dict[str, Any] = {"color": ORANGE, "linestyle": "-", "linewidth": 0.9}
+"""Line of measured minus predicted."""
 
 SETTINGS: Any = {
     "font.size": 9.5,
@@ -46,6 +53,7 @@ SETTINGS: Any = {
     "svg.fonttype": "path",
     "savefig.dpi": 150,
 }
+"""Settings of matplotlib for every figure."""
 
 WIDTH = 9.0
 """Width of every figure [inch]."""

@@ -19,6 +19,7 @@ from .thinning import thinned
 Array = NDArray[np.float64]
 
 COLUMNS = 3
+"""Panels beside one another."""
 PANELS = 12
 """Most phases drawn."""
 TURNS = 16

@@ -8,6 +8,7 @@ from typing import Any
 from .table import Table
 
 _GAP = ("before", "after", "floor")
+"""Columns of the table of gaps."""
 
 
 def effect_table(answer: Mapping[str, Any]) -> Table | None:

@@ -10,6 +10,7 @@ from ..words import duration
 from .table import Table
 
 _NOTE = "Lag: of the displacement at the turning points of the drive (in samples); dynamics, or a late channel."
+"""How to read the column of lags."""
 
 
 def record_table(experiment: Experiment, noise: np.ndarray) -> Table:

@@ -9,7 +9,9 @@ from ...errors import StageError
 from ..stage import StreamingStage
 
 _COUNT = 4096
+"""Samples of the test signal."""
 _LEAST_CORRELATION = 0.9
+"""Correlation from which the delay is known."""
 
 
 def loop_back_delay(stage: StreamingStage, amplitude: float = 1.0) -> float:

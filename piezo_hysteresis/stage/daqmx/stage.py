@@ -15,6 +15,7 @@ from .setup import DaqmxSetup
 from .tasks import DaqmxError, Tasks
 
 _RAMP_STEP = 0.01
+"""Time between two voltages of a ramp [s]."""
 _CLIPPED = 0.998
 """Share of the range of the sensor from which on it counts as clipped."""
 

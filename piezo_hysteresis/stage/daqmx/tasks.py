@@ -13,12 +13,14 @@ from ..description import Samples
 from .setup import DaqmxSetup
 
 _RATE_TOLERANCE = 1e-4
+"""Relative difference up to which the rate of the card is the one asked for."""
 
 _OPTIONS = (
     ("grpc.max_receive_message_length", -1),
     ("grpc.max_send_message_length", -1),
     ("grpc.use_local_subchannel_pool", 1),  # a new channel is a new link, not one that waits to be tried again
 )
+"""Options of the link to the server."""
 
 
 class DaqmxError(DeviceError):

@@ -11,6 +11,7 @@ from ..description import Samples
 from .connection import Gcs2Error
 
 _END = "END_HEADER"
+"""Last line of the header."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -20,6 +20,7 @@ NEEDED = (
 """Commands without which an axis cannot be driven."""
 
 _SAMPLE_TIME_TOLERANCE = 1e-3
+"""Relative difference up to which two sample times are one."""
 
 
 class Axis:

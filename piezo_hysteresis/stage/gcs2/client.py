@@ -7,6 +7,7 @@ from .connection import Connection, Gcs2Error, NoAnswerError
 from .error_number import STOPPED_BY_COMMAND, meaning
 
 _STOP, _RUNNING = "\x18", "\x09"
+"""Single-byte commands: stop everything, is the generator running."""
 
 
 class Client:

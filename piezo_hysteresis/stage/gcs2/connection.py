@@ -7,7 +7,9 @@ import socket
 from ...errors import DeviceError
 
 _CODE_PAGE = "cp1252"
+"""Character set of GCS."""
 _LONGEST_ANSWER = 1 << 26
+"""Bytes of an answer at most."""
 
 
 class Gcs2Error(DeviceError):

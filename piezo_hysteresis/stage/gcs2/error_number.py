@@ -1,21 +1,37 @@
 """What the error numbers mean that a controller keeps for ``ERR?``."""
 
 STOPPED_BY_COMMAND = 10
+"""A motion was stopped by a command."""
 UNKNOWN_COMMAND = 2
+"""The command is not known."""
 SYNTAX = 1
+"""The parameters of a command are not well formed."""
 OUT_OF_RANGE = 17
+"""A parameter is out of range."""
 ILLEGAL_AXIS = 23
+"""There is no such axis or channel."""
 WRONG_COUNT = 24
+"""A command has the wrong number of parameters."""
 UNKNOWN_PARAMETER = 54
+"""There is no such controller parameter."""
 NO_RECORDER_TABLE = 57
+"""There is no such recorder table."""
 NO_RECORD_OPTION = 58
+"""There is no such record option."""
 READ_ONLY = 64
+"""The controller parameter cannot be written."""
 VOLTAGE_OUT_OF_LIMITS = 66
+"""The voltage is outside the limits."""
 WAVE_TOO_LARGE = 67
+"""The wave memory is too small."""
 GENERATOR_ACTIVE = 73
+"""The wave generator is active."""
 NO_WAVE_SELECTED = 75
+"""No wave table is connected to the generator."""
 TOO_FEW_RECORDED = 77
+"""The recorder holds fewer samples than asked for."""
 SERVO_IS_ON = 79
+"""An open-loop move was refused because the servo is on."""
 
 MEANING = {
     SYNTAX: "syntax of the parameters",

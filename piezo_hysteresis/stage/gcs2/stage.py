@@ -16,7 +16,9 @@ from .axis import Axis
 from .setup import Gcs2Setup
 
 _POLL = 5e-3
+"""Shortest time between two questions whether the generator runs [s]."""
 _RAMP_STEP = 0.01
+"""Time between two voltages of a ramp [s]."""
 
 
 class Gcs2Stage:

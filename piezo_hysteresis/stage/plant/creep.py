@@ -24,6 +24,7 @@ REFERENCE_TIME = 0.1
 """Time after a step at which creep changes nothing [s]."""
 
 _ELEMENTS_PER_DECADE = 4
+"""Kelvin-Voigt elements per decade of time."""
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,10 @@ _GROUPS: dict[str, type[Group]] = {
     "sensor": Sensor,
     "environment": Environment,
 }
+"""Parts of the plant by name."""
 
 _SUB_STEP = Parameter("sub_step", "δ", "s", 5e-6, 1e-8, 1e-3, "longest internal step of the simulation", SOURCE)
+"""Longest internal step of the plant."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from .structure import Mechanics
 Samples = NDArray[np.float64]
 
 _CHUNK = 4096
+"""Samples that are simulated in one go."""
 
 
 class Reading(NamedTuple):

@@ -9,6 +9,7 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 
 SOURCE = "simulated plant"
+"""Source of the parameters of the plant."""
 
 
 def quantity(value: float | tuple[float, ...], unit: str, lower: float, upper: float, meaning: str) -> Any:

@@ -14,6 +14,7 @@ from .quantity import Group, quantity
 Samples = NDArray[np.float64]
 
 _FLICKER_LOWEST = 0.01
+"""Lowest frequency of the 1/f noise [Hz]."""
 
 
 @dataclass(frozen=True)
