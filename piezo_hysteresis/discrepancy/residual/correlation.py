@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
 from scipy.stats import norm
 
 from ...errors import RecordError
@@ -16,9 +18,17 @@ Array = NDArray[np.float64]
 FALSE_ALARMS = 0.01
 """Chance that any lag of an independent residual lies beyond the bounds: they hold for all lags together."""
 
+LONGEST_MEMORY, SHARE_OF_MEMORY = 40, 20
+"""Highest order of the autoregression of the residual; it takes at most one part in so many of the samples."""
+FEWEST_INDEPENDENT = 20.0
+"""Effective number of samples below which the cross-correlation decides nothing."""
+PREDICTABLE = 1e-9
+"""Share of the residual's power below which its innovations are rounding: it is a sum of few sines."""
+
 CAPTION = (
     "An output-error model is judged by the cross-correlation: beyond its bounds, something that the drive does is not "
-    "in the model. Auto-correlation beyond its bounds tells as well of a sensor whose noise is coloured."
+    "in the model. Auto-correlation beyond its bounds tells as well of a sensor whose noise is coloured. For the "
+    "cross-correlation, residual and drive both pass the filter that makes the residual white."
 )
 """How to read the test of whiteness."""
 
@@ -38,9 +48,12 @@ class Correlation:
     cross_lag : (2k + 1,) ndarray
         Lags of the cross-correlation [s]; positive where e follows u.
     cross : (2k + 1,) ndarray
-        Cross-correlation of e(t + lag) with u(t).
+        Cross-correlation of e'(t + lag) with u'(t): both filtered by the autoregression that makes e white.
     cross_bound : float
-        99 % bound for an e of the same colour that does not depend on u, z·√(Σ ρ_e ρ_u / n).
+        99 % bound for an e that does not depend on u, from the effective number of samples; below 1 wherever
+        `decides`.
+    effective_samples : float
+        Number of independent samples that know as much as the n that were taken, n/Σ ρ_e' ρ_u'.
     """
 
     lag: Array
@@ -49,6 +62,12 @@ class Correlation:
     cross_lag: Array
     cross: Array
     cross_bound: float
+    effective_samples: float
+
+    @property
+    def decides(self) -> bool:
+        """False where the drive holds too few frequencies, or the residual too little, for any conclusion."""
+        return self.effective_samples >= FEWEST_INDEPENDENT
 
     @property
     def is_white(self) -> bool:
@@ -82,9 +101,10 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
 
     Notes
     -----
-    Ljung, *System Identification*, 2nd ed., Sec. 16.6. The sum over the colours is taken over all lags, as the product
-    of the two spectra (Bartlett). z is the normal quantile of 1 % shared by all lags (Bonferroni). A drive of one
-    frequency has a bound near or above 1: it decides nothing.
+    Ljung, *System Identification*, 2nd ed., Sec. 16.6, with pre-whitening (Box and Jenkins, *Time Series Analysis*,
+    Sec. 11.2): a slow residual and a slow drive agree by chance, their innovations do not. The sum over the colours
+    that are left is taken over all lags, as the product of the two spectra (Bartlett). The bound is tanh(z/√(n' − 3))
+    (Fisher), z the normal quantile of 1 % shared by all lags (Bonferroni), n' the effective number of samples.
     """
     n = residual.size
     if n < 16:
@@ -94,17 +114,56 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
     if power_e == 0.0 or power_u == 0.0:
         raise RecordError("correlation: got a constant drive or residual, expected both to change")
     lags = min(lags, n // 4)
-    length = next_fast_len(2 * n, real=True)
-    spectrum_e, spectrum_u = rfft(e, length), rfft(u, length)
-    auto_e = irfft(np.abs(spectrum_e) ** 2, length) / power_e
-    auto_u = irfft(np.abs(spectrum_u) ** 2, length) / power_u
-    both = irfft(spectrum_e * np.conj(spectrum_u), length) / np.sqrt(power_e * power_u)
+    auto, _, _ = _products(e, e)
+    memory = autoregression(auto / power_e, n)
+    innovations, drive = (lfilter(memory, [1.0], x)[memory.size - 1 :] for x in (e, u))
+    both, auto_e, auto_u = _products(innovations, drive)
+    power = float(auto_e[0] * auto_u[0])
     k = np.arange(-lags, lags + 1)
+    z = float(norm.isf(FALSE_ALARMS / 2 / k.size))
+    if auto_e[0] <= PREDICTABLE * power_e or auto_u[0] <= PREDICTABLE * power_u:
+        cross, effective = np.zeros(k.size), 0.0
+    else:
+        cross = both[k] / np.sqrt(power)
+        effective = innovations.size / max(1.0, float(auto_e @ auto_u) / power)
     return Correlation(
         lag=np.asarray(sample_period * np.arange(lags + 1)),
-        auto=auto_e[: lags + 1],
+        auto=auto[: lags + 1] / power_e,
         auto_bound=float(norm.isf(FALSE_ALARMS / 2 / lags) / np.sqrt(n)),
         cross_lag=np.asarray(sample_period * k),
-        cross=both[k],
-        cross_bound=float(norm.isf(FALSE_ALARMS / 2 / k.size)) * float(np.sqrt(max(auto_e @ auto_u, 0.0) / n)),
+        cross=cross,
+        cross_bound=float(np.tanh(z / np.sqrt(effective - 3.0))) if effective >= FEWEST_INDEPENDENT else 1.0,
+        effective_samples=effective,
     )
+
+
+def autoregression(auto: Array, size: int) -> Array:
+    """Filter (p + 1,) that makes a signal of the auto-correlation given (k,) white; its order by Schwarz's criterion.
+
+    Parameters
+    ----------
+    auto : (k,) ndarray
+        Auto-correlation from lag 0, normalised to 1.
+    size : int
+        Number of samples it was taken from.
+
+    Examples
+    --------
+    >>> autoregression(0.5 ** np.arange(50), 1000).round(3).tolist()
+    [1.0, -0.5]
+    """
+    best, least = np.ones(1), 0.0
+    for order in range(1, min(LONGEST_MEMORY, size // SHARE_OF_MEMORY) + 1):
+        weights = solve_toeplitz(auto[:order], auto[1 : order + 1])
+        left = max(1.0 - float(weights @ auto[1 : order + 1]), np.finfo(float).eps)
+        criterion = size * np.log(left) + order * np.log(size)
+        if criterion < least:
+            best, least = np.concatenate(([1.0], -weights)), criterion
+    return best
+
+
+def _products(first: Array, second: Array) -> tuple[Array, Array, Array]:
+    """Inner products of `first` later than `second` at all lags, circular, and of either with itself."""
+    length = next_fast_len(2 * first.size, real=True)
+    a, b = rfft(first, length), rfft(second, length)
+    return irfft(a * np.conj(b), length), irfft(np.abs(a) ** 2, length), irfft(np.abs(b) ** 2, length)

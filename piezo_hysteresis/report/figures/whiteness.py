@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...discrepancy.residual.correlation import CAPTION, correlate
+from ...discrepancy.residual.correlation import CAPTION, FEWEST_INDEPENDENT, correlate
 from ...errors import RecordError
 from .comparison import ModelComparison
 from .drawing import Drawing
@@ -49,17 +49,18 @@ def whiteness(comparison: ModelComparison) -> Drawing | None:
         axis.set_title(f"{title}, {record.phase}")
         axis.set_xlabel(f"lag [{unit}]")
         axis.legend(loc="upper right")
-    if found.cross_bound >= 1.0:
+    if not found.decides:
         axes[1].set_title(f"{title}, {record.phase}: undecided")
-    reach = 1.1 * float(np.max(np.abs(found.cross), initial=min(found.cross_bound, 1.0)))
+    reach = 1.1 * float(np.max(np.abs(found.cross), initial=found.cross_bound))
     axes[1].set_ylim(-reach, reach)
     axes[0].set_ylabel("correlation")
     white = "white" if found.is_white else "not white"
     free = "depends on the drive" if not found.is_independent else "does not depend on the drive"
-    if found.is_independent and WIDE < found.cross_bound < 1.0:
-        free = f"may depend on the drive by less than the bound of {found.cross_bound:.2g}, wide for so slow a drive"
-    if found.cross_bound >= 1.0:
-        free = "may or may not depend on the drive: one of few frequencies decides nothing, the bound is above 1"
+    if found.is_independent and found.cross_bound > WIDE:
+        free = f"may depend on the drive by less than the bound of {found.cross_bound:.2g}, which is wide"
+    if not found.decides:
+        few = f"a record worth fewer than {FEWEST_INDEPENDENT:.0f} independent samples"
+        free = f"may or may not depend on the drive: {few} decides nothing"
     return Drawing(
         "residual_tests",
         "Residual tests",
