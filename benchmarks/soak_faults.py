@@ -142,9 +142,10 @@ def foreign_topics(bench: Bench) -> None:
 
 
 def stop(bench: Bench) -> None:
-    """`~/stop` in whatever plays."""
-    bench.keeper.client(Trigger, "driver_node/stop").call_async(Trigger.Request())
-    time.sleep(0.5)
+    """`~/stop` in whatever plays, and `~/release` after a while."""
+    for service in ("stop", "release"):
+        bench.keeper.client(Trigger, f"driver_node/{service}").call_async(Trigger.Request())
+        time.sleep(0.5)
 
 
 FAULTS: Mapping[str, Callable[[Bench], None]] = {

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.limiter import Limiter
 from piezo_hysteresis.stage.simulated import SimulatedStage
 from piezo_hysteresis.stage.stage import Acquired, Description, Samples
 
@@ -42,8 +43,7 @@ class OwnStage:
         voltage_max: float,
         max_slew_rate: float,
     ) -> None:
-        # 1. Say what the device is and what it may be asked for. `check_voltage` and `check_sample_period` of the
-        #    description then refuse everything else, before anything moves.
+        # 1. Say what the device is and what it may be asked for; everything else is refused before anything moves.
         self._description = Description(
             name=name,
             streaming=True,
@@ -53,6 +53,7 @@ class OwnStage:
             voltage_max=voltage_max,
             max_slew_rate=max_slew_rate,
         )
+        self._limiter = Limiter(self._description)
         self._put, self._get = put, get
         self._sample_period, self._voltage, self._closed = 1e-3, 0.0, False
         self._due = 0.0
@@ -77,12 +78,16 @@ class OwnStage:
         self._require_open()
         self._sample_period = self._description.check_sample_period(sample_period)
 
+    def restrict(self, limits: Description, ramp_rate: float) -> None:
+        """Hold the limits of the driver from now on: what leaves this machine passes the limiter, always."""
+        self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
+
     # 2. The fast path: as many samples back as were given, each measured while its voltage was applied. If the device
     #    fails in the midst of it, raise StageError; the driver then calls `safe`.
     def exchange(self, voltage: Samples) -> Acquired:
         """Apply a block of drive voltages [V], one per sample period."""
         self._require_open()
-        drive = self._description.check_voltage(voltage, self._voltage, self._sample_period)
+        drive = self._limiter.check(voltage, self._voltage, self._sample_period)
         displacement = np.empty(drive.size)
         self._due = max(self._due, time.monotonic())
         for i, level in enumerate(drive):
@@ -94,13 +99,12 @@ class OwnStage:
 
     # 3. The slow path.
     def set_voltage(self, voltage: float) -> None:
-        """Apply one voltage [V] and hold it."""
+        """Go to one voltage [V] and hold it."""
         self._require_open()
-        self._move(float(self._description.check_voltage(np.array([voltage]), self._voltage, self._sample_period)[0]))
+        self._go(self._limiter.goal(voltage))
 
     def read_voltage(self) -> float:
         """The voltage in force [V]: nothing measures it here."""
-        self._require_open()
         return self._voltage
 
     def read_displacement(self) -> float:
@@ -108,19 +112,23 @@ class OwnStage:
         self._require_open()
         return self._get()
 
-    # 4. The way to safety: no steeper than allowed, harmless when repeated, and it must work in every state. What
-    #    cannot be made safe has to be said: raise StageError with what is known about the voltage.
+    # 4. The way to safety: harmless when repeated, and it must work in every state. Where it fails, raise StageError
+    #    with what is known about the voltage.
     def safe(self) -> None:
         """Go to 0 V."""
-        step = self._description.max_slew_rate * 1e-3
-        while not self._closed and self._voltage:
-            self._move(max(self._voltage - step, 0.0))
-            time.sleep(1e-3)
+        if not self._closed and self._voltage != self._limiter.safe_voltage:
+            self._go(self._limiter.safe_voltage)
 
     def close(self) -> None:
         """Make safe; every later call but `close` and `safe` raises StageError."""
         self.safe()
         self._closed = True
+
+    def _go(self, voltage: float) -> None:
+        for part in self._limiter.way(self._voltage, voltage, 1e-3):
+            for level in part:
+                self._move(float(level))
+                time.sleep(1e-3)
 
     def _move(self, voltage: float) -> None:
         self._put(voltage)

@@ -9,7 +9,8 @@
     ├── IdentificationError   (RuntimeError)     data that do not determine what was asked
     ├── DivergenceError       (ArithmeticError)  a simulation that ran away
     ├── StageError            (OSError)          a stage or its limits, link, state
-    │   └── DeviceError                          the device itself failed
+    │   ├── DeviceError                          the device itself failed
+    │   └── StoppedError                         work on a device was broken off because a stop was asked for
     └── RecordingError        (OSError)          a file that cannot be read or written
 """
 
@@ -66,6 +67,10 @@ class StageError(PiezoError, OSError):
 
 class DeviceError(StageError):
     """The device refused, answered nonsense, or its link failed: a fault of the device, not of its user."""
+
+
+class StoppedError(StageError):
+    """Work on a device was broken off because a stop was asked for; nothing was started after that."""
 
 
 class RecordingError(PiezoError, OSError):

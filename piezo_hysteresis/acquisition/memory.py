@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from ..errors import StoppedError
 from ..stage.stage import Acquired, MemoryStage
 from .playback import Playback
 from .streaming import StreamingAcquisition
@@ -31,11 +32,17 @@ class MemoryAcquisition(StreamingAcquisition):
         super().__init__(*arguments, **named)
         self._rest_period = rest_period
 
+    def _run(self) -> None:
+        cast(MemoryStage, self.stage).watch(lambda: self.playback.is_stopping)
+        super()._run()
+
     def _step(self) -> None:
         playback = cast(Playback, self.playback)
         with self._access:
-            pending = playback.pending
-        if pending:
+            pending, is_stopping = playback.pending, playback.is_stopping
+        if is_stopping:
+            self._break_off(playback)
+        elif pending:
             self._play(playback, min(pending, self.stage.description.longest_block or pending))
         else:
             self._rest(playback)
@@ -45,7 +52,7 @@ class MemoryAcquisition(StreamingAcquisition):
         while time.monotonic() < due:
             if not self._wait_until(min(due, time.monotonic() + self._poll)):
                 return
-            if playback.pending:
+            if playback.pending or playback.is_stopping:
                 return
         self._look(playback)
 
@@ -61,28 +68,29 @@ class MemoryAcquisition(StreamingAcquisition):
         self._tell(first, drive, Acquired(np.array([voltage]), np.array([displacement])))
 
     def _play(self, playback: Playback, count: int) -> None:
+        """One block from upload to read-out; a stop is noticed between any two messages to the device."""
         stage = cast(MemoryStage, self.stage)
         with self._access:
-            voltage, was_stopping = playback.preview(count).voltage, playback.is_stopping
-        stage.upload(voltage)
-        stage.arm()
-        first = max(self._time_base.index_at(time.monotonic()), self.index)
-        stage.start()
-        end = self._time_base.due(first + count)
-
-        def interrupted() -> bool:
-            return playback.is_stopping and not was_stopping
-
-        while (now := time.monotonic()) < end and not interrupted():
-            if not self._wait_until(min(end, now + self._poll)):
-                break
-        if time.monotonic() < end:
+            voltage = playback.preview(count).voltage
+        try:
+            stage.upload(voltage)
+            stage.arm()
+            first = max(self._time_base.index_at(time.monotonic()), self.index)
+            stage.start()
+            end = self._time_base.due(first + count)
+            while (now := time.monotonic()) < end and not playback.is_stopping:
+                if not self._wait_until(min(end, now + self._poll)):
+                    break
+            if time.monotonic() < end:
+                self._break_off(playback)
+                return
+            stage.wait(1.0 + end - self._time_base.due(first))
+            acquired = stage.read()
+        except StoppedError:
             self._break_off(playback)
             return
-        stage.wait(1.0 + end - self._time_base.due(first))
-        acquired = stage.read()
         with self._access:
-            drive = None if interrupted() else playback.take(count)
+            drive = None if playback.is_stopping else playback.take(count)
         if drive is None:
             self._break_off(playback)
         else:
@@ -92,5 +100,5 @@ class MemoryAcquisition(StreamingAcquisition):
         """The device goes to its safe voltage by itself; what it measured on the way is not known."""
         self.stage.safe()
         with self._access:
-            playback.jump(self.stage.voltage)
+            playback.jump(self.stage.description.safe_voltage)
         self._look(playback)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from ..errors import PiezoError, StageError
+from ..record import Record
+from ..stage.opening import Opening
 from ..stage.replay import ReplayStage
 from ..stage.stage import Stage
 from .back_ends import BACK_ENDS, open_stage
@@ -15,6 +17,7 @@ from .playback import Playback
 from .recorded_playback import RecordedPlayback
 from .settings import DriverSettings
 from .stage_lock import StageLock
+from .stop_latch import StopLatch
 from .streaming import Delivery, Source, StreamingAcquisition
 from .time_base import TimeBase
 
@@ -30,6 +33,10 @@ class DriverSession:
         Of the rows of the back end, by name.
     place : str
         What no other driver may share, in words: topic and domain.
+    read : callable, optional
+        Reads the records of a recording from its path, for the stage `replay`.
+    latch : StopLatch, optional
+        Outlives the session where it is given.
 
     Raises
     ------
@@ -37,16 +44,26 @@ class DriverSession:
         If the stage cannot be opened, is driven already, or does not allow what the settings ask for.
     """
 
-    def __init__(self, settings: DriverSettings, values: Mapping[str, Any], place: str) -> None:
+    def __init__(
+        self,
+        settings: DriverSettings,
+        values: Mapping[str, Any],
+        place: str,
+        read: Callable[[str], Iterable[Record]] | None = None,
+        latch: StopLatch | None = None,
+    ) -> None:
         self.settings, self._values = settings, values
+        self.latch = StopLatch() if latch is None else latch
         self._lock = StageLock([place])
+        opening = Opening(settings.sample_period, settings.real_time_factor, **({"read": read} if read else {}))
         try:
-            self.stage = open_stage(settings.stage, values, settings.sample_period, settings.real_time_factor)
+            self.stage = open_stage(settings.stage, values, opening)
         except BaseException:
             self._lock.release()
             raise
         try:
-            self.limits = settings.limits(self.stage.description)
+            self.limits = settings.limits(self.stage.description, self.stage.sample_period)
+            self.stage.restrict(self.limits, settings.ramp_rate)
             if BACK_ENDS[settings.stage].is_device:
                 self._lock.add(f"device {self.limits.name}")
         except BaseException:
@@ -82,6 +99,7 @@ class DriverSession:
             deliver,
             fail,
             lambda: subscribers() >= wanted,
+            self.latch,
         )
         if self.limits.streaming:
             acquisition = StreamingAcquisition(*arguments)
@@ -91,7 +109,7 @@ class DriverSession:
         self._acquisition = acquisition
         return acquisition
 
-    def in_force(self) -> dict[str, float | str]:
+    def in_force(self) -> dict[str, float | str | bool]:
         """What holds, by the names of `IN_FORCE`."""
         limits, settings = self.limits, self.settings
         return {
@@ -102,15 +120,17 @@ class DriverSession:
             "safe_voltage": limits.safe_voltage,
             "max_slew_rate": limits.max_slew_rate,
             "ramp_rate": settings.ramp_rate,
+            "stopped": self.latch.is_set,
         }
 
     def _source(self, stage: Stage) -> Source:
         if isinstance(stage, ReplayStage):
             return RecordedPlayback(stage, self._values["repeat"])
-        settings = self.settings
-        return Playback(
-            stage.voltage, self.limits.safe_voltage, self.sample_period, settings.ramp_rate, settings.hold_timeout
-        )
+        settings, safe = self.settings, self.limits.safe_voltage
+        playback = Playback(stage.voltage, safe, self.sample_period, settings.ramp_rate, settings.hold_timeout)
+        if abs(stage.voltage - safe) > settings.ramp_rate * self.sample_period:
+            playback.stop()  # left there by a driver that was killed, or by another program
+        return playback
 
     def make_safe(self) -> None:
         """Ramp to the safe voltage and end the stream; harmless when nothing streams.
@@ -127,7 +147,7 @@ class DriverSession:
         if not acquisition.make_safe(timeout):
             self.stage.safe()
             raise StageError(
-                f"{self.limits.name}: no ramp to the safe voltage within {timeout:g} s; it was set at once"
+                f"{self.limits.name}: not at the safe voltage within {timeout:g} s; the stage went there by itself"
             )
 
     def close(self) -> None:

@@ -15,6 +15,12 @@ from .back_ends import BACK_ENDS
 _SOURCE = "driver"
 """Source of the parameters of the driver."""
 
+LARGEST_STEP = 0.4
+"""Share of the voltage range that the drive may move by from one sample to the next, where `max_slew_rate` is 0.
+
+Four thirds of the steepest edge of the identification protocols, 0.3 of the range in one sample.
+"""
+
 DRIVER: tuple[Row, ...] = (
     Setting("stage", "simulated", "back end", tuple(BACK_ENDS)),
     Setting("autostart", True, "configure and activate at start"),
@@ -23,7 +29,9 @@ DRIVER: tuple[Row, ...] = (
     Parameter("live_rate", "f_l", "Hz", 50.0, 0.1, 1000.0, "rate of voltage, displacement and live", _SOURCE),
     Parameter("voltage_min", "u_min", "V", 0.0, -1e4, 1e4, "lowest drive voltage; both 0: the stage's", _SOURCE),
     Parameter("voltage_max", "u_max", "V", 0.0, -1e4, 1e4, "highest drive voltage; both 0: the stage's", _SOURCE),
-    Parameter("max_slew_rate", "S_max", "V/s", 0.0, 0.0, 1e12, "steepest drive; 0: what the stage allows", _SOURCE),
+    Parameter(
+        "max_slew_rate", "S_max", "V/s", 0.0, 0.0, 1e12, "steepest drive; 0: 0.4 of the range per sample", _SOURCE
+    ),
     Parameter("ramp_rate", "S_r", "V/s", 50.0, 1e-3, 1e9, "rate of set-points and of the way to safety", _SOURCE),
     Parameter(
         "hold_timeout", "T_h", "s", 0.0, 0.0, 1e6, "a held voltage then gives way to the safe one; 0: never", _SOURCE
@@ -42,6 +50,7 @@ IN_FORCE: tuple[Row, ...] = (
     Parameter("safe_voltage", "u_0", "V", 0.0, -math.inf, math.inf, "voltage of the stage at rest", _SOURCE),
     Parameter("max_slew_rate", "S_max", "V/s", 0.0, 0.0, math.inf, "steepest drive", _SOURCE),
     Parameter("ramp_rate", "S_r", "V/s", 0.0, 0.0, math.inf, "rate of set-points and of the way to safety", _SOURCE),
+    Setting("stopped", False, "true after ~/stop, until ~/release"),
 )
 """What holds while the driver is configured, under ``"in_force."``: planners read it."""
 
@@ -69,8 +78,15 @@ class DriverSettings:
         """Pick the fields out of `values`."""
         return cls(**{field.name: values[field.name] for field in fields(cls)})
 
-    def limits(self, stage: Description) -> Description:
+    def limits(self, stage: Description, sample_period: float) -> Description:
         """The description of a stage, narrowed to what this driver lets pass; waveforms may be of any length.
+
+        Parameters
+        ----------
+        stage : Description
+            Of the stage.
+        sample_period : float
+            In force [s]: `LARGEST_STEP` counts per sample.
 
         Raises
         ------
@@ -87,7 +103,8 @@ class DriverSettings:
                 f"voltage_min, voltage_max: got {low:g} to {high:g} V, expected them inside {stage.voltage_min:g} to "
                 f"{stage.voltage_max:g} V of {stage.name} and around its safe voltage {stage.safe_voltage:g} V"
             )
-        slew = self.max_slew_rate or stage.max_slew_rate
+        usual = max(LARGEST_STEP * (high - low) / sample_period, self.ramp_rate)
+        slew = self.max_slew_rate or min(usual, stage.max_slew_rate)
         if slew > stage.max_slew_rate:
             raise ParameterError(
                 f"max_slew_rate: got {slew:g} V/s, expected at most the {stage.max_slew_rate:g} V/s of {stage.name}"

@@ -18,6 +18,7 @@ from .latency_buffer import LatencyBuffer
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
 from .sample_block import SampleBlock
+from .stop_latch import StopLatch
 from .time_base import TimeBase, read_together
 
 Source = Playback | RecordedPlayback
@@ -76,6 +77,8 @@ class StreamingAcquisition:
         Takes the PiezoError that ended the thread; the stage has been made safe by itself where it could.
     ready : callable, optional
         The first block waits until it is true.
+    latch : StopLatch, optional
+        Set by `stop`; nothing is played and no set-point taken while it is.
     """
 
     patience = 0.5
@@ -91,6 +94,7 @@ class StreamingAcquisition:
         deliver: Callable[[Delivery], None],
         fail: Callable[[PiezoError], None],
         ready: Callable[[], bool] = lambda: True,
+        latch: StopLatch | None = None,
     ) -> None:
         self.stage, self.playback, self.tally = stage, playback, Tally()
         self.block_size, self.index = block_size, 0
@@ -98,6 +102,7 @@ class StreamingAcquisition:
         self._deliver, self._fail, self._ready = deliver, fail, ready
         self._late = LatencyBuffer(round(stage.description.latency / time_base.sample_period), playback.phase.number)
         self._device_clock = DeviceClock(time_base) if stage.description.latency else None
+        self._latch = StopLatch() if latch is None else latch
         self._access = threading.Lock()
         self._halting = threading.Event()
         self._safe = threading.Event()
@@ -120,6 +125,7 @@ class StreamingAcquisition:
         `accepted` is called with the phase and the number of samples before the first one is applied.
         """
         with self._access:
+            self._latch.require_released(name)
             self.playback.require_free(name)
             check(waveform, self.playback.voltage)
             phase = self.playback.play(waveform, name, stamp)
@@ -129,9 +135,15 @@ class StreamingAcquisition:
     def ramp_to(self, voltage: float) -> None:
         """See `Playback.ramp_to`."""
         with self._access:
+            self._latch.require_released("set_voltage")
             self.playback.ramp_to(voltage)
 
     def stop(self) -> tuple[Phase, bool]:
+        """As `cancel`, and nothing moves after that until the latch is released."""
+        self._latch.set()
+        return self.cancel()
+
+    def cancel(self) -> tuple[Phase, bool]:
         """See `Playback.stop`; the phase that ended, and whether it was being played."""
         with self._access:
             was_playing = self.playback.is_playing
@@ -149,7 +161,7 @@ class StreamingAcquisition:
         if not self._thread.is_alive():
             return True
         self._safe.clear()
-        self.stop()
+        self.cancel()
         reached = self._safe.wait(timeout)
         self._halting.set()
         self._thread.join(timeout)

@@ -20,7 +20,7 @@ from .terminal import console
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
-    default = DaqmxSetup("-")
+    default = DaqmxSetup("-", max_slew_rate=1.0)
     parser = subparsers.add_parser("calibrate", description=__doc__)
     parser.add_argument("device", help="name of the National Instruments card, as NI MAX shows it")
     parser.add_argument(
@@ -62,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
         server=args.server,
         sample_period=args.sample_period,
         sensor_gain=1.0,
+        max_slew_rate=20.0 / args.sample_period,  # nothing is connected that a step could harm
     )
     stage = DaqmxStage(setup)
     try:

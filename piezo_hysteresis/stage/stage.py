@@ -8,7 +8,7 @@ voltages before the amplifier; a back end that measures behind it divides by `De
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -59,8 +59,15 @@ class Stage(Protocol):
         """Set the sample period [s]; StageError if the device cannot run at it or is playing."""
         ...
 
+    def restrict(self, limits: Description, ramp_rate: float) -> None:
+        """Hold the range and slew of `limits` and a ramp rate [V/s] from now on, on every path to the device.
+
+        StageError if they allow more than the stage does.
+        """
+        ...
+
     def set_voltage(self, voltage: float) -> None:
-        """Slow path: apply one voltage [V] at once and hold it; StageError outside the limits."""
+        """Slow path: go to one voltage [V] at the ramp rate and hold it; StageError outside the limits."""
         ...
 
     def read_voltage(self) -> float:
@@ -72,7 +79,7 @@ class Stage(Protocol):
         ...
 
     def safe(self) -> None:
-        """Stop what plays and go to the safe voltage, no steeper than `max_slew_rate`; harmless when repeated."""
+        """Stop what plays and go to the safe voltage at the ramp rate; harmless when repeated."""
         ...
 
     def close(self) -> None:
@@ -99,6 +106,13 @@ class StreamingStage(Stage, Protocol):
 
 class MemoryStage(Stage, Protocol):
     """A device that plays and records from its own memory: upload, arm, start, wait, read."""
+
+    def watch(self, is_interrupted: Callable[[], bool]) -> None:
+        """Look at `is_interrupted` before every message of upload, arm, start and read; StoppedError once it is true.
+
+        Nothing is started after that, and the way to safety does not look.
+        """
+        ...
 
     def upload(self, voltage: Samples) -> None:
         """Store a waveform [V]; it counts from the voltage in force; StageError if it breaks a limit."""

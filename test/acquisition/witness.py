@@ -19,6 +19,9 @@ class Witness:
     def configure(self, sample_period):
         self.description.check_sample_period(sample_period)
 
+    def restrict(self, limits, ramp_rate):
+        self.restricted = limits, ramp_rate
+
     def exchange(self, voltage):
         self._calls += 1
         if self._calls == self._fails_at:

@@ -32,7 +32,7 @@ def test_the_delay_that_was_written_is_taken_off(piezo, address, tmp_path):
     delay = written["/**"]["nidaqmx.io_delay"]
     assert delay == pytest.approx(2 * PERIOD, abs=0.05 * PERIOD)
     wiring = {"displacement_input": "ai2", "sensor_gain": 1.0, "server": address}
-    stage = DaqmxStage(DaqmxSetup("Dev1", io_delay=delay, **wiring))
+    stage = DaqmxStage(DaqmxSetup("Dev1", max_slew_rate=1e6, io_delay=delay, **wiring))
     got = stage.exchange(np.concatenate((WAVE, np.zeros(5000))))
     np.testing.assert_allclose(got.displacement, got.voltage, atol=2e-4)
     stage.close()

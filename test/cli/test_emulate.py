@@ -16,8 +16,8 @@ from piezo_hysteresis.stage.gcs2.stage import Gcs2Stage
 
 def opened(device, port):
     if device == "gcs2":
-        return Gcs2Stage(Gcs2Setup("127.0.0.1", port, amplifier_gain=20.0))
-    return DaqmxStage(DaqmxSetup("Dev1", server=f"127.0.0.1:{port}"))
+        return Gcs2Stage(Gcs2Setup("127.0.0.1", port, amplifier_gain=20.0, max_slew_rate=1e6))
+    return DaqmxStage(DaqmxSetup("Dev1", server=f"127.0.0.1:{port}", max_slew_rate=1e6))
 
 
 @pytest.mark.parametrize("device", ["gcs2", "nidaqmx"])

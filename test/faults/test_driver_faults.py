@@ -56,7 +56,7 @@ class Bench:
 
     def rests(self):
         """Stop, as often as it takes, and wait for the safe voltage."""
-        client = self.lab.node.create_client(Trigger, "driver_node/stop")
+        client = self.lab.node.create_client(Trigger, "driver_node/cancel")
 
         def stopped():
             client.call_async(Trigger.Request())

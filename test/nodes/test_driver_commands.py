@@ -27,7 +27,8 @@ def driven(streaming_lab):
     yield streaming_lab
     streaming_lab.forget()
     samples = streaming_lab.streaming()
-    streaming_lab.call(Trigger, "driver_node/stop")
+    streaming_lab.call(Trigger, "driver_node/cancel")
+    streaming_lab.call(Trigger, "driver_node/release")
     streaming_lab.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
     streaming_lab.forget()
 
@@ -115,5 +116,27 @@ def test_stop_ramps_a_playing_waveform_down(driven):
     driven.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
     assert driven.states(statuses, "long") == ["accepted", "playing", "stopped"]
     assert samples.steepest(PERIOD) <= RAMP_RATE * (1 + 1e-6)
+    told = driven.diagnostics()
+    ask = driven.publisher(Float64, "set_voltage")
+    driven.send(np.zeros(10), "too_early")
+    ask.publish(Float64(data=1.0))
+    for name in ("too_early", "set_voltage"):
+        driven.wait(
+            lambda name=name: any(s.name == name and "call ~/release" in s.message for s in list(statuses)),
+            f"the refusal of {name}",
+        )
+    driven.wait(lambda: any("until ~/release" in s.message for a in list(told) for s in a.status), "the diagnostics")
+    assert not samples.voltage[-10:].any()
+    assert driven.call(Trigger, "driver_node/release").message == "commands are taken again"
+    driven.send(np.zeros(10), "next")
+    driven.wait(lambda: "done" in driven.states(statuses, "next"), "a later command")
+
+
+def test_a_cancelled_waveform_ends_safe_and_the_next_one_is_taken(driven):
+    samples, statuses = driven.streaming(), driven.statuses()
+    driven.send(np.concatenate((np.linspace(0, 3, 10_000), np.full(500_000, 3.0))), "long")
+    driven.wait(lambda: samples.newest.voltage[-1] == 3.0, "the top")
+    assert driven.call(Trigger, "driver_node/cancel").success
+    driven.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
     driven.send(np.zeros(10), "next")
     driven.wait(lambda: "done" in driven.states(statuses, "next"), "a later command")

@@ -102,7 +102,7 @@ def test_a_controller_with_memory(lab):
         return float(controller.carry_out("VOL? 1").lines[0].partition("=")[2]) / GAIN
 
     with Gcs2Server(controller) as server:
-        address = {"gcs2__host": server.host, "gcs2__port": server.port}
+        address = {"gcs2__host": server.host, "gcs2__port": server.port, "gcs2__max_slew_rate": 1e6}
         driven = Driven(lab, "gcs2", gcs2__amplifier_gain=GAIN, gcs2__points_per_command=500, **address)
         assert "E-727.EMULATED" in driven.in_force("stage")
         assert driven.in_force("voltage_max") == 10.0
@@ -136,7 +136,11 @@ def test_a_card_that_streams(lab):
 
     card = Card(SimulatedStage(seed=3, sample_period=PERIOD))
     with DaqmxServer(card) as server:
-        wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1"}
+        wiring = {
+            "nidaqmx__server": f"127.0.0.1:{server.port}",
+            "nidaqmx__device": "Dev1",
+            "nidaqmx__max_slew_rate": 1e6,
+        }
         wiring |= {"nidaqmx__voltage_input": "ai1", "nidaqmx__lead": 1.5, "sample_period": PERIOD}
         driven = Driven(lab, "nidaqmx", block_duration=0.1, **wiring)
         assert driven.in_force("stage").endswith("Dev1/ao0")
@@ -162,8 +166,14 @@ def test_a_card_that_streams(lab):
 def emulated_controller():
     controller = Controller(SimulatedStage(seed=3, sample_period=PERIOD))
     with Gcs2Server(controller) as server:
-        address = {"gcs2__host": server.host, "gcs2__port": server.port}
-        yield {"stage": "gcs2", "gcs2__amplifier_gain": GAIN, "gcs2__points_per_command": 500, **address}
+        address = {"gcs2__host": server.host, "gcs2__port": server.port, "gcs2__max_slew_rate": 1e6}
+        yield {
+            "stage": "gcs2",
+            "gcs2__max_slew_rate": 1e6,
+            "gcs2__amplifier_gain": GAIN,
+            "gcs2__points_per_command": 500,
+            **address,
+        }
 
 
 @contextmanager
@@ -174,6 +184,7 @@ def emulated_card():
 
     with DaqmxServer(Card(SimulatedStage(seed=3, sample_period=PERIOD))) as server:
         wiring = {"nidaqmx__server": f"127.0.0.1:{server.port}", "nidaqmx__device": "Dev1", "nidaqmx__lead": 1.5}
+        wiring["nidaqmx__max_slew_rate"] = 1e6
         yield {
             "stage": "nidaqmx",
             "nidaqmx__voltage_input": "ai1",

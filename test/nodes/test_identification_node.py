@@ -192,6 +192,11 @@ def test_every_early_end_leaves_the_stage_safe_and_the_recording_readable(lab):
     assert "stopped" in identification.await_state("failed").message
     at_rest()
     recorded(path)
+    refused = identification.ask("identify")
+    assert not refused.success
+    assert "call driver_node/release first" in refused.message
+    assert lab.call(Trigger, "driver_node/release").success
+    lab.pause(1.0)  # until the identification node has asked the driver again
 
     path = identification.begin()
     lab.wait(moving, "the first phase")

@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "ros.md").read_text()
 POLICY = ROOT / "config" / "sros2_policy.xml"
 NODES = {"driver": "driver_node", "model": "model_node", "identification": "identification_node"}
+ALL_NODES = (*NODES.values(), "driver_node_stop")
 OF_ROS = {"/rosout", "/parameter_events", "/clock"}
 
 
@@ -37,7 +38,7 @@ def nodes(shared_lab):
     there = shared_lab.node.get_node_names
     last = {"driver_node": "/samples", "model_node": "/predicted_live", "identification_node": "/model"}
     try:
-        shared_lab.wait(lambda: set(NODES.values()) <= set(there()), "all nodes")
+        shared_lab.wait(lambda: set(ALL_NODES) <= set(there()), "all nodes")
         for node, topic in last.items():
             shared_lab.wait(
                 lambda node=node, topic=topic: topic in published(shared_lab, node), f"{topic} of the {node}"
@@ -88,7 +89,7 @@ def test_what_anyone_may_publish_is_subscribed_by_the_driver(nodes):
 def test_every_service_is_served_as_documented(nodes):
     documented = {f"/{name}": cells[0] for name, cells in rows("Services")}
     real = {}
-    for node in NODES.values():
+    for node in ALL_NODES:
         for name, kinds in nodes.node.get_service_names_and_types_by_node(node, "/"):
             if kinds[0].startswith("std_srvs"):
                 real[name] = kinds[0].replace("/srv/", "/")
@@ -107,7 +108,7 @@ def allowed(node):
     return names
 
 
-@pytest.mark.parametrize("node", NODES.values())
+@pytest.mark.parametrize("node", ALL_NODES)
 def test_the_security_policy_allows_what_a_node_uses_and_nothing_more(nodes, node):
     def of(what):
         return {name for name, _ in getattr(nodes.node, f"get_{what}_names_and_types_by_node")(node, "/")}
@@ -119,7 +120,8 @@ def test_the_security_policy_allows_what_a_node_uses_and_nothing_more(nodes, nod
         own |= {"/" + name.lstrip("/") for name in TOPICS}  # while it records
     if node == "driver_node":
         own.add("/samples")  # before it begins, to find another driver
-    assert policy["subscribe"] == own | {"/clock"}
+    clock = set() if node == "driver_node_stop" else {"/clock"}  # a stop asks no clock
+    assert policy.get("subscribe", set()) == own | clock
     assert policy["reply"] == of("service")
     assert policy.get("request", set()) == of("client")
 

@@ -39,7 +39,9 @@ def gcs2(plant):
     """Upload, arm, start, wait, read: block by block as long as the recorder, over TCP."""
     simulated = SimulatedStage(plant, seed=SEED, sample_period=PERIOD)
     with Gcs2Server(Controller(simulated, speed=math.inf, recorder_points=8 * 3000)) as server:
-        stage = Gcs2Stage(Gcs2Setup(server.host, server.port, amplifier_gain=GAIN, points_per_command=500))
+        stage = Gcs2Stage(
+            Gcs2Setup(server.host, server.port, amplifier_gain=GAIN, points_per_command=500, max_slew_rate=1e6)
+        )
         longest = stage.description.longest_block
 
         def block(drive):
@@ -70,7 +72,7 @@ def nidaqmx(plant):
 
     with DaqmxServer(Card(SimulatedStage(plant, seed=SEED, sample_period=PERIOD), speed=math.inf)) as server:
         wiring = {"voltage_input": "ai1", "amplifier_gain": GAIN, "server": f"127.0.0.1:{server.port}"}
-        stage = DaqmxStage(DaqmxSetup("Dev1", sample_period=PERIOD, **wiring))
+        stage = DaqmxStage(DaqmxSetup("Dev1", max_slew_rate=1e6, sample_period=PERIOD, **wiring))
         late = round(stage.description.latency / PERIOD)
 
         def play(drives):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .card import INPUTS, Card, CardError
+from .card import Card, CardError
 
 _ANALOG_INPUT, _ANALOG_OUTPUT, _VOLTAGE = 10100, 10102, 10322
 """NI-DAQmx values: kinds of channel, and of measurement."""
@@ -203,7 +203,7 @@ class Calls:
 
     def _add(self, request: Any, kind: int) -> dict[str, Any]:
         channel = request.physical_channel.partition("/")[2]
-        if channel not in ("ao0", *INPUTS):
+        if channel not in ("ao0", *self._card.inputs):
             raise CardError(-200170, f"Physical channel specified does not exist on this device: {channel}")
         task = self._task(request)
         task.kind = kind

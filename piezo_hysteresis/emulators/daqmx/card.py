@@ -16,8 +16,8 @@ from ..fault import Fault, Faults
 UNDERFLOW, OUT_OF_RANGE, NOT_RUNNING = -200290, -200077, -200278
 """Error numbers of NI-DAQmx."""
 
-INPUTS = ("ai0", "ai1", "ai2")
-"""Analogue inputs of the card."""
+INPUTS = ("ai0", "ai1", "ai2", "_ao0_vs_aognd")
+"""Inputs, the last one inside the card: the output, read back."""
 
 _TIMEBASE = 100e6
 """Clock that sample clocks are divided from [Hz]."""
@@ -36,6 +36,8 @@ class CardError(Exception):
 class Card:
     """Output ``ao0`` drives the stage; ``ai0`` is its sensor, ``ai1`` the amplifier's monitor, ``ai2`` the output.
 
+    The output can be read back inside the card, too, unless it is a card that cannot.
+
     Parameters
     ----------
     stage : SimulatedStage
@@ -46,6 +48,8 @@ class Card:
         Monitor voltage over piezo voltage [V/V].
     speed : float
         Seconds of the card per second; infinite to play what is in the output buffer as soon as it is asked for.
+    reads_back : bool
+        False for a card that cannot read its output back.
     faults : iterable of Fault
     """
 
@@ -56,9 +60,11 @@ class Card:
         sensor_gain: float = 6e-6,
         monitor_gain: float = 0.1,
         speed: float = 1.0,
+        reads_back: bool = True,
         faults: Iterable[Fault] = (),
     ) -> None:
         self._stage, self._speed, self.faults = stage, speed, Faults(faults)
+        self.inputs = INPUTS if reads_back else INPUTS[:-1]
         self._sensor_gain, self._monitor_gain = sensor_gain, monitor_gain
         self._begin, self._played, self._is_finite = 0.0, 0, False
         self._buffer: Samples = np.empty(0)
@@ -159,7 +165,7 @@ class Card:
             self.underflow()
 
     def _run(self, voltage: Samples) -> Samples:
-        """Inputs while so many voltages are put out [V], shape (3, n)."""
+        """Inputs while so many voltages are put out [V], shape (4, n)."""
         lasts, d = self.faults.lasts, self._stage.description
         drive = np.ascontiguousarray(voltage)
         if lasts("saturated"):
@@ -174,4 +180,4 @@ class Card:
         sensor = displacement / self._sensor_gain
         monitor = got.voltage * d.amplifier_gain * self._monitor_gain
         both = (monitor, sensor) if lasts("swapped") else (sensor, monitor)
-        return np.stack((*both, echo[: drive.size]))
+        return np.stack((*both, echo[: drive.size], got.voltage))

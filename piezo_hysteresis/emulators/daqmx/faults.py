@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..fault import FaultCatalogue
 
-_IN_A_STREAM = "ReadAnalogF64:3"
+_IN_A_STREAM = "ReadAnalogF64:4"
 """Call at which a fault begins by default: the third block of a stream."""
 
 FAULTS = FaultCatalogue(

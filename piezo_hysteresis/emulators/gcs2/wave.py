@@ -43,16 +43,15 @@ class WaveGenerator:
         return self._points[table]
 
     def write(self, words: list[str]) -> None:
-        """Carry out ``WAV table X|& PNT first count values…``; the calculated curves are not there."""
+        """Carry out ``WAV table X|& PNT first count values…`` or ``WAV table X|& LIN …``; no other curve is there."""
         if len(words) < 6:
             raise Refusal(WRONG_COUNT)
-        table, mode, kind, first, count, *values = words
-        if kind.upper() != "PNT" or mode.upper() not in ("X", "&"):
+        table, mode, kind, *rest = words
+        if kind.upper() not in ("PNT", "LIN") or mode.upper() not in ("X", "&"):
             raise Refusal(OUT_OF_RANGE)
         try:
-            stored, numbers = self.points(int(table)), [float(value) for value in values]
-            if int(first) < 1 or int(count) != len(numbers):
-                raise Refusal(WRONG_COUNT)
+            stored = self.points(int(table))
+            numbers = _points(rest) if kind.upper() == "PNT" else _line(rest)
         except ValueError:
             raise Refusal(SYNTAX) from None
         low, high = self._limits
@@ -72,3 +71,21 @@ class WaveGenerator:
         if self.cycles < 1 or self.cycles * self.rate * len(points) > _LONGEST_RUN:
             raise Refusal(OUT_OF_RANGE)
         return np.tile(np.repeat(np.array(points) + self.offset, self.rate), self.cycles)
+
+
+def _points(words: list[str]) -> list[float]:
+    first, count, *values = words
+    if int(first) < 1 or int(count) != len(values):
+        raise Refusal(WRONG_COUNT)
+    return [float(value) for value in values]
+
+
+def _line(words: list[str]) -> list[float]:
+    """A line of constant speed over the whole segment; the last point is one step before the end."""
+    segment, amplitude, offset, wave, first, speed_up = (float(word) for word in words)
+    if not 1 <= segment == wave or first or speed_up:
+        raise Refusal(OUT_OF_RANGE)
+    if segment > _LONGEST_RUN:
+        raise Refusal(WAVE_TOO_LARGE)
+    steps = np.arange(int(segment)) / segment
+    return [float(point) for point in offset + amplitude * steps]

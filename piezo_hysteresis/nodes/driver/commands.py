@@ -1,13 +1,15 @@
-"""`DriverCommands`: what others ask of the driver: `command`, `set_voltage`, `~/stop`."""
+"""`DriverCommands`: what others ask of the driver: `command`, `set_voltage`, `~/stop`, `~/cancel`, `~/release`."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64
-from std_srvs.srv import Trigger
 
 from ...acquisition.session import DriverSession
+from ...acquisition.stop_latch import StopLatch
 from ...errors import PiezoError, StageError, printable
 from ..messages.conversions import from_stamp, waveform_from_cloud
 from ..messages.phase_text import phase_name
@@ -15,6 +17,7 @@ from ..runtime.node_clock import now
 from ..topics import subscribe
 from .diagnostics import DriverDiagnostics
 from .publishers import DriverTopics
+from .stop_services import StopServices
 
 _LONGEST_NAME = 64
 """Characters of a phase name at most."""
@@ -32,14 +35,20 @@ class DriverCommands:
         The driver.
     diagnostics : DriverDiagnostics
         Counts the refusals.
+    latch : StopLatch
+        Of the driver.
+    tell_latch : callable
+        Called when the driver is stopped or released, in the thread of the stop.
     """
 
-    def __init__(self, node: Node, diagnostics: DriverDiagnostics) -> None:
-        self._node, self._diagnostics = node, diagnostics
+    def __init__(
+        self, node: Node, diagnostics: DriverDiagnostics, latch: StopLatch, tell_latch: Callable[[], None]
+    ) -> None:
+        self._node, self._diagnostics, self._latch, self._tell_latch = node, diagnostics, latch, tell_latch
         self._attached: tuple[DriverSession, DriverTopics] | None = None
         subscribe(node, "command", self._on_command)
         subscribe(node, "set_voltage", self._on_set_voltage)
-        node.create_service(Trigger, "~/stop", self._on_stop)
+        self._services = StopServices(node, stop=self._stop, cancel=self._cancel, release=self._release)
 
     def attach(self, session: DriverSession, topics: DriverTopics) -> None:
         """Pass commands to this stage from now on."""
@@ -48,6 +57,10 @@ class DriverCommands:
     def detach(self) -> None:
         """Refuse every command from now on."""
         self._attached = None
+
+    def end(self) -> None:
+        """Serve no stop any more."""
+        self._services.end()
 
     def _stage(self) -> tuple[DriverSession, DriverTopics]:
         if self._attached is None:
@@ -59,6 +72,7 @@ class DriverCommands:
         try:
             stamp = from_stamp(cloud.header.stamp)
             session, topics = self._stage()
+            self._latch.require_released(name)
             name = phase_name(cloud.header.frame_id)
             voltage = waveform_from_cloud(cloud, session.sample_period)
             waveform = session.check.waveform(voltage, stamp, now(self._node))
@@ -76,19 +90,33 @@ class DriverCommands:
         except PiezoError as error:
             self._refuse("set_voltage", 0, error)
 
-    def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = True
+    def _stop(self) -> str:
+        """Go to the safe voltage, and let nothing move until the stop is released."""
+        self._latch.set()
+        self._tell_latch()
+        return f"{self._go_to_safety(latch=True)}; nothing moves until ~/release"
+
+    def _cancel(self) -> str:
+        """Go to the safe voltage; the next command is taken when the stage is there."""
+        return self._go_to_safety(latch=False)
+
+    def _release(self) -> str:
+        was_set = self._latch.release()
+        self._tell_latch()
+        return "commands are taken again" if was_set else "the driver was not stopped"
+
+    def _go_to_safety(self, latch: bool) -> str:
         try:
             session, topics = self._stage()
-            phase, was_playing = session.streaming.stop()
+            streaming = session.streaming
+            phase, was_playing = streaming.stop() if latch else streaming.cancel()
         except StageError as error:
-            response.message = f"{error}; it was left at its safe voltage"
-            return response
+            return f"{error}; it was left at its safe voltage"
         if not was_playing:
             topics.stopped(phase)
-        response.message = f"on the way to the safe voltage, {session.limits.safe_voltage:g} V"
-        self._node.get_logger().info(f"stopped {phase}: {response.message}", throttle_duration_sec=_LOG_INTERVAL)
-        return response
+        told = f"on the way to the safe voltage, {session.limits.safe_voltage:g} V"
+        self._node.get_logger().info(f"stopped {phase}: {told}", throttle_duration_sec=_LOG_INTERVAL)
+        return told
 
     def _refuse(self, name: str, stamp: int, reason: PiezoError) -> None:
         self._diagnostics.refused += 1

@@ -7,6 +7,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 
+from ...acquisition.stop_latch import StopLatch
 from ...acquisition.streaming import StreamingAcquisition
 from ..messages.conversions import diagnostic
 from ..runtime.guarded_node import GuardedNode
@@ -21,10 +22,12 @@ class DriverDiagnostics:
     ----------
     node : GuardedNode
         The driver; its full name stands before every status.
+    latch : StopLatch
+        Of the driver: whether it was stopped.
     """
 
-    def __init__(self, node: GuardedNode) -> None:
-        self._node = node
+    def __init__(self, node: GuardedNode, latch: StopLatch) -> None:
+        self._node, self._latch = node, latch
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: stage"
         self._publisher = advertise(node, DIAGNOSTICS)
         self._state = (DiagnosticStatus.STALE, "not configured", "")
@@ -47,7 +50,13 @@ class DriverDiagnostics:
     def publish(self) -> None:
         """Publish one array with one status."""
         level, message, stage = self._state
-        values: dict[str, object] = {"refused_commands": self.refused, "faults": self._node.faults}
+        values: dict[str, object] = {
+            "refused_commands": self.refused,
+            "faults": self._node.faults,
+            "stopped": self._latch.is_set,
+        }
+        if self._latch.is_set and level == DiagnosticStatus.OK:
+            level, message = DiagnosticStatus.WARN, f"stopped, {message}; nothing moves until ~/release"
         if fault := self._node.recent_fault:
             level, message = max(level, DiagnosticStatus.WARN), f"{message}; {fault}"
         acquisition = self._acquisition

@@ -17,7 +17,9 @@ from sensor_msgs.msg import PointCloud2
 from ...acquisition.back_ends import BACK_ENDS
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DRIVER, IN_FORCE, DriverSettings
+from ...acquisition.stop_latch import StopLatch
 from ...errors import ParameterError, PiezoError, StageError, reason_of
+from ...record import Record
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.node_clock import now
 from ..runtime.parameters import declare, read
@@ -63,9 +65,10 @@ class DriverNode(GuardedNode, LifecycleNode):
         self._topics: DriverTopics | None = None
         self._failure: PiezoError | None = None
         self._telling = False
-        self._diagnostics = DriverDiagnostics(self)
+        self._latch = StopLatch()
+        self._diagnostics = DriverDiagnostics(self, self._latch)
         self.add_on_set_parameters_callback(self._refuse_while_configured)
-        self._commands = DriverCommands(self, self._diagnostics)
+        self._commands = DriverCommands(self, self._diagnostics, self._latch, self._latch_changed)
 
     def begin(self) -> None:
         """Configure and activate where `autostart` asks for it; after a failure both can be tried again."""
@@ -78,6 +81,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             self.trigger_deactivate()
         if self._state_machine.current_state[1] in ("unconfigured", "inactive"):
             self.trigger_shutdown()
+        self._commands.end()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the stage; on failure the node stays unconfigured and tells why."""
@@ -85,7 +89,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             settings = DriverSettings.from_values(read(self, DRIVER))
             values = read(self, BACK_ENDS[settings.stage].rows, f"{settings.stage}.")
             place = f"{self.resolve_topic_name('samples')} of domain {self.context.get_domain_id()}"
-            session = DriverSession(settings, values, place)
+            session = DriverSession(settings, values, place, _records, self._latch)
             try:
                 self._refuse_second_driver(settings.discovery_time)
             except StageError:
@@ -153,7 +157,7 @@ class DriverNode(GuardedNode, LifecycleNode):
 
     def _release(self) -> None:
         self._commands.detach()
-        self._tell_in_force({row.name: row.value for row in IN_FORCE})
+        self._tell_in_force({row.name: row.value for row in IN_FORCE} | {"stopped": self._latch.is_set})
         session, self._session = self._session, None
         topics, self._topics = self._topics, None
         if topics is not None:
@@ -173,6 +177,15 @@ class DriverNode(GuardedNode, LifecycleNode):
     def _give_up(self) -> None:
         if self._state_machine.current_state[1] == "active":
             self.trigger_deactivate()
+
+    def _latch_changed(self) -> None:
+        """The driver was stopped or released, in a thread of its own: tell it from the executor's."""
+        if self.executor is not None:
+            self.executor.create_task(self.guarded(self._tell_latch))
+
+    def _tell_latch(self) -> None:
+        self._tell_in_force({"stopped": self._latch.is_set})
+        self._diagnostics.publish()
 
     def _tell_failure(self, error: Exception) -> None:
         reason = reason_of(error)
@@ -211,6 +224,12 @@ class DriverNode(GuardedNode, LifecycleNode):
             if reason:
                 return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
+
+
+def _records(path: str) -> tuple[Record, ...]:
+    from ... import recording  # only for a replay, and slow to import
+
+    return recording.read(path).records
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -47,18 +47,20 @@ class DriverClient:
         Fate of the last phase: ``sending``, ``sent``, ``accepted``, ``playing``, ``done``, ``refused`` or ``stopped``.
     first_index : int
         Index of its first sample, once it plays.
+    stopped : str
+        Why the driver takes no command; empty where it was not stopped.
     """
 
     def __init__(self, node: GuardedNode, driver: str) -> None:
         self._node, self._driver = node, driver
         self.limits: DriveLimits | None = None
-        self.state = self.reason = ""
+        self.state = self.reason = self.stopped = ""
         self.first_index = 0
         self._sent: tuple[str, str] | None = None
         self._newest: float | None = None
         self._pending: Future | None = None
         self._parameters = AsyncParameterClient(node, driver)
-        self._stop = node.create_client(Trigger, f"{driver}/stop")
+        self._stop = node.create_client(Trigger, f"{driver}/cancel")  # another one's stop stays as it is
         self._command = CommandSender(node)
         subscribe(node, "command_status", self._on_status)
         subscribe(node, "voltage", self._on_voltage)
@@ -97,7 +99,7 @@ class DriverClient:
         self._command.send(phase, leaving, lost)
 
     def stop(self) -> Future | None:
-        """Ask the driver to go to the safe voltage; None where there is no driver to ask.
+        """Ask the driver to end what it plays and go to the safe voltage; None where there is no driver to ask.
 
         A phase that is on its way arrives first.
         """
@@ -115,11 +117,13 @@ class DriverClient:
         if not self._parameters.services_are_ready():
             self.limits = None
             return
-        self._pending = self._parameters.get_parameters([f"in_force.{name}" for name in _NAMES])
+        self._pending = self._parameters.get_parameters([f"in_force.{name}" for name in (*_NAMES, "stopped")])
         self._pending.add_done_callback(self._node.guarded(self._on_limits))
 
     def _on_limits(self, answer: Future) -> None:
         values = [parameter_value_to_python(value) for value in answer.result().values]
+        stopped = values.pop() if len(values) > len(_NAMES) else False
+        self.stopped = f"the driver was stopped, nothing moves; call {self._driver}/release first" if stopped else ""
         self.limits = None
         if len(values) == len(_NAMES) and values[0]:
             try:

@@ -104,6 +104,9 @@ class IdentificationNode(GuardedNode):
         return response
 
     def _on_identify(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._driver.stopped:
+            response.message = self._driver.stopped
+            return response
         path = self._root() / datetime.now(UTC).strftime("%Y%m%dT%H%M%S%fZ")
         return self._begin(response, self._identify(path), f"recording to {path}")
 

@@ -70,6 +70,8 @@ def campaign(
     """
     yield from _until(lambda: driver.limits is not None, lambda: driver.missing)
     assert driver.limits is not None
+    if driver.stopped:
+        raise StageError(driver.stopped)
     protocol = plan(driver.limits)
     recorder = BagRecorder(node, path)
     try:

@@ -21,5 +21,6 @@ class Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc]  # grpc 
 
     def intercept_unary_unary(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
         """Pass the call on with its deadline."""
-        allowed = self._seconds + max(getattr(request, "timeout", 0.0), 0.0)
+        waits = (getattr(request, name, 0.0) for name in ("timeout", "time_to_wait"))
+        allowed = self._seconds + max(*waits, 0.0)
         return continuation(client_call_details._replace(timeout=allowed), request)

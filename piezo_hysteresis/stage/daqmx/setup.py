@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ...errors import StageError
+from ..description import Description
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +34,11 @@ class DaqmxSetup:
     voltage_min, voltage_max : float
         Limits of the drive before the amplifier [V].
     max_slew_rate : float
-        Steepest drive [V/s]; also the way to the safe voltage.
+        Steepest drive [V/s], and rate of the way to the safe voltage unless a driver has a lower one; has to be given.
     safe_voltage : float
         Drive voltage of the stage at rest [V].
+    assume_safe : bool
+        True to take the output to be at its safe voltage at the start, where neither the card nor a monitor tells.
     amplifier_gain : float
         Piezo voltage over drive voltage [V/V].
     monitor_gain : float
@@ -70,8 +73,9 @@ class DaqmxSetup:
     lead: float = 0.1
     voltage_min: float = 0.0
     voltage_max: float = 10.0
-    max_slew_rate: float = math.inf
+    max_slew_rate: float = 0.0
     safe_voltage: float = 0.0
+    assume_safe: bool = False
     amplifier_gain: float = 20.0
     monitor_gain: float = 0.1
     sensor_gain: float = 6e-6
@@ -89,15 +93,40 @@ class DaqmxSetup:
             "sample_period",
             "sample_period_min",
             "lead",
-            "max_slew_rate",
             "sensor_range",
             "timeout",
             "voltage_tolerance",
         ):
             if not getattr(self, name) > 0:
                 raise StageError(f"daqmx.{name}: got {getattr(self, name)!r}, expected more than 0")
+        if not 0 < self.max_slew_rate < math.inf:
+            raise StageError(
+                f"nidaqmx.max_slew_rate: got {self.max_slew_rate:g} V/s, expected the steepest that amplifier and "
+                "stage stand, more than 0 and finite; from the amplifier's current I and the piezo's capacitance C it "
+                "is I/C, divided by amplifier_gain"
+            )
         for name in ("amplifier_gain", "monitor_gain", "sensor_gain"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) != 0):
                 raise StageError(f"daqmx.{name}: got {getattr(self, name)!r}, expected a number other than 0")
         if not 0 <= self.io_delay < 1:
             raise StageError(f"daqmx.io_delay: got {self.io_delay!r} s, expected 0 to 1 s")
+
+    def description(self) -> Description:
+        """Limits and scales of the stage; `latency` is that of the output buffer."""
+        s = self
+        scale = abs(s.sensor_gain) * s.sensor_range
+        return Description(
+            name=f"NI-DAQmx {s.server or 'local'} {s.device}/{s.output}",
+            streaming=True,
+            sample_period_min=s.sample_period_min,
+            sample_period_max=1.0,
+            voltage_min=s.voltage_min,
+            voltage_max=s.voltage_max,
+            max_slew_rate=s.max_slew_rate,
+            safe_voltage=min(max(s.safe_voltage, s.voltage_min), s.voltage_max),
+            amplifier_gain=s.amplifier_gain,
+            displacement_min=-scale,
+            displacement_max=scale,
+            measured_voltage=bool(s.voltage_input),
+            latency=s.lead,
+        )

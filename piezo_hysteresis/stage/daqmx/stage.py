@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
 import numpy as np
 
 from ...errors import DeviceError, StageError
 from ..agreement import Agreement
+from ..guard import guarded
+from ..limiter import Limiter
 from ..stage import Acquired, Description, Samples
 from .setup import DaqmxSetup
 from .tasks import DaqmxError, Tasks
 
-_RAMP_STEP = 0.01
-"""Time between two voltages of a ramp [s]."""
+_RAMP_PERIOD = 1e-3
+"""Time between the samples of a ramp outside a stream, at most [s]."""
+_READ_BACK_ERROR = 2e-3
+"""Error of an output that the card reads back itself, at most [V]."""
 _CLIPPED = 0.998
 """Share of the range of the sensor from which on it counts as clipped."""
 
@@ -38,30 +40,23 @@ class DaqmxStage:
 
     def __init__(self, setup: DaqmxSetup) -> None:
         self._setup, self._tasks, self._closed, self._is_lost = setup, Tasks(setup), False, False
-        s = setup
-        scale = abs(s.sensor_gain) * s.sensor_range
-        self._description = Description(
-            name=f"NI-DAQmx {s.server or 'local'} {s.device}/{s.output}",
-            streaming=True,
-            sample_period_min=s.sample_period_min,
-            sample_period_max=1.0,
-            voltage_min=s.voltage_min,
-            voltage_max=s.voltage_max,
-            max_slew_rate=s.max_slew_rate,
-            safe_voltage=min(max(s.safe_voltage, s.voltage_min), s.voltage_max),
-            amplifier_gain=s.amplifier_gain,
-            displacement_min=-scale,
-            displacement_max=scale,
-            measured_voltage=bool(s.voltage_input),
-            latency=s.lead,
-        )
-        self._sample_period = self._description.check_sample_period(s.sample_period)
+        self._description = setup.description()
+        self._limiter = Limiter(self._description)
+        self._sample_period = self._description.check_sample_period(setup.sample_period)
         self._voltage = self._description.safe_voltage
         self._waiting: Samples = np.empty(0)
         self._readings: Samples = np.empty(0)
         self._agreement = self._new_agreement()
         try:
-            self._voltage = self._found(self._tasks.read_once())
+            readings = self._tasks.read_once()
+            found = self._found(readings)
+            if found is None and not setup.assume_safe:
+                raise StageError(
+                    f"{self._description.name}: nothing tells the voltage at the output, expected a card that reads it "
+                    "back or a monitor; wire one (voltage_input), or see to it that the output is at its safe voltage "
+                    "and set nidaqmx.assume_safe"
+                )
+            self._voltage = self._description.safe_voltage if found is None else found
         except StageError:
             self._tasks.close()
             raise
@@ -78,7 +73,7 @@ class DaqmxStage:
 
     @property
     def voltage(self) -> float:
-        """Drive voltage given last [V]; on opening the one measured, or the safe one where there is no monitor."""
+        """Drive voltage given last [V]; on opening the one that was found."""
         return self._voltage
 
     def configure(self, sample_period: float) -> None:
@@ -90,20 +85,25 @@ class DaqmxStage:
                 self._drain()
             self._sample_period = period
 
+    def restrict(self, limits: Description, ramp_rate: float) -> None:
+        """Hold these limits and this ramp rate [V/s] from now on; see `Limiter.restricted`."""
+        self._require_open()
+        self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
+
     def exchange(self, voltage: Samples) -> Acquired:
         """Give a block of drive voltages [V]; returns as many samples, applied and measured `latency` earlier."""
         self._require_open()
-        drive = self._description.check_voltage(voltage, self._voltage, self._sample_period)
+        drive = self._limiter.check(voltage, self._voltage, self._sample_period)
         with self._guarded():
             return self._stream(drive)
 
     def set_voltage(self, voltage: float) -> None:
-        """Apply one voltage [V] and hold it; ends a stream."""
+        """Go to one voltage [V] at the ramp rate and hold it; ends a stream."""
         self._require_open()
-        drive = self._description.check_voltage(np.array([voltage]), self._voltage, self._sample_period)
+        goal = self._limiter.goal(voltage)
         with self._guarded():
             self._drain()
-            self._move(float(drive[0]))
+            self._go(goal)
 
     def read_displacement(self) -> float:
         """One reading of the sensor [m]; ends a stream."""
@@ -165,15 +165,18 @@ class DaqmxStage:
         """Drive voltage from the monitor [V]."""
         return np.asarray(readings[1] / (self._setup.monitor_gain * self._setup.amplifier_gain))
 
-    def _found(self, readings: Samples) -> float:
-        """Drive voltage at which the card stands before anything was given [V]."""
+    def _found(self, readings: Samples) -> float | None:
+        """Drive voltage at which the output stands [V]; None where neither card nor monitor tells."""
+        found, uncertainty = self._tasks.output(), _READ_BACK_ERROR
+        if found is None:
+            if not self._setup.voltage_input:
+                return None
+            found = float(self._measured(readings).ravel()[0])
+            uncertainty = self._setup.voltage_tolerance / abs(self._setup.amplifier_gain)
         safe = self._description.safe_voltage
-        if not self._setup.voltage_input:
+        if abs(found - safe) <= uncertainty:
             return safe
-        measured = float(self._measured(readings))
-        if abs(measured - safe) * abs(self._setup.amplifier_gain) <= self._setup.voltage_tolerance:
-            return safe
-        return min(max(measured, self._description.voltage_min), self._description.voltage_max)
+        return min(max(found, self._description.voltage_min), self._description.voltage_max)
 
     def _new_agreement(self) -> Agreement:
         s, d = self._setup, self._description
@@ -187,52 +190,45 @@ class DaqmxStage:
             self._stream(np.full(self._lead, self._voltage))
             self._tasks.stop()
 
-    @contextmanager
-    def _guarded(self) -> Iterator[None]:
-        """Go to the safe voltage when the card fails, and say in the error whether it was reached."""
-        try:
-            yield
-        except DeviceError as error:
-            try:
-                self._abort()
-                end = f"the output was set to its safe voltage, {self._voltage:g} V"
-            except DaqmxError:
-                end = self._unknown()
-            raise StageError(f"{error}; {end}") from None
+    def _guarded(self) -> AbstractContextManager[None]:
+        return guarded(
+            self._abort, lambda: f"the output was brought to its safe voltage, {self._voltage:g} V", self._unknown
+        )
 
     def _retreat(self) -> None:
         if self._is_lost:
             self._abort()
         elif self._tasks.is_running:
             try:
-                goal, step = self._description.safe_voltage, self._setup.max_slew_rate * self._sample_period
-                count = max(int(np.ceil(abs(goal - self._voltage) / step)), 1)
-                self._stream(np.linspace(self._voltage, goal, count + 1)[1:])
+                goal = self._description.safe_voltage
+                for part in self._limiter.way(self._voltage, goal, self._sample_period, self._lead):
+                    self._stream(part)
                 self._drain()
             except DeviceError:
                 self._abort()
         elif self._voltage != self._description.safe_voltage:
-            self._ramp()
+            self._go(self._description.safe_voltage)
 
     def _abort(self) -> None:
-        """End a stream that has failed, and go to the safe voltage from where the output stands, if that is known."""
+        """End a stream that has failed, and go to the safe voltage from where the output stands."""
         self._tasks.abandon()
-        if self._setup.voltage_input:
-            self._voltage = self._found(self._tasks.read_once())
+        found = self._found(self._tasks.read_once())
+        if found is not None:
+            self._voltage = found
         elif self._waiting.size:
             self._voltage = float(self._waiting[0])
-        self._ramp()
+        self._go(self._description.safe_voltage)
 
-    def _ramp(self) -> None:
-        goal, step = self._description.safe_voltage, self._setup.max_slew_rate * _RAMP_STEP
-        while abs(goal - self._voltage) > step:
-            self._move(self._voltage + float(np.copysign(step, goal - self._voltage)))
-            time.sleep(_RAMP_STEP)
-        self._move(goal)
-
-    def _move(self, drive: float) -> None:
-        self._tasks.write_once(drive)
-        self._voltage, self._is_lost = drive, False
+    def _go(self, goal: float) -> None:
+        """Go to a voltage [V] along the limiter's way, sample by sample on the clock of the card; nothing streams."""
+        period = max(min(self._sample_period, _RAMP_PERIOD), self._description.sample_period_min)
+        for part in self._limiter.way(self._voltage, goal, period):
+            if part.size > 1:
+                self._tasks.play(part, period)
+            else:
+                self._tasks.write_once(goal)
+            self._voltage = float(part[-1])
+        self._is_lost = False
 
     def _unknown(self) -> str:
         self._is_lost = True

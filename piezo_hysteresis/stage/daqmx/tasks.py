@@ -27,6 +27,10 @@ class DaqmxError(DeviceError):
     """NI-DAQmx reports a fault, or the card does what it should not."""
 
 
+class UnsupportedError(DaqmxError):
+    """The card itself refuses, over a link that works."""
+
+
 class Tasks:
     """Tasks on a card, through the local driver or a gRPC device server.
 
@@ -122,6 +126,27 @@ class Tasks:
         self.close()
         self._connect()
 
+    def play(self, drive: Samples, sample_period: float) -> None:
+        """Put out at least two drive voltages [V] once, on the clock of the card, and return when that is done."""
+        s = self._setup
+        finite = self._nidaqmx.constants.AcquisitionType.FINITE
+        with self._faults("putting out a ramp"), self._output_task() as task:
+            task.timing.cfg_samp_clk_timing(1 / sample_period, sample_mode=finite, samps_per_chan=drive.size)
+            task.write(drive, auto_start=False)
+            task.start()
+            task.wait_until_done(drive.size * sample_period + s.timeout)
+
+    def output(self) -> float | None:
+        """Voltage at the output [V], read back by the card itself; None where it cannot."""
+        s = self._setup
+        try:
+            with self._faults("reading the output back"), self._task() as task:
+                name = f"{s.device}/_{s.output}_vs_aognd"
+                task.ai_channels.add_ai_voltage_chan(name, min_val=-s.sensor_range, max_val=s.sensor_range)
+                return float(self._finite(np.atleast_2d(np.asarray(task.read(), dtype=np.float64)))[0, 0])
+        except UnsupportedError:
+            return None
+
     def write_once(self, drive: float) -> None:
         """Put out one voltage [V] without a clock."""
         with self._faults("writing one voltage"), self._output_task() as task:
@@ -191,6 +216,7 @@ class Tasks:
             raise
         except (errors.Error, OSError, ValueError) as error:
             words = " ".join(str(error).split())
+            kind = UnsupportedError if isinstance(error, errors.DaqError) else DaqmxError
             if "DEADLINE_EXCEEDED" in str(getattr(error, "rpc_code", "")):
                 words = f"no answer within {self._setup.timeout:g} s from {self._setup.server}"
-            raise DaqmxError(f"NI-DAQmx, {self._setup.device}: {doing} failed: {words[:300]}") from None
+            raise kind(f"NI-DAQmx, {self._setup.device}: {doing} failed: {words[:300]}") from None

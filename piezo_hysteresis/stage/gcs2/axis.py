@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 
 import numpy as np
 
 from ..description import Description, Samples
-from .array import GcsArray
 from .client import Client
 from .connection import Connection, Gcs2Error
 from .setup import Gcs2Setup
+from .wave_table import WaveTable
 
 NEEDED = (
     "#9", "#24", "DRC", "DRL?", "DRR?", "ERR?", "POS?", "RTR", "SAI?", "SPA?", "SVA", "SVO", "SVO?", "TNR?", "VMA?",
@@ -21,6 +20,12 @@ NEEDED = (
 
 _SAMPLE_TIME_TOLERANCE = 1e-3
 """Relative difference up to which two sample times are one."""
+_HIGHEST_VOLTAGE = 1e4
+"""No piezo amplifier gives more [V]."""
+_SERVO_TIMES = (1e-6, 0.1)
+"""Servo times that can be [s]."""
+_POLL = 5e-3
+"""Time between two questions whether the generator runs [s]."""
 
 
 class Axis:
@@ -35,6 +40,8 @@ class Axis:
         self.setup = setup
         self.client = Client(Connection(setup.host, setup.port, setup.timeout))
         self.servo_time = 0.0
+        self.waves = WaveTable(self.client, setup)
+        self._plausible = (-_HIGHEST_VOLTAGE, _HIGHEST_VOLTAGE)
 
     def identify(self) -> Description:
         """Ask the controller who it is and for its limits; nothing moves.
@@ -55,8 +62,13 @@ class Axis:
         axes = client.ask("SAI?")
         if s.axis not in axes:
             raise Gcs2Error(f"{name}: has the axes {' '.join(axes)}, expected '{s.axis}' among them; set gcs2.axis")
-        self.servo_time = client.number(f"SPA? {s.axis} 0x{s.servo_time_parameter:08X}")
-        low, high = sorted(client.number(f"{q} {s.channel}") / s.amplifier_gain for q in ("VMI?", "VMA?"))
+        self.servo_time = client.number(f"SPA? {s.axis} 0x{s.servo_time_parameter:08X}", *_SERVO_TIMES)
+        lowest, highest = (client.number(f"{q} {s.channel}", *self._plausible) for q in ("VMI?", "VMA?"))
+        if not lowest < highest:
+            raise Gcs2Error(f"{name}: answers {lowest:g} V to VMI? and {highest:g} V to VMA?, expected a range")
+        self.waves.limits, span = (lowest, highest), highest - lowest
+        self._plausible = (lowest - span / 2, highest + span / 2)
+        low, high = sorted((lowest / s.amplifier_gain, highest / s.amplifier_gain))
         return Description(
             name=f"{name}, axis {s.axis}",
             streaming=False,
@@ -87,7 +99,7 @@ class Axis:
 
     def voltage(self) -> float:
         """Drive voltage measured at the piezo [V]."""
-        return self.client.number(f"VOL? {self.setup.channel}") / self.setup.amplifier_gain
+        return self.client.number(f"VOL? {self.setup.channel}", *self._plausible) / self.setup.amplifier_gain
 
     def displacement(self) -> float:
         """Position [m]."""
@@ -113,9 +125,22 @@ class Axis:
             )
 
     def set_voltage(self, drive: float) -> None:
-        """Command one drive voltage [V] and wait until the piezo has it."""
+        """Command one drive voltage [V]: a step of one servo cycle."""
         self.client.command(f"SVA {self.setup.axis} {self.setup.command(drive):.9g}")
-        self.require_voltage(drive)
+
+    def follow(self, line: Samples) -> None:
+        """Play drive voltages on a straight line [V], one per servo cycle, and return when they have been played."""
+        s = self.setup
+        self.waves.load_line(line)
+        self._select(1)
+        self.start()
+        time.sleep(line.size * self.servo_time)
+        due = time.monotonic() + s.timeout
+        while self.is_playing():
+            if time.monotonic() > due:
+                raise Gcs2Error(f"{self.client.connection.place}: plays {s.timeout:g} s after the end of a ramp")
+            time.sleep(_POLL)
+        self.set_voltage(float(line[-1]))
 
     def require_voltage(self, drive: float) -> None:
         """Gcs2Error unless ``VOL?`` reaches the drive voltage [V] within the settling time."""
@@ -130,48 +155,32 @@ class Axis:
                 )
             time.sleep(min(left, 2e-3))
 
-    def load(self, drive: Samples) -> None:
-        """Write a waveform of drive voltages [V] into the wave table, and read it back if the setup says so."""
-        s = self.setup
-        points = s.command_at_zero + s.command_per_volt * s.amplifier_gain * drive
-        self.client.command(f"WCL {s.wave_table}")
-        for first in range(0, points.size, s.points_per_command):
-            chunk = points[first : first + s.points_per_command]
-            values = " ".join(f"{point:.9g}" for point in chunk)
-            self.client.command(f"WAV {s.wave_table} {'&' if first else 'X'} PNT {first + 1} {chunk.size} {values}")
-        stored = self.client.whole(f"WAV? {s.wave_table} 1")
-        if stored != points.size:
-            raise Gcs2Error(f"{self.client.connection.place}: stored {stored} wave points, expected {points.size}")
-        if s.read_back:
-            self._compare(points)
-
-    def _compare(self, points: Samples) -> None:
-        stored = np.concatenate([a.values[:, 0] for a in self._arrays("GWD?", points.size, (self.setup.wave_table,))])
-        tolerance = 1e-5 * max(float(np.abs(points).max()), 1.0)
-        differs = np.abs(stored - points) > tolerance
-        if differs.any():
-            at = int(differs.argmax())
-            raise Gcs2Error(
-                f"{self.client.connection.place}: wave point {at + 1} reads back as {stored[at]:g}, expected "
-                f"{points[at]:g}; lower points_per_command"
-            )
-
     def arm(self, multiple: int) -> None:
         """Set generator and recorder for one run at `multiple` servo times per sample."""
         s = self.setup
+        self.waves.require_not_interrupted()
+        self._select(multiple)
         for text in (
-            f"WSL {s.generator} {s.wave_table}",
-            f"WOS {s.generator} 0",
-            f"WGC {s.generator} 1",
-            f"WTR {s.generator} {multiple} 0",
             f"RTR {multiple}",
             f"DRC {s.voltage_table} {s.channel} {s.voltage_option}",
             f"DRC {s.displacement_table} {s.axis} {s.displacement_option}",
         ):
             self.client.command(text)
 
+    def _select(self, multiple: int) -> None:
+        """Let the generator play the wave table once, at `multiple` servo times per point."""
+        s = self.setup
+        for text in (
+            f"WSL {s.generator} {s.wave_table}",
+            f"WOS {s.generator} 0",
+            f"WGC {s.generator} 1",
+            f"WTR {s.generator} {multiple} 0",
+        ):
+            self.client.command(text)
+
     def start(self) -> None:
-        """Start the generator, and with it the recorder."""
+        """Start the generator, and with it the recorder; the last look at whether a stop has been asked for."""
+        self.waves.require_not_interrupted()
         self.client.command(f"WGO {self.setup.generator} 1")
 
     def is_playing(self) -> bool:
@@ -198,7 +207,7 @@ class Axis:
             if held < count:
                 raise Gcs2Error(f"{place}: recorder table {table} holds {held} samples, expected {count}")
         parts: list[Samples] = []
-        for array in self._arrays("DRR?", count, tables):
+        for array in self.waves.arrays("DRR?", count, tables):
             told = array.sample_time
             if told is None or abs(told / sample_period - 1) > _SAMPLE_TIME_TOLERANCE:
                 raise Gcs2Error(f"{place}: recorded every {told} s, expected {sample_period:g} s; check the servo time")
@@ -207,9 +216,3 @@ class Axis:
             parts.append(array.values)
         values = np.concatenate(parts)
         return values[:, 0] / s.amplifier_gain, values[:, 1] * s.position_unit
-
-    def _arrays(self, question: str, count: int, tables: tuple[int, ...]) -> Iterator[GcsArray]:
-        numbers = " ".join(str(table) for table in tables)
-        for first in range(1, count + 1, self.setup.rows_per_answer):
-            rows = min(self.setup.rows_per_answer, count + 1 - first)
-            yield self.client.array(f"{question} {first} {rows} {numbers}", rows, len(tables))

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from .array import GcsArray
+import math
+import re
+
+from .array_answer import ArrayAnswer
 from .connection import Connection, Gcs2Error, NoAnswerError
 from .error_number import STOPPED_BY_COMMAND, meaning
 
 _STOP, _RUNNING = "\x18", "\x09"
 """Single-byte commands: stop everything, is the generator running."""
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+"""A number of an answer."""
+_ERROR_NUMBER = re.compile(r"-?[0-9]{1,6}")
+"""An answer to ``ERR?``."""
+_MASK = re.compile(r"(0[xX])?[0-9a-fA-F]{1,8}")
+"""An answer to ``#9``."""
+LARGEST_COUNT = 1e9
+"""More samples, points or tables no controller has."""
 
 
 class Client:
@@ -56,29 +67,30 @@ class Client:
             raise self.nonsense(text, " ".join(lines), "one line")
         return lines[0].rpartition("=")[2].strip()
 
-    def number(self, text: str) -> float:
-        """The one value of an answer, as a finite number."""
+    def number(self, text: str, lowest: float = -math.inf, highest: float = math.inf) -> float:
+        """The one value of an answer, as a finite number from `lowest` to `highest`: others cannot be meant."""
         words = self.value(text)
-        try:
-            number = float(words)
-        except ValueError:
-            raise self.nonsense(text, words, "a number") from None
-        if not abs(number) < float("inf"):
+        if not _NUMBER.fullmatch(words):
+            raise self.nonsense(text, words, "a number")
+        number = float(words)
+        if not math.isfinite(number):
             raise self.nonsense(text, words, "a finite number")
+        if not lowest <= number <= highest:
+            raise self.nonsense(text, words, f"a number from {lowest:g} to {highest:g}")
         return number
 
     def whole(self, text: str) -> int:
-        """The one value of an answer, as a whole number."""
-        number = self.number(text)
+        """The one value of an answer, as a whole number that can be a count."""
+        number = self.number(text, 0, LARGEST_COUNT)
         if number != int(number):
             raise self.nonsense(text, f"{number:g}", "a whole number")
         return int(number)
 
-    def array(self, text: str, rows: int, columns: int) -> GcsArray:
+    def array(self, text: str, rows: int, columns: int) -> ArrayAnswer:
         """The answer to a question for recorded or stored samples."""
         lines = self.ask(text)
         try:
-            return GcsArray.parse(lines, rows, columns)
+            return ArrayAnswer.parse(lines, rows, columns)
         except Gcs2Error as error:
             raise Gcs2Error(f"{self.connection.place}: answer to '{text}': {error}") from None
 
@@ -89,13 +101,9 @@ class Client:
             words = " ".join(self.connection.receive())
         except NoAnswerError as error:
             raise self._unanswered("#9", error) from None
-        try:
-            mask = int(words, 16)
-        except ValueError:
-            mask = -1
-        if mask < 0:
+        if not _MASK.fullmatch(words):
             raise self.nonsense("#9", words, "a hexadecimal number")
-        return mask
+        return int(words, 16)
 
     def stop(self) -> None:
         """Stop all motion at once; the error that tells so is read and forgotten."""
@@ -122,10 +130,9 @@ class Client:
         except NoAnswerError as error:
             self.connection.close()
             raise Gcs2Error(f"{error} to ERR? after '{_short(text)}'") from None
-        try:
-            return int(words)
-        except ValueError:
-            raise self.nonsense("ERR?", words, "an error number") from None
+        if not _ERROR_NUMBER.fullmatch(words):
+            raise self.nonsense("ERR?", words, "an error number")
+        return int(words)
 
     def _check(self, text: str, number: int) -> None:
         if number:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 
 from ...errors import DeviceError
 
@@ -17,7 +18,7 @@ class Gcs2Error(DeviceError):
 
 
 class NoAnswerError(Gcs2Error):
-    """Not one byte came within the time-out."""
+    """Not one byte came within the deadline."""
 
 
 class Connection:
@@ -33,7 +34,7 @@ class Connection:
     port : int
         TCP port; 50000 on PI controllers.
     timeout : float
-        Longest silence while opening, sending or waiting for an answer [s].
+        Deadline for opening, for sending, and for the whole of an answer [s].
     """
 
     def __init__(self, host: str, port: int, timeout: float) -> None:
@@ -60,6 +61,7 @@ class Connection:
         """
         link = self._opened()
         try:
+            link.settimeout(self.timeout)  # of the whole text, however it is cut
             link.sendall(text.encode(_CODE_PAGE))
         except OSError as error:
             raise self._lost(f"lost the link while sending ({error})") from None
@@ -72,20 +74,23 @@ class Connection:
         Raises
         ------
         NoAnswerError
-            If nothing came within the time-out; the link stays open.
+            If nothing came before the deadline; the link stays open.
         Gcs2Error
-            If the link is lost or half an answer came; the link is closed.
+            If the link is lost or only a part of an answer came before the deadline; the link is closed.
         """
         link = self._opened()
-        answer = bytearray()
+        answer, deadline = bytearray(), time.monotonic() + self.timeout
         while not answer.endswith(b"\n") or answer.endswith(b" \n"):
             try:
+                link.settimeout(max(deadline - time.monotonic(), 1e-3))
                 part = link.recv(1 << 16)
+                if time.monotonic() > deadline and not part.endswith(b"\n"):
+                    raise TimeoutError
             except TimeoutError:
                 if not answer:
                     raise NoAnswerError(f"{self.place}: no answer within {self.timeout:g} s") from None
                 raise self._lost(
-                    f"the answer stopped after {len(answer)} bytes for {self.timeout:g} s, expected its end"
+                    f"the answer stopped after {len(answer)} bytes, expected its end within {self.timeout:g} s"
                 ) from None
             except OSError as error:
                 raise self._lost(f"lost the link while reading ({error})") from None

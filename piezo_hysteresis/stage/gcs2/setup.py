@@ -36,7 +36,7 @@ class Gcs2Setup:
     safe_voltage : float
         Drive voltage of the stage at rest [V].
     max_slew_rate : float
-        Steepest drive [V/s]; also the way to the safe voltage.
+        Steepest drive [V/s], and rate of the way to the safe voltage unless a driver has a lower one; has to be given.
     voltage_tolerance : float
         Largest steady difference between piezo voltage asked for and measured [V].
     settling_time : float
@@ -77,7 +77,7 @@ class Gcs2Setup:
     command_at_zero: float = 0.0
     position_unit: float = 1e-6
     safe_voltage: float = 0.0
-    max_slew_rate: float = math.inf
+    max_slew_rate: float = 0.0
     voltage_tolerance: float = 1.0
     settling_time: float = 0.01
     points_per_command: int = 10
@@ -94,10 +94,16 @@ class Gcs2Setup:
             raise StageError("gcs2.host: got no host, expected name or address of the controller")
         for name in (
             "port", "channel", "generator", "wave_table", "voltage_table", "displacement_table", "points_per_command",
-            "rows_per_answer", "longest_multiple", "timeout", "voltage_tolerance", "position_unit", "max_slew_rate",
+            "rows_per_answer", "longest_multiple", "timeout", "voltage_tolerance", "position_unit",
         ):  # fmt: skip
             if not getattr(self, name) > 0:
                 raise StageError(f"gcs2.{name}: got {getattr(self, name)!r}, expected more than 0")
+        if not 0 < self.max_slew_rate < math.inf:
+            raise StageError(
+                f"gcs2.max_slew_rate: got {self.max_slew_rate:g} V/s, expected the steepest drive that amplifier and "
+                "stage stand, more than 0 and finite; from the amplifier's current I and the piezo's capacitance C it "
+                "is I/C, divided by amplifier_gain"
+            )
         for name in ("amplifier_gain", "command_per_volt"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) != 0):
                 raise StageError(f"gcs2.{name}: got {getattr(self, name)!r}, expected a number other than 0")

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import cast
 
 import numpy as np
 
 from ...errors import DeviceError, StageError
 from ..agreement import Agreement
+from ..guard import guarded
+from ..limiter import Limiter
 from ..stage import Acquired, Description, Samples
 from .axis import Axis
 from .setup import Gcs2Setup
 
 _POLL = 5e-3
 """Shortest time between two questions whether the generator runs [s]."""
-_RAMP_STEP = 0.01
-"""Time between two voltages of a ramp [s]."""
 
 
 class Gcs2Stage:
@@ -50,6 +50,7 @@ class Gcs2Stage:
         except StageError:
             self._axis.client.connection.close()
             raise
+        self._limiter = Limiter(self._description)
         self._sample_period = self._axis.servo_time
 
     @property
@@ -75,13 +76,28 @@ class Gcs2Stage:
         self._waveform = None
         self._forget()
 
-    def set_voltage(self, voltage: float) -> None:
-        """Apply one voltage [V], hold it, and see it measured."""
+    def restrict(self, limits: Description, ramp_rate: float) -> None:
+        """Hold these limits and this ramp rate [V/s] from now on; learns how the controller draws a ramp."""
         self._require_ready()
-        drive = self._check(np.array([voltage]))
+        self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
+        self._waveform = None
+        with self._guarded():
+            _ = self._axis.waves.draws_lines
+
+    def watch(self, is_interrupted: Callable[[], bool]) -> None:
+        """Look at `is_interrupted` before every message of upload, arm, start and read; StoppedError once it is true.
+
+        Between two looks there is one command, or one answer of `rows_per_answer` samples.
+        """
+        self._axis.waves.is_interrupted = is_interrupted
+
+    def set_voltage(self, voltage: float) -> None:
+        """Go to one voltage [V] at the ramp rate, hold it, and see it measured; a waveform in memory is forgotten."""
+        self._require_ready()
+        goal = self._limiter.goal(voltage)
         with self._guarded():
             self._axis.open_loop()
-            self._move(float(drive[0]))
+            self._go(goal)
 
     def read_voltage(self) -> float:
         """One reading of the drive voltage at the piezo [V]."""
@@ -102,7 +118,7 @@ class Gcs2Stage:
         self._waveform = None
         self._forget()
         with self._guarded():
-            self._axis.load(waveform)
+            self._axis.waves.load(waveform)
         self._waveform = waveform
 
     def arm(self) -> None:
@@ -163,7 +179,6 @@ class Gcs2Stage:
         """Stop what plays and go to the safe voltage, over a new link where the old one is lost."""
         if self._closed:
             return
-        self._forget()
         try:
             self._retreat()
         except DeviceError as error:
@@ -190,34 +205,32 @@ class Gcs2Stage:
         self._axis.require_voltage(self._voltage)
         return Acquired(voltage, displacement)
 
-    @contextmanager
-    def _guarded(self) -> Iterator[None]:
-        """Go to the safe voltage when the device fails, and say in the error whether it was reached."""
-        try:
-            yield
-        except DeviceError as error:
-            self._forget()
-            try:
-                self._retreat()
-                end = f"the stage was brought to its safe voltage, {self._voltage:g} V"
-            except DeviceError:
-                end = self._unknown()
-            raise StageError(f"{error}; {end}") from None
+    def _guarded(self) -> AbstractContextManager[None]:
+        return guarded(
+            self._retreat,
+            lambda: f"the stage was brought to its safe voltage, {self._voltage:g} V",
+            self._unknown,
+        )
 
     def _retreat(self) -> None:
-        self._axis.stop()
-        self._axis.open_loop()
-        self._voltage = self._axis.voltage()
-        goal, slew = self._description.safe_voltage, self._description.max_slew_rate
-        step = slew * _RAMP_STEP
-        while abs(goal - self._voltage) > step:
-            self._move(self._voltage + float(np.copysign(step, goal - self._voltage)))
-            time.sleep(_RAMP_STEP)
-        self._move(goal)
+        self._forget()
+        with self._axis.waves.uninterrupted():
+            self._axis.stop()
+            self._axis.open_loop()
+            self._voltage = self._axis.voltage()
+            self._go(self._description.safe_voltage)
 
-    def _move(self, drive: float) -> None:
-        self._axis.set_voltage(drive)
-        self._voltage = drive
+    def _go(self, goal: float) -> None:
+        """Go to a voltage [V] along the limiter's way, sample by sample on the servo clock; the servo is off."""
+        self._waveform = None
+        longest = cast(int, self._description.longest_block)
+        for part in self._limiter.way(self._voltage, goal, self._axis.servo_time, longest):
+            if part.size > 1:
+                self._axis.follow(part)
+            else:
+                self._axis.set_voltage(goal)
+            self._voltage = float(part[-1])
+        self._axis.require_voltage(goal)
 
     def _unknown(self) -> str:
         return (
@@ -225,7 +238,7 @@ class Gcs2Stage:
         )
 
     def _check(self, voltage: Samples) -> Samples:
-        return self._description.check_voltage(voltage, self._voltage, self._sample_period)
+        return self._limiter.check(voltage, self._voltage, self._sample_period)
 
     def _require_ready(self) -> None:
         self._require_open()

@@ -32,6 +32,7 @@ class Rig:
 
     def setup(self, **changes) -> DaqmxSetup:
         wiring = {"voltage_input": "ai1", "lead": LEAD * PERIOD, "server": f"127.0.0.1:{self.server.port}"}
+        wiring["max_slew_rate"] = 1e9
         return DaqmxSetup("Dev1", **wiring | changes)
 
 

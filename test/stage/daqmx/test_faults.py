@@ -14,9 +14,9 @@ from piezo_hysteresis.stage.simulated import SimulatedStage
 WAVE = 4.0 - 4.0 * np.cos(2 * np.pi * np.arange(4000) / 2000)
 BLOCKS = range(400, 4000, 400)
 STEPS = (
-    "CreateTask:2 CreateAOVoltageChan:1 CreateAIVoltageChan:3 CfgSampClkTiming:1 CfgSampClkTiming:2 "
+    "CreateTask:3 CreateAOVoltageChan:1 CreateAIVoltageChan:4 CfgSampClkTiming:1 CfgSampClkTiming:2 "
     "GetTimingAttributeDouble:1 SetWriteAttributeInt32:1 WriteAnalogF64:1 WriteAnalogF64:4 StartTask:1 StartTask:2 "
-    "ReadAnalogF64:2 ReadAnalogF64:4 ClearTask:2 ClearTask:3"
+    "ReadAnalogF64:3 ReadAnalogF64:5 ClearTask:3 ClearTask:4"
 )
 """Every kind of call between the first block and the last sample."""
 
@@ -76,7 +76,7 @@ def test_every_failure_is_told_clearly_and_ends_safe(rig, streamed, fault, messa
     r.stage.close()
 
 
-@pytest.mark.parametrize("step", ["StartTask:1", "ReadAnalogF64:3", "WriteAnalogF64:5"])
+@pytest.mark.parametrize("step", ["StartTask:1", "ReadAnalogF64:4", "WriteAnalogF64:5"])
 def test_a_link_that_does_not_come_back_leaves_the_voltage_unknown_and_says_so(rig, streamed, step):
     r = rig(f"gone@{step}")
     with pytest.raises(StageError, match=r"voltage of the stage is unknown, last given .* by hand: the card holds"):
@@ -130,9 +130,9 @@ def test_an_output_left_high_by_another_program_is_seen_where_there_is_a_monitor
 
 def test_nobody_there_or_no_driver_on_this_machine():
     with pytest.raises(StageError, match=r"Failed to connect to server|no answer"):
-        DaqmxStage(DaqmxSetup("Dev1", server="127.0.0.1:9", timeout=2.0))
+        DaqmxStage(DaqmxSetup("Dev1", server="127.0.0.1:9", timeout=2.0, max_slew_rate=1e3))
     with pytest.raises(StageError, match=r"reading one sample failed: .*NI-DAQmx"):
-        DaqmxStage(DaqmxSetup("Dev1"))
+        DaqmxStage(DaqmxSetup("Dev1", max_slew_rate=1e3))
 
 
 def test_every_fault_can_be_named_and_nothing_else():

@@ -115,12 +115,12 @@ def test_an_input_that_hears_nothing_has_no_delay(opened):
 def test_a_machine_without_the_package_is_told_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "nidaqmx", None)
     with pytest.raises(StageError, match=r"pip install 'nidaqmx\[grpc\]'"):
-        DaqmxStage(DaqmxSetup("Dev1"))
+        DaqmxStage(DaqmxSetup("Dev1", max_slew_rate=1e3))
 
 
 def test_setups_and_cards_that_cannot_be(opened):
     with pytest.raises(StageError, match="does not exist"):
         opened(displacement_input="ai9")
-    for wrong in ({"device": ""}, {"lead": 0.0}, {"sensor_gain": 0.0}, {"io_delay": -1.0}):
+    for wrong in ({"device": ""}, {"lead": 0.0}, {"sensor_gain": 0.0}, {"io_delay": -1.0}, {"max_slew_rate": 0.0}):
         with pytest.raises(StageError, match="expected"):
-            DaqmxSetup(**{"device": "Dev1", **wrong})
+            DaqmxSetup(**{"device": "Dev1", "max_slew_rate": 1e3, **wrong})

@@ -42,7 +42,7 @@ class Bench:
     stage: Gcs2Stage | None = None
 
     def setup(self, **changes) -> Gcs2Setup:
-        scales = {"amplifier_gain": GAIN, "points_per_command": 100, "timeout": 5.0}
+        scales = {"amplifier_gain": GAIN, "points_per_command": 100, "timeout": 5.0, "max_slew_rate": 1e9}
         return Gcs2Setup(self.server.host, self.server.port, **scales | changes)
 
     def observer(self) -> Client:

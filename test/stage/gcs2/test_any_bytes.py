@@ -14,7 +14,7 @@ from piezo_hysteresis.emulators.gcs2 import answer
 from piezo_hysteresis.emulators.gcs2.controller import BYTES, Controller
 from piezo_hysteresis.emulators.gcs2.server import Gcs2Server, cut
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.stage.gcs2.array import GcsArray
+from piezo_hysteresis.stage.gcs2.array_answer import ArrayAnswer
 from piezo_hysteresis.stage.gcs2.axis import NEEDED
 from piezo_hysteresis.stage.gcs2.client import Client
 from piezo_hysteresis.stage.gcs2.connection import Connection
@@ -62,7 +62,7 @@ ROWS = st.lists(st.one_of(st.lists(WORDS, max_size=4).map(" ".join), LINES), max
 @example(["# SEPARATOR = 1114112", "# END_HEADER"], ["1 2"], 1, 2)
 def test_an_array_is_whole_and_finite_or_refused(header, rows, count, columns):
     try:
-        array = GcsArray.parse([*header, "# END_HEADER", *rows], count, columns)
+        array = ArrayAnswer.parse([*header, "# END_HEADER", *rows], count, columns)
     except StageError:
         return
     assert array.values.shape == (count, columns)
@@ -80,7 +80,7 @@ def test_an_array_is_whole_and_finite_or_refused(header, rows, count, columns):
 def test_an_array_comes_back_as_it_was_written(values, sample_time):
     values = np.array(values)
     lines = answer.array(values, sample_time, [f"column {i}" for i in range(values.shape[1])])
-    read = GcsArray.parse(lines, *values.shape)
+    read = ArrayAnswer.parse(lines, *values.shape)
     np.testing.assert_allclose(read.values, values, rtol=1e-8)
     assert read.sample_time == pytest.approx(sample_time, rel=1e-8)
 

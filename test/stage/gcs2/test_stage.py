@@ -130,17 +130,6 @@ def test_safe_stops_a_waveform_where_it_is(bench):
         b.stage.read()
 
 
-def test_the_way_to_safety_is_no_steeper_than_allowed(bench):
-    b = bench(max_slew_rate=200.0)
-    client = b.observer()
-    client.command("SVA 1 120")
-    client.connection.close()
-    b.stage.safe()
-    levels = [120.0] + [float(line.split()[2]) for line in b.controller.heard if line.startswith("SVA 1")][1:]
-    assert levels[-1] == 0.0
-    assert np.abs(np.diff(levels)).max() <= 200.0 * 0.01 * 20.0 + 0.01
-
-
 def test_a_closed_stage_is_safe_and_refuses_work(bench):
     b = bench()
     b.stage.set_voltage(4.0)
@@ -191,8 +180,16 @@ def test_a_controller_that_lacks_what_is_needed_is_named(bench):
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"host": ""}, {"port": 0}, {"amplifier_gain": 0.0}, {"points_per_command": 0}, {"voltage_table": 2}],
+    [
+        {"host": ""},
+        {"port": 0},
+        {"amplifier_gain": 0.0},
+        {"points_per_command": 0},
+        {"voltage_table": 2},
+        {"max_slew_rate": 0.0},
+        {"max_slew_rate": math.inf},
+    ],
 )
 def test_a_setup_that_cannot_be_is_refused(wrong):
     with pytest.raises(StageError, match="expected"):
-        Gcs2Setup(**{"host": "nowhere", **wrong})
+        Gcs2Setup(**{"host": "nowhere", "max_slew_rate": 1e9, **wrong})

@@ -8,10 +8,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import StageError
-from ..record import Record
-from .description import Description, Samples
-from .plant import Plant, PlantParameters, Reading
+from ...errors import StageError
+from ...record import Record
+from ..description import Description, Samples
+from ..limiter import Limiter
+from ..plant import Plant, PlantParameters, Reading
 
 _SHORTEST_PERIOD = 1e-6
 """Shortest sample period of a simulated stage [s]."""
@@ -47,6 +48,7 @@ class Simulation:
             displacement_min=-sensor.range,
             displacement_max=sensor.range - sensor.lsb,
         )
+        self._limiter = Limiter(self._description)
         self._sample_period = self._description.check_sample_period(sample_period)
         Plant(self.parameters, self._sample_period).run(np.zeros(1))  # compiles the kernels before a clock runs
         self._plant = Plant(self.parameters, self._sample_period, seed, rest)
@@ -88,9 +90,14 @@ class Simulation:
             self._plant.configure(period, self.voltage)
             self._sample_period = period
 
+    def restrict(self, limits: Description, ramp_rate: float) -> None:
+        """Hold these limits and this ramp rate [V/s] from now on; see `Limiter.restricted`."""
+        self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
+
     def set_voltage(self, voltage: float) -> None:
-        """Apply one voltage [V] and hold it; takes one sample period of simulated time."""
-        self._run(np.array([voltage], dtype=np.float64))
+        """Go to one voltage [V] at the ramp rate and hold it; one sample of simulated time where nothing limits it."""
+        self._require_ready()
+        self._go(self._limiter.goal(voltage))
 
     def read_voltage(self) -> float:
         """The drive voltage that the converter applies [V]."""
@@ -102,9 +109,9 @@ class Simulation:
         return float(self._run(np.array([self.voltage])).displacement[0])
 
     def safe(self) -> None:
-        """Apply the safe voltage and hold it."""
+        """Go to the safe voltage at the ramp rate and hold it."""
         if not self._closed and self.voltage != self._description.safe_voltage:
-            self.set_voltage(self._description.safe_voltage)
+            self._go(self._description.safe_voltage)
 
     def close(self) -> None:
         """Make safe; every later call but `close` and `safe` raises StageError."""
@@ -171,7 +178,11 @@ class Simulation:
             raise StageError(f"{self._description.name}: is closed, expected an open stage; make a new one")
 
     def _check(self, voltage: ArrayLike, start: float) -> Samples:
-        return self._description.check_voltage(voltage, start, self._sample_period)
+        return self._limiter.check(voltage, start, self._sample_period)
+
+    def _go(self, voltage: float) -> None:
+        for part in self._limiter.way(self.voltage, voltage, self._sample_period):
+            self._plant.run(part)
 
     def _run(self, voltage: Samples) -> Reading:
         self._require_ready()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 
 import numpy as np
 
-from ..errors import StageError
-from .plant import PlantParameters
+from ...errors import StageError, StoppedError
+from ..plant import PlantParameters
+from ..stage import Acquired, Samples
 from .simulation import Simulation
-from .stage import Acquired, Samples
 
 
 class SimulatedStage(Simulation):
@@ -85,16 +86,23 @@ class SimulatedMemoryStage(Simulation):
         self._acquired: Acquired | None = None
         self._armed, self._playing = False, False
         self._begin = 0.0
+        self._is_interrupted: Callable[[], bool] = bool
+
+    def watch(self, is_interrupted: Callable[[], bool]) -> None:
+        """Look at `is_interrupted` before a waveform is taken, armed, started or read; StoppedError once it is true."""
+        self._is_interrupted = is_interrupted
 
     def upload(self, voltage: Samples) -> None:
         """Store a waveform [V]."""
         self._require_ready()
+        self._require_not_interrupted()
         self._waveform = self._check(voltage, self.voltage).copy()
         self._armed = False
 
     def arm(self) -> None:
         """Make ready to start; takes `dead_time` of simulated time at the voltage in force."""
         self._require_ready()
+        self._require_not_interrupted()
         self._check(self._uploaded(), self.voltage)
         idle = round(self._dead_time / self._sample_period)
         if idle:
@@ -106,6 +114,7 @@ class SimulatedMemoryStage(Simulation):
         self._require_ready()
         if not self._armed:
             raise StageError(f"{self._description.name}: started without being armed, expected arm() first")
+        self._require_not_interrupted()
         self._armed, self._playing, self._begin = False, True, time.monotonic()
 
     def wait(self, timeout: float) -> None:
@@ -123,6 +132,7 @@ class SimulatedMemoryStage(Simulation):
     def read(self) -> Acquired:
         """The record of the waveform that was played."""
         self._require_ready()
+        self._require_not_interrupted()
         if self._acquired is None:
             raise StageError(f"{self._description.name}: nothing recorded, expected upload, arm, start, wait first")
         return self._acquired
@@ -133,7 +143,7 @@ class SimulatedMemoryStage(Simulation):
         self._waveform, self._acquired, self._armed = None, None, False
 
     def safe(self) -> None:
-        """Stop what plays where it is and apply the safe voltage."""
+        """Stop what plays where it is and go to the safe voltage at the ramp rate."""
         self._armed = False
         if self._playing:
             waveform = self._uploaded()
@@ -143,6 +153,10 @@ class SimulatedMemoryStage(Simulation):
                 self._plant.run(played)
             self._playing = False
         super().safe()
+
+    def _require_not_interrupted(self) -> None:
+        if self._is_interrupted():
+            raise StoppedError(f"{self._description.name}: stopped before the waveform was played and read")
 
     def _uploaded(self) -> Samples:
         if self._waveform is None:

@@ -1,4 +1,4 @@
-"""`GcsArray`: the table of numbers with a header that ``DRR?`` and ``GWD?`` answer."""
+"""`ArrayAnswer`: the table of numbers with a header that ``DRR?`` and ``GWD?`` answer."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _END = "END_HEADER"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class GcsArray:
-    """A GCS array.
+class ArrayAnswer:
+    """A GCS array as a controller answers it; saved ones are read by `piezo_hysteresis.recording`.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class GcsArray:
     values: Samples
 
     @classmethod
-    def parse(cls, lines: list[str], rows: int, columns: int) -> GcsArray:
+    def parse(cls, lines: list[str], rows: int, columns: int) -> ArrayAnswer:
         """Read the lines of an answer.
 
         Raises
@@ -47,7 +47,7 @@ class GcsArray:
             cells = line.split(separator)
             try:
                 values[row] = [float(cell) for cell in cells]
-                sound = len(cells) == columns and bool(np.isfinite(values[row]).all())
+                sound = len(cells) == columns and "_" not in line and bool(np.isfinite(values[row]).all())
             except ValueError:
                 sound = False
             if not sound:

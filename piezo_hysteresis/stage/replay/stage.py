@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ..errors import StageError
-from ..record import Record
-from .stage import Acquired, Description, Samples
+from ...errors import StageError
+from ...record import Record
+from ..stage import Acquired, Description, Samples
 
 
 class ReplayStage:
@@ -114,6 +114,10 @@ class ReplayStage:
 
         others = {name: values[index] for name, values in self._channels.items()}
         return Acquired(self._applied[index], self._measured[index], others)
+
+    def restrict(self, limits: Description, ramp_rate: float) -> None:
+        """Ignored: nothing is put out."""
+        self._require_open()
 
     def set_voltage(self, voltage: float) -> None:
         """Ignored: a recording cannot be driven."""

@@ -1,0 +1,68 @@
+"""`StopServices`: `~/stop`, `~/cancel` and `~/release` of the driver, served by a thread that does nothing else."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+SUFFIX = "_stop"
+"""After the name of the driver: the name of the node that serves its stop."""
+
+
+class StopServices:
+    """Services under the name of the driver, on a node and an executor of their own.
+
+    The driver takes its callbacks one after the other: behind a flood of large commands a stop would wait for seconds.
+
+    Parameters
+    ----------
+    driver : rclpy.node.Node
+        The driver.
+    **actions : callable
+        By the last word of the service: what is done, in the thread of the services; returns the message of the
+        answer.
+    """
+
+    def __init__(self, driver: Node, **actions: Callable[[], str]) -> None:
+        self._node = Node(
+            f"{driver.get_name()}{SUFFIX}",
+            context=driver.context,
+            namespace=driver.get_namespace(),
+            use_global_arguments=False,  # they may rename the driver
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        for word, action in actions.items():
+            self._node.create_service(Trigger, f"{driver.get_fully_qualified_name()}/{word}", _answering(action))
+        self._executor = SingleThreadedExecutor(context=driver.context)
+        self._executor.add_node(self._node)
+        self._ended = Future()
+        self._thread = threading.Thread(
+            target=self._executor.spin_until_future_complete, args=(self._ended,), name="stop", daemon=True
+        )
+        self._thread.start()
+
+    def end(self) -> None:
+        """Serve nothing any more; harmless when repeated."""
+        if not self._ended.done():
+            self._ended.set_result(None)
+            self._executor.wake()
+            self._thread.join()
+            self._executor.shutdown()
+            self._node.destroy_node()
+
+
+def _answering(action: Callable[[], str]) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
+    def answer(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.message, response.success = action(), True
+        except Exception as error:  # the thread must live to serve the next stop
+            response.message = f"fault of the driver: {error!r}"
+        return response
+
+    return answer

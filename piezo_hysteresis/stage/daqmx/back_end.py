@@ -1,0 +1,49 @@
+"""How a driver opens a stage on a National Instruments card."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ...parameter import Parameter, Row, Setting
+from ..opening import Opening
+from ..stage import Stage
+from .setup import DaqmxSetup
+from .stage import DaqmxStage
+
+_DAQMX = DaqmxSetup(device="-", max_slew_rate=1.0)
+"""Set-up whose values are the defaults."""
+
+PARAMETERS: tuple[Row, ...] = (
+    Setting("device", "", "name of the card, as NI MAX shows it"),
+    Setting("output", _DAQMX.output, "analogue output that drives the amplifier"),
+    Setting("displacement_input", _DAQMX.displacement_input, "analogue input of the position sensor"),
+    Setting("voltage_input", _DAQMX.voltage_input, "analogue input of the amplifier's monitor; empty: none"),
+    Setting("server", _DAQMX.server, "host:port of an NI gRPC device server; empty: the driver on this machine"),
+    Parameter("sample_period_min", "", "s", _DAQMX.sample_period_min, 1e-9, 1.0, "shortest sample period", "the card"),
+    Parameter("lead", "", "s", _DAQMX.lead, 1e-3, 10.0, "output that waits in the buffer: the latency", "the machine"),
+    Parameter("voltage_min", "u_min", "V", _DAQMX.voltage_min, -10.0, 10.0, "lowest drive voltage", "rig"),
+    Parameter("voltage_max", "u_max", "V", _DAQMX.voltage_max, -10.0, 10.0, "highest drive voltage", "rig"),
+    Parameter("max_slew_rate", "S", "V/s", 0.0, 0.0, 1e12, "steepest drive; has to be given", "rig"),
+    Parameter("safe_voltage", "u_s", "V", 0.0, -10.0, 10.0, "drive voltage of the stage at rest", "rig"),
+    Setting("assume_safe", _DAQMX.assume_safe, "true: at safe_voltage at the start, where nothing tells the output"),
+    Parameter(
+        "amplifier_gain", "G_a", "V/V", _DAQMX.amplifier_gain, -1e4, 1e4, "piezo voltage over drive voltage", "rig"
+    ),
+    Parameter("monitor_gain", "", "V/V", _DAQMX.monitor_gain, -1e3, 1e3, "monitor voltage over piezo voltage", "rig"),
+    Parameter("sensor_gain", "", "m/V", _DAQMX.sensor_gain, -1.0, 1.0, "displacement over sensor voltage", "rig"),
+    Parameter("voltage_tolerance", "", "V", 1.0, 1e-3, 1e3, "largest steady error of the piezo voltage", "rig"),
+    Parameter("settling_time", "", "s", 0.01, 0.0, 10.0, "time the amplifier needs to follow a step", "rig"),
+    Parameter("sensor_range", "", "V", _DAQMX.sensor_range, 1e-3, 10.0, "the inputs span ± this voltage", "the card"),
+    Parameter("io_delay", "", "s", 0.0, 0.0, 1.0, "delay of the card itself, from a loop-back", "loop_back_delay"),
+    Parameter(
+        "timeout", "", "s", _DAQMX.timeout, 0.01, 600.0, "longest wait for samples, silence of a server", "network"
+    ),
+)
+"""Of the driver, under ``nidaqmx.``."""
+
+
+def open(values: Mapping[str, Any], opening: Opening) -> Stage:
+    """Open a stage on a National Instruments card; StageError if it is not there or not what the values say."""
+    period = {"sample_period": opening.sample_period} if opening.sample_period else {}
+    return DaqmxStage(DaqmxSetup(**{**values, **period}))

@@ -1,0 +1,35 @@
+"""`guarded`: what every stage does when its device fails: it goes to safety, and says whether it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from ..errors import DeviceError, StageError
+
+
+@contextmanager
+def guarded(retreat: Callable[[], None], reached: Callable[[], str], unknown: Callable[[], str]) -> Iterator[None]:
+    """Bring the stage to its safe voltage when the device fails within the block.
+
+    Parameters
+    ----------
+    retreat : callable
+        Goes to the safe voltage; DeviceError where that fails too.
+    reached, unknown : callable
+        The end of the message: where the stage is after the retreat, and what is known where the retreat failed.
+
+    Raises
+    ------
+    StageError
+        In place of the DeviceError, with where the stage is.
+    """
+    try:
+        yield
+    except DeviceError as error:
+        try:
+            retreat()
+            end = reached()
+        except DeviceError:
+            end = unknown()
+        raise StageError(f"{error}; {end}") from None

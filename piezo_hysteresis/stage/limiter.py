@@ -1,0 +1,107 @@
+"""`Limiter`: range, slew and ramp rate of the drive, last before the device on every path to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import StageError
+from .description import Description, Samples
+
+LONGEST_PART = 65536
+"""Samples of a ramp that are made at once; the next ones follow while they are played."""
+
+
+class Limiter:
+    """What a stage may put out, sample by sample.
+
+    A stage asks its limiter before it gives its device a waveform, and takes from it the samples of every way that it
+    goes by itself: to a set-point, to the safe voltage, after a fault, on closing. A stage begins with the limits of
+    its own description; a driver narrows them to its own with `Stage.restrict`.
+
+    Parameters
+    ----------
+    limits : Description
+        Range, steepest slew, safe voltage and longest block.
+    ramp_rate : float
+        Rate of the ways that the stage goes by itself [V/s]; never above the steepest slew. Infinite where neither
+        limits it: such a way is one step.
+    """
+
+    def __init__(self, limits: Description, ramp_rate: float = math.inf) -> None:
+        if not ramp_rate > 0:
+            raise StageError(f"{limits.name}: got a ramp rate of {ramp_rate:g} V/s, expected more than 0")
+        self.limits, self.ramp_rate = limits, min(ramp_rate, limits.max_slew_rate)
+
+    def restricted(self, limits: Description, ramp_rate: float) -> Limiter:
+        """The same stage held to the range and slew of `limits` and to a ramp rate [V/s].
+
+        Raises
+        ------
+        StageError
+            If that would allow what the stage does not, or does not contain the safe voltage.
+        """
+        own = self.limits
+        inside = own.voltage_min <= limits.voltage_min and limits.voltage_max <= own.voltage_max
+        if not (inside and limits.max_slew_rate <= own.max_slew_rate):
+            raise StageError(
+                f"{own.name}: got limits {limits.voltage_min:g} to {limits.voltage_max:g} V and "
+                f"{limits.max_slew_rate:g} V/s, expected them inside {own.voltage_min:g} to {own.voltage_max:g} V and "
+                f"{own.max_slew_rate:g} V/s"
+            )
+        narrowed = replace(
+            own,
+            voltage_min=limits.voltage_min,
+            voltage_max=limits.voltage_max,
+            max_slew_rate=limits.max_slew_rate,
+        )
+        return Limiter(narrowed, ramp_rate)
+
+    @property
+    def safe_voltage(self) -> float:
+        """Drive voltage of the stage at rest [V]."""
+        return self.limits.safe_voltage
+
+    def check(self, voltage: ArrayLike, present_voltage: float, sample_period: float) -> Samples:
+        """See `Description.check_voltage`."""
+        return self.limits.check_voltage(voltage, present_voltage, sample_period)
+
+    def goal(self, voltage: float) -> float:
+        """Return a voltage to go to [V]; StageError if it is not finite or outside the range."""
+        return float(self.limits.check_voltage(np.array([voltage], dtype=np.float64), float(voltage), 1.0)[0])
+
+    def way(
+        self, present_voltage: float, goal: float, sample_period: float, longest: int = LONGEST_PART
+    ) -> Iterator[Samples]:
+        """Samples of the straight way to a voltage, the present one left out, the last one exactly the goal.
+
+        Parameters
+        ----------
+        present_voltage : float
+            Voltage applied now [V]; it may lie outside the limits, where another program has left it there.
+        goal : float
+            Where the way ends [V].
+        sample_period : float
+            Time between samples [s].
+        longest : int
+            Samples in one part, at most.
+
+        Yields
+        ------
+        (n,) ndarray of float64
+            No two samples are further apart than `ramp_rate` times `sample_period`; one sample at least in all.
+        """
+        step = self.ramp_rate * sample_period
+        count = max(math.ceil(abs(goal - present_voltage) / step * (1 - 1e-12)), 1)
+        low, high = min(present_voltage, goal), max(present_voltage, goal)
+        direction = math.copysign(step, goal - present_voltage) if count > 1 else 0.0
+        for first in range(1, count + 1, longest):
+            numbers = np.arange(first, min(first + longest, count + 1))
+            part = np.clip(present_voltage + direction * numbers, low, high)
+            if first + longest > count:
+                part[-1] = goal
+            yield part

@@ -1,0 +1,32 @@
+"""`Opening`: what a driver says about a stage that it opens, besides the values of its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from ..errors import StageError
+from ..record import Record
+
+
+def _no_reader(path: str) -> Iterable[Record]:
+    raise StageError(f"{path}: this program reads no recordings, expected another stage than 'replay'")
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """How a stage is wanted.
+
+    Parameters
+    ----------
+    sample_period : float
+        Time between samples [s]; 0 for the stage's own.
+    real_time_factor : float
+        Seconds of a simulated stage per second; 1 for every real one.
+    read : callable
+        Reads the records of a recording from its path: stages read no files of samples by themselves.
+    """
+
+    sample_period: float = 0.0
+    real_time_factor: float = 1.0
+    read: Callable[[str], Iterable[Record]] = _no_reader

@@ -1,0 +1,68 @@
+"""How a driver opens a simulated stage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ...errors import RecordingError, StageError
+from ...parameter import Parameter, Row, Setting
+from ...yaml_file import read_yaml
+from ..hidden import hidden_effect
+from ..opening import Opening
+from ..plant import PlantParameters
+from ..stage import Stage
+from .stages import SimulatedMemoryStage, SimulatedStage
+
+_PLANT = PlantParameters.table()
+"""Parameters of the simulated plant."""
+
+PARAMETERS: tuple[Row, ...] = (
+    Setting("seed", 0, "fixes noise and random phases", lower=0, upper=2**31 - 1),
+    Setting("memory", False, "true for a stage with on-board memory: upload, run, read"),
+    Setting("longest_block", 32768, "samples that the memory holds", lower=2, upper=2**31 - 1),
+    Parameter("dead_time", "t_d", "s", 0.05, 0.0, 100.0, "time that arming takes", "simulated plant"),
+    Setting("hidden_effect", -1, "seed that draws one effect to hide; -1: nothing hidden", lower=-1, upper=2**31 - 1),
+    Setting("plant_file", "", "YAML file of plant parameters, which then count instead of the ones below"),
+    Setting("hysteresis.operator", "bouc_wen", "hysteresis of the plant", ("bouc_wen", "prandtl_ishlinskii")),
+    *_PLANT,
+)
+"""Of the driver, under ``simulated.``."""
+
+
+def open(values: Mapping[str, Any], opening: Opening) -> Stage:
+    """Make a simulated stage from the values of `PARAMETERS`; PiezoError if they make no sense."""
+    period = {"sample_period": opening.sample_period} if opening.sample_period else {}
+    named = {"seed": values["seed"], **period}
+    plant = PlantParameters.from_mapping(_plant_values(values))
+    if values["hidden_effect"] >= 0:
+        plant = hidden_effect(values["hidden_effect"], plant).parameters
+    if values["memory"]:
+        return SimulatedMemoryStage(
+            plant,
+            longest_block=values["longest_block"],
+            dead_time=values["dead_time"],
+            real_time_factor=opening.real_time_factor,
+            **named,
+        )
+    return SimulatedStage(plant, **named)
+
+
+def _plant_values(values: Mapping[str, Any]) -> Mapping[str, Any]:
+    if values["plant_file"]:
+        return _read_mapping(Path(values["plant_file"]).expanduser())
+    changed = {row.name: values[row.name] for row in _PLANT if values[row.name] != row.value}
+    return {"hysteresis.operator": values["hysteresis.operator"], **changed}
+
+
+def _read_mapping(path: Path) -> Mapping[str, Any]:
+    try:
+        mapping = read_yaml(path)
+    except RecordingError as error:
+        raise StageError(f"simulated.plant_file: {error}") from None
+    except OSError as error:
+        raise StageError(f"simulated.plant_file: cannot read {path} ({error.strerror})") from None
+    if not isinstance(mapping, Mapping):
+        raise StageError(f"simulated.plant_file: {path} holds no mapping, expected plant parameters by name")
+    return mapping
