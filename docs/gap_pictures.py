@@ -135,7 +135,7 @@ def screening(diagnosis: Diagnosis) -> Figure:
     """Step 6: predicted gain of every effect of the catalogue."""
     assert diagnosis.selection is not None
     first = diagnosis.selection.steps[0]
-    found = screen(diagnosis.selection.baseline, diagnosis.selection.accepted[0].best.evidence, CATALOGUE)
+    found = screen(diagnosis.selection.baseline, diagnosis.selection.accepted[0].best.training_data, CATALOGUE)
     gains = sorted(((max(0.0, first.before.cost - c.score.cost), c.name) for c in found), reverse=True)
     figure, ((axes,),) = canvas(1, 1, 4.0)
     axes.barh(np.arange(len(gains)), [g for g, _ in gains], color=[GREEN, *[BLUE] * (len(gains) - 1)])

@@ -37,8 +37,8 @@ def run(args: argparse.Namespace) -> int:
     """
     start = None if args.model is None else model_file.load(args.model)
     experiment = reading.read(args)
-    with progress("diagnose") as tell:
-        found = diagnose(experiment, start, progress=tell)
+    with progress("diagnose") as report_progress:
+        found = diagnose(experiment, start, progress=report_progress)
     path = ""
     if args.output is not None and found.model is not None:
         path = str(model_file.save(found.model, args.output))
@@ -46,8 +46,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(args.json, answer)
     if args.report is not None:
-        with progress("report") as tell:
-            drawn = page(_comparison(found), fit=found.fit, answer=answer, progress=tell)
+        with progress("report") as report_progress:
+            drawn = page(_comparison(found), fit=found.fit, answer=answer, progress=report_progress)
         drawn.save(Path(args.report).expanduser())
     out = console()
     said = answer_verdict(answer)
@@ -70,7 +70,7 @@ def _comparison(found: Diagnosis) -> ModelComparison:
     if found.selection is not None and found.selection.accepted and found.model not in (None, found.baseline):
         assert found.model is not None
         models["after"] = found.model
-        free = found.selection.accepted[-1].best.evidence.nuisance
+        free = found.selection.accepted[-1].best.training_data.nuisance
         # hum has an amplitude and a phase of its own in every record
         nuisances = {"after": free} if free.hum_frequency is not None else {}
     return compare(found.experiment, models, nuisances)

@@ -59,14 +59,14 @@ def run(args: argparse.Namespace) -> int:
     """
     experiment = reading.read(args)
     orders = None if args.choose_orders else tuple(args.orders or (8, 8))
-    with progress("identify") as tell:
+    with progress("identify") as report_progress:
         found = identify(
             experiment,
             orders=orders,
             hysteresis=OPERATORS[args.hysteresis],
             memory=not args.no_memory,
             held_out=HELD_OUT if args.held_out is None else tuple(args.held_out),
-            progress=tell,
+            progress=report_progress,
         )
     path = model_file.save(found.model, args.output)
     if args.json is not None:

@@ -47,17 +47,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except IdentificationError as error:
-        return _told(error, NOT_IDENTIFIABLE)
+        return _print_error(error, NOT_IDENTIFIABLE)
     except (PiezoError, OSError) as error:
         if isinstance(error, BrokenPipeError):
             # the reader of our output has gone: leave nothing for the interpreter to flush
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return BROKEN_PIPE
-        return _told(error, BAD_INPUT)
+        return _print_error(error, BAD_INPUT)
     except MemoryError:
-        return _told("the recording does not fit into memory; decimate it or give fewer rows", BAD_INPUT)
+        return _print_error("the recording does not fit into memory; decimate it or give fewer rows", BAD_INPUT)
     except KeyboardInterrupt:
-        return _told("interrupted", INTERRUPTED)
+        return _print_error("interrupted", INTERRUPTED)
 
 
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
@@ -73,7 +73,7 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
     return parser
 
 
-def _told(message: object, status: int) -> int:
+def _print_error(message: object, status: int) -> int:
     print(f"piezo: {printable(' '.join(str(message).split()))}", file=sys.stderr)
     return status
 

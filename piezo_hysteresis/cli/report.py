@@ -47,8 +47,8 @@ def run(args: argparse.Namespace) -> int:
     answer = None if args.answer is None else read_json(args.answer)
     experiment = reading.read(args)
     nuisances = dict.fromkeys(models, Nuisance(offset=True)) if args.zero_per_phase else None
-    with progress("report") as tell:
-        drawn = page(compare(experiment, models, nuisances), answer=answer, title=args.title, progress=tell)
+    with progress("report") as report_progress:
+        drawn = page(compare(experiment, models, nuisances), answer=answer, title=args.title, progress=report_progress)
     path = Path(args.output).expanduser()
     drawn.save(path)
     console().print(f"wrote {path} and {len(drawn.drawings)} figures beside it")

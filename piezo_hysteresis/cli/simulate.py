@@ -50,9 +50,9 @@ def run(args: argparse.Namespace) -> int:
     console().print(f"{args.protocol}: {phases.summary}")
     records: list[Record] = []
     done = 0.0
-    with progress("simulate") as tell:
+    with progress("simulate") as report_progress:
         for phase in phases:
-            tell(phase.name, done / phases.summary.duration)
+            report_progress(phase.name, done / phases.summary.duration)
             records.append(stage.play(phase.voltage, phase.name, continues=bool(records), average=phase.stored_every))
             done += phase.duration
     recording.write(Experiment(tuple(records)), args.output)

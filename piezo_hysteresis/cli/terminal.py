@@ -65,7 +65,7 @@ def progress(task: str) -> Iterator[Callable[[str, float], None]]:
     with bar:
         number = bar.add_task(task, total=1.0)
 
-        def tell(word: str, fraction: float) -> None:
+        def report_progress(word: str, fraction: float) -> None:
             bar.update(number, description=f"{task}: {word}", completed=min(max(fraction, 0.0), 1.0))
 
-        yield tell
+        yield report_progress

@@ -45,16 +45,16 @@ class UnreachablePart:
             "voltage_max": f"{self.needed_max:.3g} V",
             "max_slew_rate": f"{self.needed_slew:.3g} V/s",
         }[self.limit]
-        told = (
+        message = (
             f"{self.begin:.6g} to {self.end:.6g} s cannot be had: it needs {needed}, beyond {self.limit}; "
             f"the stage would be off by up to {1e9 * abs(self.largest):.0f} nm"
         )
         if self.after_loop:
-            told += (
+            message += (
                 "; from rest this displacement is within the limits, but after a swing the hysteresis holds the stage "
                 "above it and only a voltage below the minimum brings it back"
             )
-        return told
+        return message
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,7 +85,7 @@ def _diagnosed(
     experiment: Experiment,
     model: Model | None,
     effects: Collection[type[Effect]],
-    tell: Progress,
+    progress: Progress,
     known: Selection | None = None,
 ) -> Diagnosis:
     """The diagnosis; `known` is a search whose model tells what slow samples have lost better than its baseline."""
@@ -100,74 +100,80 @@ def _diagnosed(
         return _undecided(experiment, model, severe)
     moving = [i for i in moving if i in usable]
     if len(moving) < FEWEST:
-        return diagnose_few(experiment, model, moving, effects, tell)
+        return diagnose_few(experiment, model, moving, effects, progress)
 
-    told = {n.kind for n in experiment.notices}
-    sharpens, may_be_stepped = VOLTAGE_NOISE not in told, KIND not in told
-    ground = prepare_baseline(experiment.records, usable, model, known, sharpens, tell)
-    baseline = ground.baseline.model
-    found_wanting = ground.score.excess > ADEQUATE
-    if found_wanting and may_be_stepped and is_stepped(baseline, ground.evidence, leaves=STEPS_LEAVE):
-        return _diagnosed(without_steps(experiment, baseline), model, effects, tell)
-    where = _where(ground, tell)
+    notice_kinds = {n.kind for n in experiment.notices}
+    sharpens, may_be_stepped = VOLTAGE_NOISE not in notice_kinds, KIND not in notice_kinds
+    baseline_setup = prepare_baseline(experiment.records, usable, model, known, sharpens, progress)
+    baseline = baseline_setup.baseline.model
+    found_wanting = baseline_setup.score.excess > ADEQUATE
+    if found_wanting and may_be_stepped and is_stepped(baseline, baseline_setup.training_data, leaves=STEPS_LEAVE):
+        return _diagnosed(without_steps(experiment, baseline), model, effects, progress)
+    where = _where(baseline_setup, progress)
     stepped = False
 
-    def is_in_vain(model: Model, evidence: TrainingData) -> bool:
+    def gains_nothing(model: Model, training_data: TrainingData) -> bool:
         nonlocal stepped
-        stepped = may_be_stepped and is_stepped(model, evidence)
+        stepped = may_be_stepped and is_stepped(model, training_data)
         return stepped
 
     selection = select(
         baseline,
-        ground.evidence,
-        ground.score,
-        ground.null,
+        baseline_setup.training_data,
+        baseline_setup.score,
+        baseline_setup.null,
         effects,
-        lambda word, part: tell(word, 0.4 + 0.4 * part),
-        is_in_vain,
+        lambda word, part: progress(word, 0.4 + 0.4 * part),
+        gains_nothing,
     )
     if stepped:
-        return _diagnosed(without_steps(experiment, selection.model), model, effects, tell)
+        return _diagnosed(without_steps(experiment, selection.model), model, effects, progress)
     leaves_a_gap = bool(selection.accepted) and selection.score.excess > ADEQUATE
-    if leaves_a_gap and sharpens and known is None and ground.is_coarse(selection.model):
-        return _diagnosed(experiment, model, effects, tell, selection)
-    return _concluded(experiment, ground, where, selection, tell)
+    if leaves_a_gap and sharpens and known is None and baseline_setup.is_coarse(selection.model):
+        return _diagnosed(experiment, model, effects, progress, selection)
+    return _concluded(experiment, baseline_setup, where, selection, progress)
 
 
-def _where(ground: BaselineSetup, tell: Progress) -> tuple[ResidualShare, ...]:
-    tell("where", 0.35)
-    left = residuals(ground.baseline.model, ground.records, ground.evidence.nuisance)
-    usable = ground.usable
-    return localise([ground.records[i] for i in usable], [left[i] for i in usable], [ground.least[i] for i in usable])
+def _where(baseline_setup: BaselineSetup, progress: Progress) -> tuple[ResidualShare, ...]:
+    progress("where", 0.35)
+    left = residuals(baseline_setup.baseline.model, baseline_setup.records, baseline_setup.training_data.nuisance)
+    usable = baseline_setup.usable
+    return localise(
+        [baseline_setup.records[i] for i in usable],
+        [left[i] for i in usable],
+        [baseline_setup.least[i] for i in usable],
+    )
 
 
 def _concluded(
     experiment: Experiment,
-    ground: BaselineSetup,
+    baseline_setup: BaselineSetup,
     where: tuple[ResidualShare, ...],
     selection: Selection,
-    tell: Progress,
+    progress: Progress,
 ) -> Diagnosis:
     """The last fits, the gap on records set aside, and what follows."""
-    records, least, evidence = ground.records, ground.least, ground.evidence
-    tell("gap", 0.85)
+    records, least, training_data = baseline_setup.records, baseline_setup.least, baseline_setup.training_data
+    progress("gap", 0.85)
     named = is_explained(selection) and not is_makeshift(selection)
-    whole = ground.whole
+    whole = baseline_setup.whole
     plain = selection.baseline if selection.accepted else selection.model  # the search may have found better dynamics
-    first = joint(plain, replace(evidence, records=whole), LAST, PRECISE)
-    final_evidence = selection.accepted[-1].best.evidence if named else evidence
-    final = _finished(selection, replace(final_evidence, records=whole), ground.null) if named else first
-    chosen = ground.spared or tuple(ground.fitted)
+    first = joint(plain, replace(training_data, records=whole), LAST, PRECISE)
+    final_training_data = selection.accepted[-1].best.training_data if named else training_data
+    final = _finished(selection, replace(final_training_data, records=whole), baseline_setup.null) if named else first
+    chosen = baseline_setup.test_records or tuple(baseline_setup.fitted)
 
     def gap_of(last: Fit, nuisance: Nuisance) -> Gap:
-        models, nuisances = (first.model, last.model), (evidence.nuisance, nuisance)
-        return measure_gap(models, records, chosen, least.tolist(), ground.span, nuisances, bool(ground.spared))
+        models, nuisances = (first.model, last.model), (training_data.nuisance, nuisance)
+        return measure_gap(
+            models, records, chosen, least.tolist(), baseline_setup.span, nuisances, bool(baseline_setup.test_records)
+        )
 
-    gap = gap_of(final, final_evidence.nuisance)
+    gap = gap_of(final, final_training_data.nuisance)
     falls = not named or gap.falls
     if named and not falls:
-        named, final, gap = False, first, gap_of(first, evidence.nuisance)
-    tell("next experiment", 0.95)
+        named, final, gap = False, first, gap_of(first, training_data.nuisance)
+    progress("next experiment", 0.95)
     verdict, reason = verdict_of(selection, named, falls, gap)
     return Diagnosis(
         verdict=verdict,
@@ -178,24 +184,24 @@ def _concluded(
         fit=final,
         where=where,
         gap=gap,
-        next_experiment=decide(selection, evidence),
-        experiment=experiment.noting(*missing_excitation([records[i] for i in ground.usable])),
+        next_experiment=decide(selection, training_data),
+        experiment=experiment.noting(*missing_excitation([records[i] for i in baseline_setup.usable])),
     )
 
 
 def _quieted(experiment: Experiment, noise: Array) -> Experiment:
     size = f"{noise.max():.2g} V of noise"
-    told = f"the voltage was measured with {size}; turns within {NOISE_WIDTH:g} times that are left out"
+    notice_kinds = f"the voltage was measured with {size}; turns within {NOISE_WIDTH:g} times that are left out"
     records = tuple(quieted(r, n) for r, n in zip(experiment.records, noise.tolist(), strict=True))
-    return replace(experiment, records=records).noting(Notice(VOLTAGE_NOISE, told))
+    return replace(experiment, records=records).noting(Notice(VOLTAGE_NOISE, notice_kinds))
 
 
-def _finished(selection: Selection, evidence: TrainingData, null: float) -> Fit:
+def _finished(selection: Selection, training_data: TrainingData, null: float) -> Fit:
     """The last fit, on all samples, begun anew behind new dynamics while that helps."""
-    final = joint(selection.model, evidence, LAST, PRECISE)
+    final = joint(selection.model, training_data, LAST, PRECISE)
     last = selection.accepted[-1].best
     while final.cost > NOISY * null:
-        anew = restart(replace(last, effect=final.model[last.name], evidence=evidence, fit=final), LAST).fit
+        anew = restart(replace(last, effect=final.model[last.name], training_data=training_data, fit=final), LAST).fit
         if anew is None or anew.cost > WORTHWHILE * final.cost:
             break
         final = anew

@@ -78,19 +78,19 @@ class Diagnosis:
         """Effects that were not named, each once, with the reason of the last turn."""
         if self.selection is None:
             return ()
-        told: dict[str, Rejection] = {}
+        rejections: dict[str, Rejection] = {}
         for step in self.selection.steps:
             if self.verdict is Verdict.UNKNOWN and step.accepted:
                 closed = self.selection.explained(step.best.score)
                 kept = self.model is not None and step.best.name in self.model
                 said = f"in the model, not named: up to here {closed:.2f} of the gap is explained"
-                told[step.best.name] = Rejection(
+                rejections[step.best.name] = Rejection(
                     step.best.name, said if kept else f"closest, but explains {closed:.2f} of the gap only"
                 )
             for rejection in step.rejected:
-                told[rejection.name] = rejection
+                rejections[rejection.name] = rejection
         named = {s.best.name for s in self.selection.accepted} if self.names else set()
-        return tuple(r for r in told.values() if r.name not in named)
+        return tuple(r for r in rejections.values() if r.name not in named)
 
     def effects(self) -> list[dict[str, Any]]:
         """The named effects, as in ``answer.json``."""

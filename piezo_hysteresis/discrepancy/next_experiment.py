@@ -42,9 +42,9 @@ class NextExperiment:
     power: float
 
 
-def menu(evidence: TrainingData, model: Model) -> dict[str, Record]:
+def menu(training_data: TrainingData, model: Model) -> dict[str, Record]:
     """Phases to choose from, inside the drive range that was recorded; their displacement, not yet measured, is 0."""
-    extent, period = evidence.extent, model.sample_period
+    extent, period = training_data.extent, model.sample_period
     fast = DriveLimits(
         sample_period=period,
         voltage_min=extent.voltage_min,
@@ -81,7 +81,7 @@ def menu(evidence: TrainingData, model: Model) -> dict[str, Record]:
     }
 
 
-def propose(first: Model, second: Model, names: tuple[str, str], evidence: TrainingData) -> NextExperiment:
+def propose(first: Model, second: Model, names: tuple[str, str], training_data: TrainingData) -> NextExperiment:
     """Phase of the menu on which two fitted models differ most, beyond what either can still adjust.
 
     Parameters
@@ -90,18 +90,18 @@ def propose(first: Model, second: Model, names: tuple[str, str], evidence: Train
         Fitted, one with each effect.
     names : (str, str)
         The effects.
-    evidence : Evidence
+    training_data : Evidence
         What has been recorded: it binds the common parameters.
     """
-    free = free_numbers(first, evidence)
+    free = free_numbers(first, training_data)
     directions = gauge(first, free)
-    known = weighted_sum(grams(first, evidence.records, free, evidence.nuisance), evidence.floors)
+    known = weighted_sum(grams(first, training_data.records, free, training_data.nuisance), training_data.floors)
     prior = directions.T @ known[:-1, :-1] @ directions
-    floor = float(np.min(evidence.floors))
+    floor = float(np.min(training_data.floors))
     best = NextExperiment("", names, -1.0)
-    for name, record in menu(evidence, first).items():
+    for name, record in menu(training_data, first).items():
         (difference,) = (a - b for a, b in zip(second.simulate(record), first.simulate(record), strict=True))
-        (gram,) = grams(first, [record], free, evidence.nuisance, [difference[None, :]])
+        (gram,) = grams(first, [record], free, training_data.nuisance, [difference[None, :]])
         total = gram.matrix[:-1, :-1] / (gram.size * floor * floor)
         q = len(free)
         cross = directions.T @ total[:q, q]
@@ -114,14 +114,14 @@ def propose(first: Model, second: Model, names: tuple[str, str], evidence: Train
     return best
 
 
-def decide(selection: Selection, evidence: TrainingData) -> NextExperiment | None:
+def decide(selection: Selection, training_data: TrainingData) -> NextExperiment | None:
     """What would decide between the first accepted effect that has a rival, and that rival; None where none has.
 
     Parameters
     ----------
     selection : Selection
         Outcome of the search.
-    evidence : Evidence
+    training_data : Evidence
         What has been recorded.
     """
     for step in selection.accepted:
@@ -129,5 +129,5 @@ def decide(selection: Selection, evidence: TrainingData) -> NextExperiment | Non
         others = [r for r in step.rivals if r.effect.public_name() != mine.effect.public_name()]
         if others and mine.fit is not None and others[0].fit is not None:
             pair = (mine.effect.public_name(), others[0].effect.public_name())
-            return propose(mine.fit.model, others[0].fit.model, pair, evidence)
+            return propose(mine.fit.model, others[0].fit.model, pair, training_data)
     return None

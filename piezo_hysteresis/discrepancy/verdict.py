@@ -62,18 +62,18 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
     foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
     if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):
         if gap.after > UNFORESEEN * gap.floor:
-            told = f"those set aside, where a gap of {gap.after / gap.floor:.1f} floors remains"
-            return Verdict.UNKNOWN, f"No name: nothing is missing on the records that were fitted, but on {told}."
+            message = f"those set aside, where a gap of {gap.after / gap.floor:.1f} floors remains"
+            return Verdict.UNKNOWN, f"No name: nothing is missing on the records that were fitted, but on {message}."
         return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
     if is_explained(selection) and is_makeshift(selection):
-        told = f"{names} explains {100 * closed:.0f} %, but what is linear leaves nothing where it is named rightly"
-        return Verdict.UNKNOWN, f"No name: {told}."
+        message = f"{names} explains {100 * closed:.0f} %, but what is linear leaves nothing where it is named rightly"
+        return Verdict.UNKNOWN, f"No name: {message}."
     if selection.accepted and not falls:
         return Verdict.UNKNOWN, f"No name: {names} helps on the records that chose it, not on those set aside."
-    told = ""
+    message = ""
     if selection.steps:
         closest = selection.steps[0].best
         share = 100 * selection.explained(closest.score)
         why = "".join(f" ({r.reason})" for r in selection.steps[0].rejected if r.name == closest.name)
-        told = f"; closest is {closest.effect.public_name()}, which explains {share:.0f} %{why}"
-    return Verdict.UNKNOWN, f"The model misses an effect that the catalogue does not explain{told}."
+        message = f"; closest is {closest.effect.public_name()}, which explains {share:.0f} %{why}"
+    return Verdict.UNKNOWN, f"The model misses an effect that the catalogue does not explain{message}."

@@ -140,8 +140,8 @@ class Identification:
             if not name.startswith(f"{Arx.name}.") or name == f"{Arx.name}.delay":
                 lines.append(f"{name:28s} {value:12.6g} ± {1.96 * self.fit.standard_errors[name]:.2g} (95 %)")
         for phase in self.phases:
-            told = "" if phase.is_fitted else "  held out"
-            lines.append(f"{phase.phase:28s} {phase.percent:9.4f} % of range {phase.rms * 1e9:10.4g} nm{told}")
+            message = "" if phase.is_fitted else "  held out"
+            lines.append(f"{phase.phase:28s} {phase.percent:9.4f} % of range {phase.rms * 1e9:10.4g} nm{message}")
         lines += [str(c) for c in self.comparisons]
         lines += [f"{a} and {b} correlate by {c:.3f}" for a, b, c in self.correlated]
         lines += [f"{n.kind}: {n.message}" for n in self.notices]

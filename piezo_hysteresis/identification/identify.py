@@ -94,8 +94,8 @@ def identify(
     Every record counts the same in the joint fit, its residual measured against the larger of its sensor noise and
     0.03 % of the range.
     """
-    tell = progress or (lambda word, fraction: None)
-    experiment, led_in = known_from_within(experiment)
+    report = progress or (lambda word, fraction: None)
+    experiment, conditioning_notices = known_from_within(experiment)
     records = experiment.records
     roles = roles_of(experiment, held_out)
     if not any(roles.contents[i].span > 0.0 for i in roles.fitted):
@@ -112,13 +112,13 @@ def identify(
     scale_y = displacement_scale or reach
     floors = [max(c.noise, ADEQUATE * reach) for c in roles.contents]
     period = experiment.fastest_period
-    notices: list[Notice] = [*experiment.notices, *led_in]
+    notices: list[Notice] = [*experiment.notices, *conditioning_notices]
 
-    tell("step 1: delay", 0.0)
+    report("step 1: delay", 0.0)
     delay = _delay(experiment, roles, notices)
     published = _published(experiment, scale_v, scale_y, orders or (8, 8), hysteresis, delay, notices)
 
-    tell("step 3: hysteresis", 0.1)
+    report("step 3: hysteresis", 0.1)
     dead = 1.0 if delay is None else max(1.0, delay.time / period)
     frame = Model((hysteresis(), Arx(a=(), b=(gain,), delay=dead)), period, scale_v, scale_y)
     start = _behind_the_gauge(frame, published, records, roles.loops)
@@ -127,43 +127,43 @@ def identify(
     comparisons: tuple[InputComparison, ...] = ()
     blocks: Blocks = (records, floors, roles.fitted)
     if roles.broadband:
-        tell("step 2: dynamics", 0.2)
+        report("step 2: dynamics", 0.2)
         signals = hysteresis_signals(start, records, roles.broadband)
         samples = delay_of(signals) if delay is None else round(dead)
         table = compare_orders(signals, samples, period, HIGHEST_ORDER)
         chosen = orders or (choose_order(table),) * 2
 
         def joint_progress(word: str, part: float) -> None:
-            tell(word, 0.3 + 0.6 * part)
+            report(word, 0.3 + 0.6 * part)
 
         def fit_behind(model: Model, samples: int) -> tuple[Fit, Dynamics, tuple[Notice, ...]]:
             return fit_dynamics(model, records, floors, roles.fitted, roles.broadband, samples, chosen, joint_progress)
 
-        joint, dynamics, told = fit_behind(start, samples)
+        joint, dynamics, more_notices = fit_behind(start, samples)
         if delay is None:
             # A better hysteresis shows the onset better.
             again = delay_of(hysteresis_signals(joint.model, records, roles.broadband))
             if again != samples:
                 samples = again
-                joint, dynamics, told = fit_behind(joint.model, samples)
+                joint, dynamics, more_notices = fit_behind(joint.model, samples)
             notices.append(
                 Notice("delay_from_fit", f"no step to read it from: delay of {samples} samples from the dynamics")
             )
-        notices += told
+        notices += more_notices
         noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
-        comparisons, told = compare_inputs(joint.model, records, noise, samples, chosen)
-        notices += told
+        comparisons, more_notices = compare_inputs(joint.model, records, noise, samples, chosen)
+        notices += more_notices
     else:
-        tell("joint fit", 0.3)
+        report("joint fit", 0.3)
         blocks = steps_apart(records, floors, roles.fitted)
         joint = fit_lag(start, *blocks)
     if memory:
-        tell("memory", 0.9)
-        joint, told = choose_memory(joint, *blocks, roles.loops if roles.broadband else blocks[2])
-        notices += told
+        report("memory", 0.9)
+        joint, more_notices = choose_memory(joint, *blocks, roles.loops if roles.broadband else blocks[2])
+        notices += more_notices
     if not roles.broadband:
         notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted])
-    tell("free run", 0.95)
+    report("free run", 0.95)
     phases = _free_run(joint.model, experiment, roles, reach)
     zero = float(np.mean([e.mean() for e in residuals(joint.model, records)]))
     joint = replace(joint, model=joint.model.with_effect(Offset(y0=zero)))

@@ -32,15 +32,17 @@ def verdict(comparison: ModelComparison, answer: Mapping[str, Any] | None = None
         The answer of a diagnosis, as it is written for machines.
     """
     severe = [n.message for n in comparison.experiment.notices if n.severe]
-    doubts = tuple(f"Caution: {message}." for message in severe)
+    cautions = tuple(f"Caution: {message}." for message in severe)
     if comparison.now is None:
-        return VerdictText("The recording, without a model", (*doubts, "No model was given: only the data are shown."))
+        return VerdictText(
+            "The recording, without a model", (*cautions, "No model was given: only the data are shown.")
+        )
     if answer is None:
         more = "What is missing, `piezo diagnose` tries to name."
         advice = (more,) if _excess(comparison) > ENOUGH else ()
-        return VerdictText(_fit_headline(comparison), (*doubts, *_fit_sentences(comparison), *advice))
+        return VerdictText(_fit_headline(comparison), (*cautions, *_fit_sentences(comparison), *advice))
     said = answer_verdict(answer)
-    return VerdictText(said.headline, (*doubts, *said.sentences, *_fit_sentences(comparison)))
+    return VerdictText(said.headline, (*cautions, *said.sentences, *_fit_sentences(comparison)))
 
 
 def answer_verdict(answer: Mapping[str, Any]) -> VerdictText:

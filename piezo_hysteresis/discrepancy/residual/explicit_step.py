@@ -64,14 +64,14 @@ def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
     return [b - a if r.sample_period < own else np.zeros(r.size) for r, a, b in pairs]
 
 
-def is_stepped(model: Model, evidence: TrainingData, leaves: float = np.inf) -> bool:
+def is_stepped(model: Model, training_data: TrainingData, leaves: float = np.inf) -> bool:
     """Whether the loop behind the data takes the explicit step: they fit best with the whole of its changes taken out.
 
     Parameters
     ----------
     model : Model
         Fitted to the evidence.
-    evidence : Evidence
+    training_data : Evidence
         Records and floors.
     leaves : float
         Cost at most without the changes: what else is missing may look alike.
@@ -79,14 +79,14 @@ def is_stepped(model: Model, evidence: TrainingData, leaves: float = np.inf) -> 
     if BoucWen.name not in model:
         return False
     with suppress(DivergenceError):
-        changes = step_changes(model, evidence.records)
-        sizes = [np.sqrt(np.mean(c**2)) / f for c, f in zip(changes, evidence.floors, strict=True)]
+        changes = step_changes(model, training_data.records)
+        sizes = [np.sqrt(np.mean(c**2)) / f for c, f in zip(changes, training_data.floors, strict=True)]
         if max(sizes) < SEEN:
             return False
 
         def cost(share: float) -> float:
-            records = less(evidence.records, [share * c for c in changes])
-            return joint(model, replace(evidence, records=records), LINEARISATIONS, PRECISE).cost
+            records = less(training_data.records, [share * c for c in changes])
+            return joint(model, replace(training_data, records=records), LINEARISATIONS, PRECISE).cost
 
         whole = cost(1.0)
         return whole < leaves and whole < BETTER * cost(0.0) and all(whole < cost(share) for share in OTHER_SHARES)
@@ -97,8 +97,10 @@ def without_steps(experiment: Experiment, model: Model) -> Experiment:
     """The experiment as the exact loop would have answered, which its notices tell."""
     records = tuple(at_period(r, model.sample_period) if _is_faster(r, model) else r for r in experiment.records)
     freed = less(records, step_changes(model, records))
-    told = "jumps go by the explicit step of Eq. (7), as in a simulation and in no stage; what it changes is left out"
-    return replace(experiment, records=freed).noting(Notice(KIND, told))
+    message = (
+        "jumps go by the explicit step of Eq. (7), as in a simulation and in no stage; what it changes is left out"
+    )
+    return replace(experiment, records=freed).noting(Notice(KIND, message))
 
 
 def _is_faster(record: Record, model: Model) -> bool:

@@ -103,11 +103,11 @@ def _place(axis: str, held: Array, room: Array, labels: Sequence[str]) -> tuple[
     excess = shares - even
     chosen = [k for k in np.argsort(-excess) if excess[k] > 0.25 * max(excess.max(), 1e-12)][:3]
     share = float(shares[chosen].sum())
-    told = ", ".join(f"{labels[k]} ({100 * shares[k]:.0f} %)" for k in chosen)
+    message = ", ".join(f"{labels[k]} ({100 * shares[k]:.0f} %)" for k in chosen)
     # concentration: how far the shares are from where the samples are
     concentration = float(np.abs(excess).sum() / 2.0)
     return ResidualShare(
-        axis, share, told, tuple((n, float(s)) for n, s in zip(labels, shares, strict=True))
+        axis, share, message, tuple((n, float(s)) for n, s in zip(labels, shares, strict=True))
     ), concentration
 
 

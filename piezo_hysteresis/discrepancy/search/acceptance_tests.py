@@ -22,12 +22,15 @@ def is_seen(candidate: Candidate) -> bool:
     A change that is the same in all records is the sensor's zero.
     """
     assert candidate.fit is not None
-    evidence, model = candidate.evidence, candidate.fit.model
-    with_it, without_it = model.simulate(evidence.records), model.without(candidate.name).simulate(evidence.records)
+    training_data, model = candidate.training_data, candidate.fit.model
+    with_it, without_it = (
+        model.simulate(training_data.records),
+        model.without(candidate.name).simulate(training_data.records),
+    )
     changes = [first - second for first, second in zip(with_it, without_it, strict=True)]
-    counted = [(c, floor) for c, floor in zip(changes, evidence.floors, strict=True) if np.isfinite(floor)]
+    counted = [(c, floor) for c, floor in zip(changes, training_data.floors, strict=True) if np.isfinite(floor)]
     means = np.array([c.mean() for c, _ in counted])
-    zeros = means if evidence.nuisance.offset else np.full(means.size, means.mean())
+    zeros = means if training_data.nuisance.offset else np.full(means.size, means.mean())
     return candidate.name == MainsHum.name or any(
         np.sqrt(np.mean((c - zero) ** 2)) > SEEN * floor for (c, floor), zero in zip(counted, zeros, strict=True)
     )
@@ -44,9 +47,9 @@ def may_be_off(candidate: Candidate) -> bool:
     own = [n for n in fitted.names if n.startswith(f"{candidate.name}.")]
     if all(rows(n).off is None for n in own):
         return False
-    told = sorted((n for n in own if errors[n] > 0.0), key=lambda n: rows(n).off is None)
-    off = np.array([(fitted.values[n] - value) / errors[n] for n in told if (value := rows(n).off) is not None])
-    at, scale, k = [fitted.names.index(n) for n in told], np.array([errors[n] for n in told]), off.size
+    measured = sorted((n for n in own if errors[n] > 0.0), key=lambda n: rows(n).off is None)
+    off = np.array([(fitted.values[n] - value) / errors[n] for n in measured if (value := rows(n).off) is not None])
+    at, scale, k = [fitted.names.index(n) for n in measured], np.array([errors[n] for n in measured]), off.size
     spread = fitted.covariance[np.ix_(at, at)] / np.outer(scale, scale)
     spread = spread[:k, :k] - spread[:k, k:] @ np.linalg.pinv(spread[k:, k:], hermitian=True) @ spread[k:, :k]
     return bool(off @ np.linalg.pinv(spread, rcond=1e-9, hermitian=True) @ off < chi2.ppf(0.95, max(1, k)))
@@ -55,18 +58,20 @@ def may_be_off(candidate: Candidate) -> bool:
 def bends_all_along(candidate: Candidate) -> bool:
     """Whether a limit bends over more than the whole drive: that is a curve, and no end of a range."""
     saturates = candidate.name == AmplifierSaturation.name
-    return saturates and candidate.effect["corner"] > candidate.evidence.extent.span
+    return saturates and candidate.effect["corner"] > candidate.training_data.extent.span
 
 
 def is_steady(candidate: Candidate) -> bool:
     """Whether a hum has about one amplitude in all records: mains does not care what the drive does."""
     assert candidate.fit is not None
-    evidence, lines = candidate.evidence, 2 * candidate.evidence.nuisance.harmonics
-    frequency = evidence.nuisance.hum_frequency or 0.0
+    training_data, lines = candidate.training_data, 2 * candidate.training_data.nuisance.harmonics
+    frequency = training_data.nuisance.hum_frequency or 0.0
     amplitudes = np.array(
         [
             np.hypot(found[-lines::2], found[1 - lines :: 2])
-            for record, floor, found in zip(evidence.records, evidence.floors, candidate.fit.nuisances, strict=True)
+            for record, floor, found in zip(
+                training_data.records, training_data.floors, candidate.fit.nuisances, strict=True
+            )
             if np.isfinite(floor)
             and found.size >= lines
             and record.duration * frequency >= PERIODS

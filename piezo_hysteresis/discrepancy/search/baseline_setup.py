@@ -47,9 +47,9 @@ class BaselineSetup:
         Noise and floor of every record [m].
     span : float
         Range of the displacement [m].
-    usable, fitted, spared : sequence of int
+    usable, fitted, test_records : sequence of int
         Records that tell something; of these those for fitting and choosing, and those set aside for the gap.
-    evidence : TrainingData
+    training_data : TrainingData
         The records that are fitted, shortened.
     baseline : Fit
         The model without further effects.
@@ -65,8 +65,8 @@ class BaselineSetup:
     span: float
     usable: Sequence[int]
     fitted: Sequence[int]
-    spared: Sequence[int]
-    evidence: TrainingData
+    test_records: Sequence[int]
+    training_data: TrainingData
     baseline: Fit
     score: Score
 
@@ -92,7 +92,7 @@ def prepare_baseline(
     model: Model | None,
     known: Selection | None,
     sharpens: bool,
-    tell: Progress,
+    progress: Progress,
 ) -> BaselineSetup:
     """Floors, records to fit and to set aside, and the baseline.
 
@@ -108,7 +108,7 @@ def prepare_baseline(
         A search whose model tells what slow samples have lost better than its baseline.
     sharpens : bool
         Whether what slow samples have lost is made good: averages of a noisy voltage would turn back and forth.
-    tell : callable
+    progress : callable
         Called with a word and the fraction done.
 
     Raises
@@ -116,10 +116,10 @@ def prepare_baseline(
     ModelError
         If the records are faster than the model.
     """
-    tell("baseline", 0.0)
+    progress("baseline", 0.0)
     records = tuple(slowed(r) for r in given)
-    spared = reporting(records, usable)
-    fitted = [i for i in usable if i not in spared]
+    test_records = reporting(records, usable)
+    fitted = [i for i in usable if i not in test_records]
     noise, span = noise_floors(records), stroke(records)
     least = floors(records, noise)
     at_full_rate = [r for r, g in zip(records, given, strict=True) if r.sample_period == g.sample_period]
@@ -134,34 +134,36 @@ def prepare_baseline(
         kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
         return TrainingData(tuple(kept), np.array(sizes), Nuisance(), extent)
 
-    evidence = gathered(records, least)
-    tell("baseline, jointly", 0.2)
-    baseline = joint(start, evidence, LAST, PRECISE)
+    training_data = gathered(records, least)
+    progress("baseline, jointly", 0.2)
+    baseline = joint(start, training_data, LAST, PRECISE)
     lost = [np.zeros(r.size) for r in records]
     if sharpens:
         lost = intersample_error(known.model if known is not None else baseline.model, records)
     if any(c.any() for c in lost):
         records = less(records, lost)
         least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
-        evidence = gathered(records, least)
-        tell("baseline, jointly", 0.3)
-        baseline = joint(baseline.model, evidence, LAST, PRECISE)
-    evidence, score = score_baseline(baseline.model, evidence)
+        training_data = gathered(records, least)
+        progress("baseline, jointly", 0.3)
+        baseline = joint(baseline.model, training_data, LAST, PRECISE)
+    training_data, score = score_baseline(baseline.model, training_data)
     if score.excess > ADEQUATE:
-        baseline, score = _best(baseline, score, starts, evidence)
+        baseline, score = _best(baseline, score, starts, training_data)
     if score.excess > ADEQUATE:
         for modal in modal_models(baseline.model, records, fitted):
-            baseline, score = clearly_better(modal, baseline, score, evidence) or (baseline, score)
-        baseline, score = renewed(baseline, score, evidence)
-    return BaselineSetup(straight, records, lost, noise, least, span, usable, fitted, spared, evidence, baseline, score)
+            baseline, score = clearly_better(modal, baseline, score, training_data) or (baseline, score)
+        baseline, score = renewed(baseline, score, training_data)
+    return BaselineSetup(
+        straight, records, lost, noise, least, span, usable, fitted, test_records, training_data, baseline, score
+    )
 
 
-def _best(found: Fit, score: Score, starts: Iterator[Model], evidence: TrainingData) -> tuple[Fit, Score]:
+def _best(found: Fit, score: Score, starts: Iterator[Model], training_data: TrainingData) -> tuple[Fit, Score]:
     """The fit and its score, or those from another start: one that records left out prefer, and that fits better."""
     with suppress(*FAILURES):
         for start in map(exact, starts):
-            if score_model(start, evidence).cost < score.cost:
-                other = joint(start, evidence, LAST, PRECISE)
+            if score_model(start, training_data).cost < score.cost:
+                other = joint(start, training_data, LAST, PRECISE)
                 if other.cost < found.cost:
-                    found, score = other, score_model(other.model, evidence)
+                    found, score = other, score_model(other.model, training_data)
     return found, score

@@ -32,26 +32,28 @@ FINER = 0.05
 """Gain from which the finer form of an effect is taken."""
 
 
-def refit_candidates(model: Model, candidates: Sequence[Candidate], before: Score, tell: Progress) -> list[Candidate]:
+def refit_candidates(
+    model: Model, candidates: Sequence[Candidate], before: Score, progress: Progress
+) -> list[Candidate]:
     """Joint refits, best first: a few linearisations of all, dynamics anew for the leaders, the best to the end."""
     refits: list[Candidate] = []
     for k, candidate in enumerate(candidates):
         if refits and _is_far_behind(candidate, refits[0], before):
             continue
-        tell(f"refit with {candidate.name}", (k + 1) / (len(candidates) + 2))
+        progress(f"refit with {candidate.name}", (k + 1) / (len(candidates) + 2))
         result = refit(model, candidate, FIRST)
         if result is not None:
             refits = sorted([*refits, result], key=lambda c: c.score.cost)
     if not refits:
         return []
-    tell("dynamics anew", 0.8)
+    progress("dynamics anew", 0.8)
     leader = _anew(refits[0])
     field = [
         leader,
         *(c if k >= AGAIN or _is_far_behind(c, leader, before) else _anew(c) for k, c in enumerate(refits[1:], 1)),
     ]
     field.sort(key=lambda c: c.score.cost)
-    tell(f"refit with {field[0].name}", 0.9)
+    progress(f"refit with {field[0].name}", 0.9)
     best = _from_elsewhere(settled(field[0], before), before)
     reach = best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
     rest = [settled(c, before) if c.score.cost < reach and k < AGAIN else c for k, c in enumerate(field[1:], 1)]
@@ -91,11 +93,11 @@ def _from_elsewhere(best: Candidate, before: Score) -> Candidate:
     An effect of the drive has had all of its starts, and one with few has no valleys to choose from.
     """
     assert best.fit is not None
-    starts = type(best.effect).starts(best.evidence.extent)
-    in_vain = before.cost - best.score.cost < LEAST_GAIN
+    starts = type(best.effect).starts(best.training_data.extent)
+    gains_nothing = before.cost - best.score.cost < LEAST_GAIN
     if (
         best.score.excess <= ADEQUATE
-        or in_vain
+        or gains_nothing
         or best.effect.place is ChainPosition.DRIVE
         or len(starts) < FEWEST_STARTS
     ):

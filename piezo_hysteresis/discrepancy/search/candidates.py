@@ -39,7 +39,7 @@ class Candidate:
     """
 
     effect: Effect
-    evidence: TrainingData
+    training_data: TrainingData
     score: Score
     fit: Fit | None = None
 
@@ -49,7 +49,7 @@ class Candidate:
         return self.effect.name
 
 
-def free_numbers(model: Model, evidence: TrainingData) -> list[str]:
+def free_numbers(model: Model, training_data: TrainingData) -> list[str]:
     """Numbers of a model that a joint fit adjusts: all but the chosen ones, the delay and what is free per record.
 
     Settling where no two records begin at different levels is no number of the evidence.
@@ -59,8 +59,8 @@ def free_numbers(model: Model, evidence: TrainingData) -> list[str]:
         row = model.row(name)
         if not (row.fixed or row.per_record or name == f"{Arx.name}.delay"):
             names.append(name)
-    skipped = {f"{Offset.name}.y0"} if evidence.nuisance.offset else set()
-    if evidence.nuisance.offset or not evidence.begins_at_levels:
+    skipped = {f"{Offset.name}.y0"} if training_data.nuisance.offset else set()
+    if training_data.nuisance.offset or not training_data.begins_at_levels:
         skipped.add(f"{Offset.name}.settling")
     skipped |= {f"{MainsHum.name}.f"}
     if loop_is_off(model):  # and stays so
@@ -82,41 +82,47 @@ def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
     return columns
 
 
-def score_model(model: Model, evidence: TrainingData) -> Score:
+def score_model(model: Model, training_data: TrainingData) -> Score:
     """Score of a fitted model on records left out."""
-    return held_out(*_products(model, evidence), evidence.alone)
+    return held_out(*_products(model, training_data), training_data.alone)
 
 
-def score_baseline(model: Model, evidence: TrainingData) -> tuple[TrainingData, Score]:
+def score_baseline(model: Model, training_data: TrainingData) -> tuple[TrainingData, Score]:
     """The evidence, of which records that alone tell a number of the model are never left out, and the score."""
-    products = _products(model, evidence)
+    products = _products(model, training_data)
     alone = indispensable(*products)
-    return replace(evidence, alone=alone), held_out(*products, alone)
+    return replace(training_data, alone=alone), held_out(*products, alone)
 
 
-def _products(model: Model, evidence: TrainingData) -> tuple[list[Gram], Array, Array]:
-    names = free_numbers(model, evidence)
-    return grams(model, evidence.records, names, evidence.nuisance), evidence.floors, directions(model, names)
+def _products(model: Model, training_data: TrainingData) -> tuple[list[Gram], Array, Array]:
+    names = free_numbers(model, training_data)
+    return (
+        grams(model, training_data.records, names, training_data.nuisance),
+        training_data.floors,
+        directions(model, names),
+    )
 
 
-def screen(model: Model, evidence: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:
+def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:
     """Score test of every effect of the catalogue at every start it proposes, best first.
 
     Effects that are off at their start share one pass over the data; a finite start enters by the change it makes.
     """
-    base = free_numbers(model, evidence)
-    starts = [(effect, effect.starts(evidence.extent)) for effect in effects if _fits(model, evidence, effect)]
+    base = free_numbers(model, training_data)
+    starts = [
+        (effect, effect.starts(training_data.extent)) for effect in effects if _fits(model, training_data, effect)
+    ]
     found: list[Candidate] = []
     for turn in range(max((len(s) for _, s in starts), default=0)):
         members = [s[turn] for _, s in starts if turn < len(s) and s[turn].is_off and s[turn].name != MainsHum.name]
         if members:
-            found += _screen_off(model, evidence, base, members)
+            found += _screen_off(model, training_data, base, members)
     moves = [s for _, many in starts for s in many if not s.is_off]
     if moves:
-        found += _screen_moves(model, evidence, base, moves)
+        found += _screen_moves(model, training_data, base, moves)
     if any(effect is MainsHum for effect, _ in starts):
-        for hum in MainsHum.starts(evidence.extent):
-            with_hum = evidence.with_hum(hum["f"])
+        for hum in MainsHum.starts(training_data.extent):
+            with_hum = training_data.with_hum(hum["f"])
             found.append(Candidate(hum, with_hum, score_model(model, with_hum)))
     best: dict[str, Candidate] = {}
     for candidate in found:
@@ -125,12 +131,12 @@ def screen(model: Model, evidence: TrainingData, effects: Iterable[type[Effect]]
     return sorted(best.values(), key=lambda c: c.score.cost)
 
 
-def _fits(model: Model, evidence: TrainingData, effect: type[Effect]) -> bool:
-    has_channel = effect.channel is None or any(getattr(r, effect.channel) is not None for r in evidence.records)
+def _fits(model: Model, training_data: TrainingData, effect: type[Effect]) -> bool:
+    has_channel = effect.channel is None or any(getattr(r, effect.channel) is not None for r in training_data.records)
     return effect.name not in model and has_channel and (effect.host is None or effect.host in model)
 
 
-def _screen_off(model: Model, evidence: TrainingData, base: list[str], members: list[Effect]) -> list[Candidate]:
+def _screen_off(model: Model, training_data: TrainingData, base: list[str], members: list[Effect]) -> list[Candidate]:
     extended = model
     for effect in list(members):
         try:
@@ -139,40 +145,42 @@ def _screen_off(model: Model, evidence: TrainingData, base: list[str], members: 
             extended = trial
         except ModelError:
             members = [m for m in members if m is not effect]
-    own = {e.name: [n for n in free_numbers(extended, evidence) if n.startswith(f"{e.name}.")] for e in members}
+    own = {e.name: [n for n in free_numbers(extended, training_data) if n.startswith(f"{e.name}.")] for e in members}
     names = base + [n for e in members for n in own[e.name]]
-    products = grams(extended, evidence.records, names, evidence.nuisance)
+    products = grams(extended, training_data.records, names, training_data.nuisance)
     columns = directions(model, base, len(names) - len(base))
     kept = columns.shape[1] - (len(names) - len(base))
     found = []
     for effect in members:
         wanted = [kept + names.index(n) - len(base) for n in own[effect.name]]
         part = columns[:, [*range(kept), *wanted]]
-        found.append(Candidate(effect, evidence, held_out(products, evidence.floors, part, evidence.alone)))
+        found.append(
+            Candidate(effect, training_data, held_out(products, training_data.floors, part, training_data.alone))
+        )
     return found
 
 
-def _screen_moves(model: Model, evidence: TrainingData, base: list[str], moves: list[Effect]) -> list[Candidate]:
-    now = model.simulate(evidence.records)
+def _screen_moves(model: Model, training_data: TrainingData, base: list[str], moves: list[Effect]) -> list[Candidate]:
+    now = model.simulate(training_data.records)
     usable, rows = [], []
     for effect in moves:
         try:
-            then = model.with_effect(effect).simulate(evidence.records)
+            then = model.with_effect(effect).simulate(training_data.records)
         except (DivergenceError, ParameterError, ModelError):
             continue
         usable.append(effect)
         rows.append([a - b for a, b in zip(then, now, strict=True)])
     if not usable:
         return []
-    extra = [np.array([row[i] for row in rows]) for i in range(len(evidence.records))]
-    products = grams(model, evidence.records, base, evidence.nuisance, extra)
+    extra = [np.array([row[i] for row in rows]) for i in range(len(training_data.records))]
+    products = grams(model, training_data.records, base, training_data.nuisance, extra)
     columns = directions(model, base, len(usable))
     kept = columns.shape[1] - len(usable)
     found = []
     for k, effect in enumerate(usable):
-        score = held_out(products, evidence.floors, columns[:, [*range(kept), kept + k]], evidence.alone)
+        score = held_out(products, training_data.floors, columns[:, [*range(kept), kept + k]], training_data.alone)
         if score.step[-1] > 0.0:  # else its opposite would help
-            found.append(Candidate(effect, evidence, score))
+            found.append(Candidate(effect, training_data, score))
     return found
 
 
@@ -181,17 +189,17 @@ def alikeness(first: Candidate, second: Candidate, model: Model) -> float:
 
     For effects of several numbers the signature is the direction of the linearised step.
     """
-    evidence = first.evidence
-    base = free_numbers(model, evidence)
-    now = model.simulate(evidence.records)
+    training_data = first.training_data
+    base = free_numbers(model, training_data)
+    now = model.simulate(training_data.records)
     changes = []
     for candidate in (first, second):
         assert candidate.fit is not None
         part = candidate.fit.model
-        changes.append([a - b for a, b in zip(part.simulate(evidence.records), now, strict=True)])
-    extra = [np.array([c[i] for c in changes]) for i in range(len(evidence.records))]
-    products = grams(model, evidence.records, base, evidence.nuisance, extra)
-    total = weighted_sum(products, evidence.floors)
+        changes.append([a - b for a, b in zip(part.simulate(training_data.records), now, strict=True)])
+    extra = [np.array([c[i] for c in changes]) for i in range(len(training_data.records))]
+    products = grams(model, training_data.records, base, training_data.nuisance, extra)
+    total = weighted_sum(products, training_data.floors)
     q = len(base)
     free = gauge(model, base)
     inner = free.T @ total[:q, :q] @ free

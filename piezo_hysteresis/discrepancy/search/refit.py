@@ -44,14 +44,14 @@ class Fitted:
     score: Score
 
 
-def joint(model: Model, evidence: TrainingData, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
+def joint(model: Model, training_data: TrainingData, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
     """All free numbers of a model fitted to the evidence at once.
 
     Parameters
     ----------
     model : Model
         Where to begin.
-    evidence : Evidence
+    training_data : Evidence
         Records, floors, and what is free in each record.
     max_iterations : int
         Linearisations.
@@ -65,38 +65,38 @@ def joint(model: Model, evidence: TrainingData, max_iterations: int, tolerance: 
     """
     return fit(
         model,
-        evidence.records,
-        free_numbers(model, evidence),
-        floors=evidence.floors.tolist(),
-        nuisance=evidence.nuisance,
+        training_data.records,
+        free_numbers(model, training_data),
+        floors=training_data.floors.tolist(),
+        nuisance=training_data.nuisance,
         max_iterations=max_iterations,
         tolerance=tolerance,
     )
 
 
-def clearly_better(start: Model, found: Fit, score: Score, evidence: TrainingData) -> tuple[Fit, Score] | None:
+def clearly_better(start: Model, found: Fit, score: Score, training_data: TrainingData) -> tuple[Fit, Score] | None:
     """The fit from another start, and its score, where records left out prefer it clearly; None elsewhere.
 
     They judge the start first, after one linear step: one that is no better then has not become clearly better.
     """
     with suppress(*FAILURES):
-        if score_model(start, evidence).excess >= score.excess:
+        if score_model(start, training_data).excess >= score.excess:
             return None
-        other = joint(start, evidence, LAST, PRECISE)
-        told = score_model(other.model, evidence)
-        if other.cost < found.cost and told.excess < CLEARLY * score.excess:
-            return other, told
+        other = joint(start, training_data, LAST, PRECISE)
+        other_score = score_model(other.model, training_data)
+        if other.cost < found.cost and other_score.excess < CLEARLY * score.excess:
+            return other, other_score
     return None
 
 
-def renewed(found: Fit, score: Score, evidence: TrainingData) -> tuple[Fit, Score]:
+def renewed(found: Fit, score: Score, training_data: TrainingData) -> tuple[Fit, Score]:
     """A baseline and its score, begun anew behind dynamics found anew, while that helps.
 
     Dynamics are found behind the hysteresis of the model before, which was fitted without them.
     """
     for _ in range(ANEW):
-        anew = _behind_anew(found.model, evidence)
-        better_one = None if anew is None else clearly_better(anew.model, found, score, evidence)
+        anew = _behind_anew(found.model, training_data)
+        better_one = None if anew is None else clearly_better(anew.model, found, score, training_data)
         if better_one is None:
             break
         found, score = better_one
@@ -118,8 +118,8 @@ def proceed(candidate: Candidate, max_iterations: int) -> Candidate:
 
 def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
     try:
-        result = joint(model, candidate.evidence, max_iterations)
-        score = score_model(result.model, candidate.evidence)
+        result = joint(model, candidate.training_data, max_iterations)
+        score = score_model(result.model, candidate.training_data)
     except FAILURES:
         return None
     return replace(candidate, effect=result.model[candidate.name], score=score, fit=result)
@@ -131,7 +131,7 @@ def restart(candidate: Candidate, max_iterations: int) -> Candidate:
     The dynamics of the model before were bent by the effect it lacked; from there a joint fit has a long way to go.
     """
     assert candidate.fit is not None
-    anew = _behind_anew(candidate.fit.model, candidate.evidence)
+    anew = _behind_anew(candidate.fit.model, candidate.training_data)
     return candidate if anew is None else better(_refitted(anew.model, candidate, max_iterations), candidate)
 
 
@@ -141,34 +141,34 @@ def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> 
     Every start is judged behind dynamics found anew, by few iterations: noise that a limit cuts to pieces bends the
     dynamics so much that every size has a valley of its own.
     """
-    starts = type(candidate.effect).starts(candidate.evidence.extent)
-    found = [_behind_anew(model.with_effect(start), candidate.evidence, (FEW_ITERATIONS,)) for start in starts]
+    starts = type(candidate.effect).starts(candidate.training_data.extent)
+    found = [_behind_anew(model.with_effect(start), candidate.training_data, (FEW_ITERATIONS,)) for start in starts]
     best = min((f for f in found if f is not None), key=lambda f: f.score.cost, default=None)
     if best is None:
         return None
-    more = _behind_anew(best.model, candidate.evidence, (ITERATIONS,))
+    more = _behind_anew(best.model, candidate.training_data, (ITERATIONS,))
     best = best if more is None or more.score.cost > best.score.cost else more
     return _refitted(best.model, candidate, max_iterations)
 
 
 def _behind_anew(
-    model: Model, evidence: TrainingData, choices: Sequence[int] = (FEW_ITERATIONS, ITERATIONS)
+    model: Model, training_data: TrainingData, choices: Sequence[int] = (FEW_ITERATIONS, ITERATIONS)
 ) -> Fitted | None:
     """The model with dynamics found anew; None where the records do not tell them.
 
     Iterations that describe the broadband records better, by a lack that is still there, may describe the others worse.
     """
-    broadband = evidence.broadband()
+    broadband = training_data.broadband()
     if not broadband or not isinstance(model[Arx.name], Arx):
         return None
     found, best = list[Fitted](), None
 
     def behind(dynamics: Dynamics) -> Fitted:
         anew = with_dynamics(model, dynamics.arx)
-        return Fitted(anew, score_model(anew, evidence))
+        return Fitted(anew, score_model(anew, training_data))
 
     with suppress(*FAILURES):
-        signals = hysteresis_signals(model, evidence.records, broadband)
+        signals = hysteresis_signals(model, training_data.records, broadband)
         for iterations in choices:
             with suppress(*FAILURES):
                 found.append(behind(identify_arx(signals, *form_of(model), iterations)))
@@ -193,30 +193,33 @@ def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
     """
     assert candidate.fit is not None
     model = candidate.fit.model.without(candidate.name)
-    evidence = candidate.evidence.without(candidate.name)
+    training_data = candidate.training_data.without(candidate.name)
     starts = [model]
-    if candidate.effect.family in LINEAR and (absorbed := _absorbed(model, candidate.fit.model, evidence)) is not None:
+    if (
+        candidate.effect.family in LINEAR
+        and (absorbed := _absorbed(model, candidate.fit.model, training_data)) is not None
+    ):
         starts.append(absorbed)
     found = []
     for start in starts:
         try:
-            fitted = joint(start, evidence, max_iterations)
-            found.append(Fitted(fitted.model, score_model(fitted.model, evidence)))
+            fitted = joint(start, training_data, max_iterations)
+            found.append(Fitted(fitted.model, score_model(fitted.model, training_data)))
         except FAILURES:
             continue
     return min(found, key=lambda f: f.score.cost, default=None)
 
 
-def _absorbed(model: Model, extended: Model, evidence: TrainingData) -> Model | None:
+def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Model | None:
     """The model with dynamics that imitate those of `extended`, which has one more linear effect; None without records.
 
     A joint fit may have stopped before its G held a mode that it has room for: what G can hold is no missing effect.
     """
-    broadband = evidence.broadband()
+    broadband = training_data.broadband()
     if not broadband or not isinstance(model[Arx.name], Arx):
         return None
-    inputs = hysteresis_signals(model, evidence.records, broadband)
-    outputs = extended.simulate(evidence.records)
+    inputs = hysteresis_signals(model, training_data.records, broadband)
+    outputs = extended.simulate(training_data.records)
     signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
     try:
         found = identify_arx(signals, *form_of(model), ITERATIONS)

@@ -53,12 +53,12 @@ ALIKE = 0.97
 
 def select(
     model: Model,
-    evidence: TrainingData,
+    training_data: TrainingData,
     score: Score,
     null: float,
     effects: Collection[type[Effect]] = CATALOGUE,
     progress: Progress | None = None,
-    is_in_vain: Callable[[Model, TrainingData], bool] = lambda model, evidence: False,
+    gains_nothing: Callable[[Model, TrainingData], bool] = lambda model, training_data: False,
 ) -> Selection:
     """Add effects while records left out ask for them.
 
@@ -66,7 +66,7 @@ def select(
     ----------
     model : Model
         Fitted baseline.
-    evidence : Evidence
+    training_data : Evidence
         Records that fit and choose.
     score : Score
         Of the baseline.
@@ -76,21 +76,21 @@ def select(
         The library to choose from.
     progress : callable, optional
         Called with a word and the fraction done.
-    is_in_vain : callable, optional
+    gains_nothing : callable, optional
         Asked after every effect that leaves a gap: whether to stop, for the data must be treated first.
     """
-    tell = progress or (lambda word, fraction: None)
+    report = progress or (lambda word, fraction: None)
     baseline, steps, accepted = model, list[Step](), 0
     while not _is_enough(score, accepted) and len(steps) < MOST_TURNS and accepted < MOST:
-        step = _turn(model, evidence, score, null, effects, KEEPS[min(accepted, 1)], tell)
+        step = _turn(model, training_data, score, null, effects, KEEPS[min(accepted, 1)], report)
         if step is None:
             break
         steps.append(step)
         if step.accepted:
             assert step.best.fit is not None
-            model, score, evidence = step.best.fit.model, step.best.score, step.best.evidence
+            model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
             accepted += 1
-            if score.excess > ADEQUATE and is_in_vain(model, evidence):
+            if score.excess > ADEQUATE and gains_nothing(model, training_data):
                 return Selection(baseline, model, score, tuple(steps), null)
         elif step.renewed is not None:
             model, score = step.renewed.model, step.renewed.score
@@ -114,7 +114,7 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
     accepted = [k for k, step in enumerate(steps) if step.accepted]
     for k in accepted[:-1]:
         name, last = steps[k].best.name, steps[accepted[-1]].best
-        without_it = replace(last, effect=model[last.name], evidence=last.evidence.without(name))
+        without_it = replace(last, effect=model[last.name], training_data=last.training_data.without(name))
         lean = refit(model.without(name), without_it, FIRST)
         if lean is None:
             continue
@@ -122,8 +122,8 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
         if lean.score.cost - score.cost < 2.0 * LEAST_GAIN + 0.5:
             lean = settled(lean, steps[0].before)
         if lean.score.cost - score.cost < LEAST_GAIN and lean.fit is not None:
-            told = Rejection(name, f"superfluous once {last.name} is there")
-            steps[k] = replace(steps[k], accepted=False, rejected=(told, *steps[k].rejected))
+            rejection = Rejection(name, f"superfluous once {last.name} is there")
+            steps[k] = replace(steps[k], accepted=False, rejected=(rejection, *steps[k].rejected))
             steps[accepted[-1]] = replace(steps[accepted[-1]], best=lean)
             model, score = lean.fit.model, lean.score
     return model, score
@@ -131,19 +131,19 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
 
 def _turn(
     model: Model,
-    evidence: TrainingData,
+    training_data: TrainingData,
     before: Score,
     null: float,
     effects: Collection[type[Effect]],
     keeps: float,
-    tell: Progress,
+    progress: Progress,
 ) -> Step | None:
-    tell("score test of the catalogue", 0.0)
-    evidence = evidence.with_peaks(residuals(model, evidence.records, evidence.nuisance))
+    progress("score test of the catalogue", 0.0)
+    training_data = training_data.with_peaks(residuals(model, training_data.records, training_data.nuisance))
     present = {e.public_name() for e in model.effects}
     twins = {e.name: t.name for e in effects for t in model.effects if e.twin == t.name or t.twin == e.name}
     absent = [e for e in effects if e.public_name() not in present and e.name not in twins]
-    screened = screen(model, evidence, absent)
+    screened = screen(model, training_data, absent)
     likely = [
         c
         for k, c in enumerate(screened)
@@ -151,7 +151,7 @@ def _turn(
         if (k < REFITS or c.effect.public_name() == screened[0].effect.public_name())
         and (k < 2 or before.cost - c.score.cost > HOPELESS)
     ]
-    refits = refit_candidates(model, likely, before, tell)
+    refits = refit_candidates(model, likely, before, progress)
     if not refits:
         return None
     if refits[0].score.excess > ADEQUATE and (others := refits_of_twins(model, screened, refits[0], before)):
@@ -176,8 +176,8 @@ def _turn(
         if accepted and close and (lead < 2.0 * error or alikeness(best, candidate, model) > ALIKE):
             rivals.append(candidate)
         else:
-            told = f"{lead:.2f} ± {error:.2f} behind {best.name} on records left out (mean ln R²)"
-            rejected.append(Rejection(candidate.name, told))
+            message = f"{lead:.2f} ± {error:.2f} behind {best.name} on records left out (mean ln R²)"
+            rejected.append(Rejection(candidate.name, message))
     for candidate in _others(screened, refits):
         most = max(0.0, before.cost - candidate.score.cost)
         rejected.append(Rejection(candidate.name, f"improves records left out by {most:.2f} at most (mean ln R²)"))
@@ -210,11 +210,11 @@ def _judged(
     best = finest(simplest([c for c in refits if not bends_all_along(c)] or refits), before)
     gain, left = before.cost - best.score.cost, _left(best.score, before, null)
     if gain < LEAST_GAIN or left > keeps:
-        told = (
+        message = (
             f"improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
             f"{100 * left:.0f} % of V beyond noise stays, {100 * keeps:.0f} % at most"
         )
-        return best, None, told
+        return best, None, message
     alone = without(best, LATER)
     return best, alone, _objection(best, alone, null, keeps)
 

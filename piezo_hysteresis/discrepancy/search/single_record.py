@@ -45,7 +45,7 @@ def diagnose_few(
     model: Model | None,
     used: Collection[int],
     effects: Collection[type[Effect]],
-    tell: Progress,
+    progress: Progress,
 ) -> Diagnosis:
     """Extend the model as far as blocks left out ask for it; the verdict is always unknown.
 
@@ -59,14 +59,14 @@ def diagnose_few(
         Indices of the records in which the drive moves.
     effects : collection of Effect classes
         The library to choose from.
-    tell : callable
+    progress : callable
         Called with a word and the fraction done.
     """
     records = experiment.records
     known = Experiment(records, experiment.source)
-    tell("baseline", 0.0)
-    state = model or identify(known, progress=lambda word, part: tell(word, 0.2 * part)).model
-    start = model or identify(known, memory=True, progress=lambda word, part: tell(word, 0.2 + 0.2 * part)).model
+    progress("baseline", 0.0)
+    state = model or identify(known, progress=lambda word, part: progress(word, 0.2 * part)).model
+    start = model or identify(known, memory=True, progress=lambda word, part: progress(word, 0.2 + 0.2 * part)).model
     noise = noise_floors(records)
     least = floors(records, noise)
     blocks, origin = blocks_of(records, used)
@@ -74,24 +74,24 @@ def diagnose_few(
     runs = sum(not r.continues for r in records)
     jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
     span = extent_of([records[i] for i in used], start)
-    evidence = TrainingData(tuple(blocks), weights, Nuisance(offset=runs > 1), span, jumps)
+    training_data = TrainingData(tuple(blocks), weights, Nuisance(offset=runs > 1), span, jumps)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in used]))
-    baseline = joint(with_zero(state), evidence, LAST, PRECISE)
-    before = score_model(baseline.model, evidence)
+    baseline = joint(with_zero(state), training_data, LAST, PRECISE)
+    before = score_model(baseline.model, training_data)
     steps: list[Step] = []
     now, score = baseline, before
     if HysteresisMemory.name in start and HysteresisMemory.name not in state:
-        now = joint(with_zero(start), evidence, LAST, PRECISE)
-        score = score_model(now.model, evidence)
-        memory = Candidate(now.model[HysteresisMemory.name], evidence, score, now)
+        now = joint(with_zero(start), training_data, LAST, PRECISE)
+        score = score_model(now.model, training_data)
+        memory = Candidate(now.model[HysteresisMemory.name], training_data, score, now)
         steps.append(Step(before, memory, True, (), ()))
-    tell("where", 0.45)
+    progress("where", 0.45)
     left = residuals(baseline.model, records, Nuisance(offset=True))
     where = localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])
     fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
-    found = select(now.model, evidence, score, null, fitting, lambda word, part: tell(word, 0.5 + 0.4 * part))
+    found = select(now.model, training_data, score, null, fitting, lambda word, part: progress(word, 0.5 + 0.4 * part))
     selection = Selection(baseline.model, found.model, found.score, (*steps, *found.steps), null)
-    final_evidence = found.accepted[-1].best.evidence if found.accepted else evidence
+    final_training_data = found.accepted[-1].best.training_data if found.accepted else training_data
     # what was judged on blocks left out is delivered: fitting on would bend it towards the few kinds of record
     scored = selection.accepted[-1].best.fit if selection.accepted else None
     final = scored or baseline
@@ -101,20 +101,20 @@ def diagnose_few(
         sorted(used),
         least.tolist(),
         stroke(records),
-        (Nuisance(offset=True), replace(final_evidence.nuisance, offset=True)),
+        (Nuisance(offset=True), replace(final_training_data.nuisance, offset=True)),
         False,
     )
     names = [s.best.effect.public_name() for s in selection.accepted]
     closed = explained(before.excess, selection.score.excess, null)
-    lacking = missing_excitation([records[i] for i in used])
+    missing = missing_excitation([records[i] for i in used])
     if before.excess <= ADEQUATE:
-        told = "the published model describes it down to the floor, so that it speaks for no effect and against none"
+        message = "the published model describes it down to the floor, so that it speaks for no effect and against none"
     elif names:
-        told = f"closest is {' with '.join(names)}, which explains {100 * closed:.0f} % and is in the model"
+        message = f"closest is {' with '.join(names)}, which explains {100 * closed:.0f} % and is in the model"
     else:
-        told = "nothing in the catalogue helps on blocks left out"
+        message = "nothing in the catalogue helps on blocks left out"
     count = "one record" if len(used) == 1 else f"{len(used)} records"
-    reason = "; ".join((f"No name: {count} cannot tell effects apart", told, *(n.message for n in lacking)))
+    reason = "; ".join((f"No name: {count} cannot tell effects apart", message, *(n.message for n in missing)))
     return Diagnosis(
         verdict=Verdict.UNKNOWN,
         reason=f"{reason}.",
@@ -124,8 +124,8 @@ def diagnose_few(
         fit=final,
         where=where,
         gap=gap,
-        next_experiment=decide(selection, evidence),
-        experiment=experiment.noting(*lacking),
+        next_experiment=decide(selection, training_data),
+        experiment=experiment.noting(*missing),
     )
 
 

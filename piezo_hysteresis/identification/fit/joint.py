@@ -138,8 +138,10 @@ def fit_dynamics(
     reached = used.array("a").size, used.array("b").size
     notices = dynamics.notices
     if reached != orders:
-        told = f"na, nb = {orders[0]}, {orders[1]} are more than the data support; {reached[0]}, {reached[1]} were used"
-        notices += (Notice("order_reduced", told),)
+        message = (
+            f"na, nb = {orders[0]}, {orders[1]} are more than the data support; {reached[0]}, {reached[1]} were used"
+        )
+        notices += (Notice("order_reduced", message),)
     return joint, dynamics, notices
 
 

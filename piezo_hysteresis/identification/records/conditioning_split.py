@@ -53,7 +53,9 @@ def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice,
         if samples:
             records.append(replace(record[:samples], phase=CARRYING[0]))
             record = replace(record[samples:], truncated=False, initial_voltage=None)
-            told = f"begins in an unknown state: its first {samples} samples, up to a full loop, only carry the state"
-            notices.append(Notice("conditioning_length", told, record.phase))
+            message = (
+                f"begins in an unknown state: its first {samples} samples, up to a full loop, only carry the state"
+            )
+            notices.append(Notice("conditioning_length", message, record.phase))
         records.append(record)
     return replace(experiment, records=tuple(records)), tuple(notices)

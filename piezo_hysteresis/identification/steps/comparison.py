@@ -106,6 +106,6 @@ def compare_inputs(
         notices.append(Notice("inputs_disagree", f"G differs as seen from v and from w; {worst}", "noise"))
     gains = [c.gain_from_w for c in comparisons]
     if len(gains) > 1 and max(gains) > (1.0 + TOLERANCE) * min(gains):
-        told = ", ".join(f"{c.gain_from_w:.4g} at {c.amplitude:.3g} V" for c in comparisons)
-        notices.append(Notice("amplitude_dependent", f"|G({HIGH:g} Hz)| depends on the amplitude: {told}", "noise"))
+        message = ", ".join(f"{c.gain_from_w:.4g} at {c.amplitude:.3g} V" for c in comparisons)
+        notices.append(Notice("amplitude_dependent", f"|G({HIGH:g} Hz)| depends on the amplitude: {message}", "noise"))
     return tuple(comparisons), tuple(notices)

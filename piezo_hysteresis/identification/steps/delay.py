@@ -76,9 +76,9 @@ class Delay:
 
     def __str__(self) -> str:
         first = self.onsets[0]
-        told = f"{first.earliest * 1e6:.4g} to {first.latest * 1e6:.4g} µs"
+        span = f"{first.earliest * 1e6:.4g} to {first.latest * 1e6:.4g} µs"
         return (
-            f"delay {self.samples} samples of {self.sample_period * 1e6:.4g} µs ({told}, {self.response.edges} edges)"
+            f"delay {self.samples} samples of {self.sample_period * 1e6:.4g} µs ({span}, {self.response.edges} edges)"
         )
 
 
@@ -94,7 +94,7 @@ def _onset(response: StepResponse) -> tuple[int, float, float, list[str]]:
             "use higher steps or more of them"
         )
     onset = int(np.argmax(sure))
-    doubts = []
+    doubtful_notices = []
     earliest = onset - 1
     while onset > 0 and onset + 1 < mean.size:
         # A stage with mass starts as the square of time: its root is a line that ends at the onset.
@@ -103,15 +103,15 @@ def _onset(response: StepResponse) -> tuple[int, float, float, list[str]]:
         expected = mean[onset] * (max(onset - 1 - start, 0.0) / (onset - start)) ** 2
         if start >= onset - 1 or abs(mean[onset - 1] - expected) > SURE * response.deviation[onset - 1]:
             break
-        doubts.append("delay_ambiguous")
+        doubtful_notices.append("delay_ambiguous")
         earliest = onset - 2
         if mean[onset - 1] <= LIKELY * response.deviation[onset - 1]:
             break
         onset -= 1
     final = float(np.max(mean))
     if onset <= 1 and mean[onset] > 0.1 * final:
-        doubts.append("delay_unresolved")
-    return onset, max(earliest, 0), float(onset), doubts
+        doubtful_notices.append("delay_unresolved")
+    return onset, max(earliest, 0), float(onset), doubtful_notices
 
 
 def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 3, 5)) -> Delay:
@@ -147,7 +147,7 @@ def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 
     finest = min(r.sample_period for r in records)
     fine = [r for r in records if r.sample_period < 1.001 * finest]
     response = step_response(fine)
-    samples, first, last, doubts = _onset(response)
+    samples, first, last, doubtful_notices = _onset(response)
     onsets = [Onset(finest, samples, first * finest, last * finest)]
     others = [(fine, factor) for factor in factors if factor > 1]
     others += [([r], 1) for r in records if r.sample_period >= 1.001 * finest]
@@ -158,11 +158,11 @@ def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 
         except IdentificationError:
             continue
         onsets.append(Onset(at.sample_period, n, low * at.sample_period, high * at.sample_period))
-    told = {
+    messages = {
         "delay_ambiguous": f"onset at sample {samples} or {int(first)}: noise hides the first response",
         "delay_unresolved": f"the response begins within one sample period of {finest:.3g} s: only a bound is known",
     }
-    notices = [Notice(kind, message, "step") for kind, message in told.items() if kind in doubts]
+    notices = [Notice(kind, message, "step") for kind, message in messages.items() if kind in doubtful_notices]
     if max(o.earliest for o in onsets) >= min(o.latest for o in onsets) + 1e-12:
         answers = ", ".join(
             f"{o.earliest * 1e6:.4g} to {o.latest * 1e6:.4g} µs at {o.sample_period:.3g} s" for o in onsets

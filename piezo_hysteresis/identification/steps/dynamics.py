@@ -168,13 +168,15 @@ def identify_arx(
             whitened = [(lfilter([1.0], whitener, u - u[0]), lfilter([1.0], whitener, y - y[0])) for u, y in signals]
             theta, _ = _solve(triangle(whitened, orders, delay))
         a, b, mirrored = _reflected(theta[:na], theta[na:])
-        told = (Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),)
+        reflected_notices = (
+            Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),
+        )
         arx = settling(a, b, delay)
         if arx is None:  # the iterations run away
             if not candidates:
                 raise IdentificationError("ARX: got no dynamics that settle, expected an output that follows the input")
             break
-        model = Dynamics(arx, sample_period, one_step, notices=told if mirrored else ())
+        model = Dynamics(arx, sample_period, one_step, notices=reflected_notices if mirrored else ())
         candidates.append(in_free_run(model, signals))
         errors = [c.free_run_error for c in candidates]
         if len(errors) > PATIENCE and min(errors[-PATIENCE:]) > GAINS * min(errors[:-PATIENCE]):

@@ -94,19 +94,19 @@ def choose_memory(
     plays_error = left_out(blocks, sizes, lambda used: _fit_plays(plays, blocks, used))
     # the mean of logarithms keeps one bad block from deciding
     of_plays, of_state = (float(np.mean(np.log(np.maximum(e, 1.0)))) for e in (plays_error, state_error))
-    told = (
+    message = (
         f"on blocks left out plays reach {np.exp(of_plays):.3g} times the floor, "
         f"a Bouc-Wen state {np.exp(of_state):.3g} times (geometric means)"
     )
     lead = of_plays - of_state
     if lead > np.log(TIE):
-        return joint, (Notice("memory", f"{told}: the state is kept"),)
+        return joint, (Notice("memory", f"{message}: the state is kept"),)
     clear = lead < -np.log(TIE)
     because = "turning points are remembered" if clear else "the data do not decide, plays foretell other loops better"
     kept, kept_floors = select(records, floors, fitted)
     free = [*linear_numbers(plays), *(n for n in joint.names if n.startswith(f"{Arx.name}."))]
     found = fit(plays, kept, free, floors=kept_floors, nuisance=Nuisance(offset=True))
-    return found, (Notice("memory", f"{told}: {because}; hysteresis_memory is taken"),)
+    return found, (Notice("memory", f"{message}: {because}; hysteresis_memory is taken"),)
 
 
 def left_out(blocks: Sequence[Record], floors: Sequence[float], fitted_to: Callable[[list[int]], Model]) -> Array:

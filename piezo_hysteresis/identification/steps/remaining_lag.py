@@ -55,6 +55,8 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent]) -> tuple[Notice
     if max(c.lines for c in moving) <= ONE_FREQUENCY and max(c.bandwidth for c in moving) <= 1.5 * min(
         c.bandwidth for c in moving
     ):
-        told = "one frequency only: a lag and a narrow play turn its loop alike, the lag is less sure than its interval"
-        notices.append(Notice("one_frequency", told))
+        message = (
+            "one frequency only: a lag and a narrow play turn its loop alike, the lag is less sure than its interval"
+        )
+        notices.append(Notice("one_frequency", message))
     return tuple(notices)

@@ -35,7 +35,7 @@ def bode(comparison: ModelComparison) -> Drawing | None:
     figure, axes = canvas(2, 1, 5.4, sharex=True, gridspec_kw={"height_ratios": [1.3, 1]})
     gain_axis, phase_axis = axes[:, 0]
     data: dict[str, Array] = {}
-    told = []
+    descriptions = []
     styles = (("o", BLACK), ("s", SKY))
     for number, (rms, members) in enumerate(levels):
         marker, colour = styles[number]
@@ -52,7 +52,7 @@ def bode(comparison: ModelComparison) -> Drawing | None:
         phase_axis.errorbar(f, angle, np.degrees(2 * sigma), **options)
         data |= {f"frequency_Hz_{number + 1}": f, f"gain_m_per_V_{number + 1}": np.abs(value)}
         data |= {f"phase_deg_{number + 1}": angle, f"relative_deviation_{number + 1}": sigma}
-        told.append(
+        descriptions.append(
             f"measured at {rms:.2g} V rms: gain {gain[0]:.3g} µm/V at {f[0]:.3g} Hz, "
             f"phase {angle[-1]:.0f}° at {f[-1]:.4g} Hz"
         )
@@ -64,7 +64,7 @@ def bode(comparison: ModelComparison) -> Drawing | None:
                 gain_axis.plot(f, 1e6 * line, label="predicted, same estimator", **PREDICTED)
                 phase_axis.plot(f, turn, **PREDICTED)
                 data |= {"predicted_gain_m_per_V": line, "predicted_phase_deg": turn}
-    if not told:
+    if not descriptions:
         return None
     _linear_part(comparison.model, gain_axis, phase_axis, data)
     gain_axis.set_xscale("log")
@@ -83,7 +83,7 @@ def bode(comparison: ModelComparison) -> Drawing | None:
         "the model through the same estimator, the fair comparison. Dotted: G alone times the slope of the loop at a "
         "turning point; larger noise wears the hysteresis off and departs from it at low frequency. Two levels that "
         "disagree tell of hysteresis, backlash or a gain that depends on amplitude.",
-        "Bode diagram. " + "; ".join(told) + ".",
+        "Bode diagram. " + "; ".join(descriptions) + ".",
         figure,
         data,
     )

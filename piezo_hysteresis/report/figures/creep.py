@@ -36,7 +36,7 @@ def creep(comparison: ModelComparison) -> Drawing | None:
     figure, axes = canvas(1, 1, 3.6)
     axis = axes[0, 0]
     data: dict[str, Array] = {"time_since_change_s": time}
-    told = []
+    descriptions = []
     sources = [("measured", [r.displacement for r in comparison.experiment], MEASURED)]
     if comparison.before is not None:
         sources.append(("predicted before", list(comparison.before.predicted), BEFORE))
@@ -53,7 +53,9 @@ def creep(comparison: ModelComparison) -> Drawing | None:
             axis.fill_between(time, mean - spread, mean + spread, color="#cccccc", linewidth=0, label="± 2 std. errors")
         data[f"{label.replace(' ', '_')}_percent"] = mean
         decades = np.log10(time[-1] / REFERENCE)
-        told.append(f"{label} {mean[-1]:.2f} % after {duration(time[-1])}, {mean[-1] / decades:.2f} % per decade")
+        descriptions.append(
+            f"{label} {mean[-1]:.2f} % after {duration(time[-1])}, {mean[-1] / decades:.2f} % per decade"
+        )
     axis.set_xlabel("time since the change of level [s]")
     plain_log(axis.xaxis)
     axis.set_ylabel("creep [% of the change]")
@@ -63,7 +65,7 @@ def creep(comparison: ModelComparison) -> Drawing | None:
         "Creep",
         f"Mean over {len(holds)} holds of at least {SHORTEST_HOLD} s after a change of level, zero at {REFERENCE} s. "
         "Logarithmic creep is a straight line here; what bends up late is drift, what stays flat is neither.",
-        "Creep: " + "; ".join(told) + ".",
+        "Creep: " + "; ".join(descriptions) + ".",
         figure,
         data,
     )

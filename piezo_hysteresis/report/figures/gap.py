@@ -29,13 +29,13 @@ def gap(comparison: ModelComparison) -> Drawing | None:
     after = np.array([now.by_phase[n] for n in names])
     data = {"phase": np.array(names), "floor_percent_of_range": floors, "error_percent_of_range": after}
     axis.plot(floors, place, linestyle="none", marker="|", markersize=13, markeredgewidth=2, color=GREY, label="floor")
-    told = f"error {now.percent:.3g} % of range over all phases"
+    message = f"error {now.percent:.3g} % of range over all phases"
     if before is not None:
         old = np.array([before.by_phase[n] for n in names])
         axis.hlines(place, np.minimum(old, after), np.maximum(old, after), color="#cccccc", linewidth=2, zorder=1)
         axis.plot(old, place, linestyle="none", marker="s", markerfacecolor="none", color=BLUE, label="before")
         data["error_before_percent_of_range"] = old
-        told = f"error {before.percent:.3g} % of range before and {now.percent:.3g} % after"
+        message = f"error {before.percent:.3g} % of range before and {now.percent:.3g} % after"
     axis.plot(
         after, place, linestyle="none", marker="o", color=ORANGE, label="after" if before is not None else "error"
     )
@@ -51,7 +51,7 @@ def gap(comparison: ModelComparison) -> Drawing | None:
         "Error by phase",
         "Free-run rms error of every phase. At the floor nothing is left to explain: it is the noise of the sensor or "
         "0.03 % of the range, whichever is larger.",
-        f"Error by phase: {told}; worst in {worst}.",
+        f"Error by phase: {message}; worst in {worst}.",
         figure,
         data,
     )

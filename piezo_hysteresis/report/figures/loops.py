@@ -150,7 +150,7 @@ def _drawing(
     rows = -(-len(kept) // columns)
     figure, axes = canvas(rows, columns, 2.9 * rows + 0.3)
     data: dict[str, Array] = {}
-    told = []
+    descriptions = []
     for panel, (axis, cycle, heading) in enumerate(zip(axes.flat, kept, titles, strict=False), 1):
         record = comparison.experiment[cycle.index]
         u, y = record.voltage[cycle.part], record.displacement[cycle.part]
@@ -166,10 +166,10 @@ def _drawing(
         axis.set_title(heading)
         axis.set_xlabel("drive u [V]")
         axis.text(0.97, 0.04, words.replace(", ", "\n"), transform=axis.transAxes, ha="right", fontsize=8.5)
-        told.append(f"{heading}: {words}")
+        descriptions.append(f"{heading}: {words}")
     for axis in axes[:, 0]:
         axis.set_ylabel("displacement y [µm]")
     for axis in list(axes.flat)[len(kept) :]:
         axis.set_axis_off()
     axes.flat[0].legend(loc="upper left")
-    return Drawing(name, title, caption, f"{title}. " + "; ".join(told) + ".", figure, data)
+    return Drawing(name, title, caption, f"{title}. " + "; ".join(descriptions) + ".", figure, data)

@@ -34,7 +34,7 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
     moving = np.abs(rate[rate != 0.0])
     slow = 10.0 ** np.ceil(np.log10(max(1e-4 * fast, float(np.quantile(moving, 0.02)) if moving.size else 0.0)))
     data: dict[str, Array] = {}
-    told = []
+    descriptions = []
     quantities = (
         ("drive_V", u, "drive u [V]"),
         ("displacement_um", 1e6 * y, "displacement y [µm]"),
@@ -59,7 +59,7 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
             axis.plot(centre, 1e9 * mean, color=colour, linestyle=line, linewidth=1.8, label=f"mean, drive {word}")
             data |= {f"{name}_{word}": centre, f"residual_m_over_{name}_{word}": mean}
             if mean.size:
-                told.append(f"over {name} {word} the mean residual spans {1e9 * np.ptp(mean):.3g} nm")
+                descriptions.append(f"over {name} {word} the mean residual spans {1e9 * np.ptp(mean):.3g} nm")
         axis.set_xlabel(label)
     axes[0, 0].set_ylabel("residual [nm]")
     legend_above(figure, handles_of(axes[0, 0]))
@@ -69,7 +69,7 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
         "Grey: how often a residual occurs, all phases with equal weight, logarithmic. A mean away from zero is "
         "something the model lacks: bent over u or y a static nonlinearity, split between rising and falling a "
         "hysteresis, growing with du/dt a lag or a rate dependence.",
-        "Maps of the residual: " + "; ".join(told) + ".",
+        "Maps of the residual: " + "; ".join(descriptions) + ".",
         figure,
         data,
     )

@@ -33,7 +33,7 @@ def residual_spectrum(comparison: ModelComparison) -> Drawing | None:
     periods = sorted(sorted(groups, key=lambda p: -sum(comparison.experiment[i].size for i in groups[p]))[:PANELS])
     figure, axes = canvas(1, len(periods), 3.4)
     data: dict[str, Array] = {}
-    told = []
+    descriptions = []
     for axis, period in zip(axes.flat, periods, strict=True):
         members = groups[period]
         name = duration(period).replace(" ", "").replace("µ", "u")
@@ -52,7 +52,7 @@ def residual_spectrum(comparison: ModelComparison) -> Drawing | None:
         axis.set_title(f"sampled every {duration(period)}")
         axis.set_xlabel("frequency [Hz]")
         worst = f[int(np.argmax(left / floor))] if floor > 0 else f[int(np.argmax(left))]
-        told.append(f"sampled every {duration(period)} the residual stands out most at {worst:.3g} Hz")
+        descriptions.append(f"sampled every {duration(period)} the residual stands out most at {worst:.3g} Hz")
     axes[0, 0].set_ylabel("amplitude density [nm/√Hz]")
     legend_above(figure, handles_of(axes[0, 0]))
     return Drawing(
@@ -60,7 +60,7 @@ def residual_spectrum(comparison: ModelComparison) -> Drawing | None:
         "Spectrum of the residual",
         "Where the residual lies above the white noise of the sensor, something is left to explain at that frequency. "
         "Phases of one sample period are averaged with equal weight.",
-        "Spectrum of the residual: " + "; ".join(told) + ".",
+        "Spectrum of the residual: " + "; ".join(descriptions) + ".",
         figure,
         data,
     )

@@ -56,12 +56,12 @@ def step(comparison: ModelComparison) -> Drawing | None:
     }
     if predicted is not None:
         data["predicted_m_per_V"] = predicted.mean
-    told = "; ".join(n.message for n in delay.notices)
+    message = "; ".join(n.message for n in delay.notices)
     return Drawing(
         "step",
         "Step and delay",
         f"Mean of {measured.edges} edges, ± 2σ; {delay}. The first sample that stands out of the noise tells it, the "
-        "cost of a fit does not." + (f" Note: {told}." if told else ""),
+        "cost of a fit does not." + (f" Note: {message}." if message else ""),
         f"Step response: {delay}; it reaches {1e6 * measured.mean[-1]:.4g} µm/V after {duration(data['time_s'][-1])}.",
         figure,
         data,

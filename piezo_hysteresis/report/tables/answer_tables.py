@@ -19,9 +19,9 @@ def effect_table(answer: Mapping[str, Any]) -> Table | None:
         share = f"{100 * effect['explained_fraction']:.0f} %"
         for name, value in effect["parameters"].items():
             interval = value.get("interval_95")
-            told = f"{interval[0]:.4g} … {interval[1]:.4g}" if interval else ""
+            message = f"{interval[0]:.4g} … {interval[1]:.4g}" if interval else ""
             rows.append(
-                (effect["name"], effect["family"], share, twins, name, f"{value['value']:.4g}", told, value["unit"])
+                (effect["name"], effect["family"], share, twins, name, f"{value['value']:.4g}", message, value["unit"])
             )
     header = ("effect", "family", "explains", "confusable with", "parameter", "value", "95 %", "unit")
     return Table("Effects found", header, tuple(rows), "", frozenset({2, 5, 6})) if rows else None

@@ -42,8 +42,8 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
                 )
                 continue
             interval = f"± {sure[name]:.2g}" if name in sure else ""
-            told = f"{bounds}: at a bound" if name in hit else bounds
-            rows.append((name, row.symbol, f"{value:.6g}", interval, row.unit, told, row.meaning))
+            message = f"{bounds}: at a bound" if name in hit else bounds
+            rows.append((name, row.symbol, f"{value:.6g}", interval, row.unit, message, row.meaning))
     note = "Single ARX coefficients are not identifiable, poles and zeros nearly cancel: judge G by its response."
     return Table(
         "Parameters",

@@ -34,7 +34,7 @@ def answered(kind):
     )
 
 
-def evidence(records):
+def training_data(records):
     floors = np.full(len(records), 3.0 * NOISE)
     return TrainingData(records, floors, Nuisance(), extent_of(records, model(BoucWen)))
 
@@ -56,8 +56,8 @@ def test_slow_records_have_many_steps_behind_every_sample():
 
 
 def test_data_of_an_explicit_step_are_told_from_others():
-    assert is_stepped(model(BoucWen), evidence(answered(PublishedBoucWen)))
-    assert not is_stepped(model(BoucWen), evidence(answered(BoucWen)))
+    assert is_stepped(model(BoucWen), training_data(answered(PublishedBoucWen)))
+    assert not is_stepped(model(BoucWen), training_data(answered(BoucWen)))
 
 
 def test_without_the_steps_the_exact_loop_answers():

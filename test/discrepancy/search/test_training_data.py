@@ -16,6 +16,6 @@ STAGE = Model((BoucWen(A=-0.2, beta=3.0), Arx(a=(-0.5,), b=(0.5,)), Offset()), 1
 @pytest.mark.parametrize(("begins", "told"), [((0.0, 0.0), False), ((0.0, 0.01), False), ((0.0, 45.0), True)])
 def test_settling_is_free_only_where_records_begin_at_different_levels(begins, told):
     records = tuple(Record(u + np.linspace(0.0, 50.0, 100), np.zeros(100), 1e-4) for u in begins)
-    evidence = TrainingData(records, np.ones(2), Nuisance(), extent_of(records, STAGE))
-    assert ("offset.settling" in free_numbers(STAGE, evidence)) is told
-    assert "offset.y0" in free_numbers(STAGE, evidence)
+    training_data = TrainingData(records, np.ones(2), Nuisance(), extent_of(records, STAGE))
+    assert ("offset.settling" in free_numbers(STAGE, training_data)) is told
+    assert "offset.y0" in free_numbers(STAGE, training_data)
