@@ -9,6 +9,7 @@ from ..discrepancy.residual.noise_floor import noise_floors
 from ..report.json_file import write_json
 from ..report.tables.quality_table import notice_table, record_table
 from . import reading
+from .destination import require_new_experiment, require_new_file
 from .terminal import console, show
 
 
@@ -31,6 +32,8 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         If the recording cannot be read or the experiment not be written.
     """
+    require_new_experiment("-o", args.output)
+    require_new_file("--json", args.json)
     experiment = reading.read(args)
     show(record_table(experiment, noise_floors(experiment.records)), notice_table(experiment))
     recording.write(experiment, args.output)

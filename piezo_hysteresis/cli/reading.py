@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 from .. import recording
-from ..errors import RecordingError
+from ..errors import PiezoError, RecordError, RecordingError
 from ..record import Experiment
 
 T = TypeVar("T")
@@ -74,20 +76,43 @@ def read(args: argparse.Namespace) -> Experiment:
     RecordingError, RecordError
         If it cannot be read, or an option makes no sense.
     """
-    return recording.read(
-        *args.experiment,
-        format=args.format,
-        axis=args.axis,
-        columns=_pairs("--column", args.column, str),
-        units=_pairs("--unit", args.unit, str),
-        sample_period=args.sample_period,
-        initial_voltage=args.initial_voltage,
-        rows=_rows(args.rows),
-        phases=_phases(args.phase),
-        include=args.include,
-        average=args.average,
-        decimate=_pairs("--decimate", args.decimate, int) or None,
-    )
+    try:
+        experiment = recording.read(
+            *args.experiment,
+            format=args.format,
+            axis=args.axis,
+            columns=_pairs("--column", args.column, str),
+            units=_pairs("--unit", args.unit, str),
+            sample_period=args.sample_period,
+            initial_voltage=args.initial_voltage,
+            rows=_rows(args.rows),
+            phases=_phases(args.phase),
+            include=args.include,
+            average=args.average,
+            decimate=_pairs("--decimate", args.decimate, int) or None,
+        )
+    except RecordError as error:
+        raise RecordError(as_options(str(error))) from None
+    except PiezoError as error:
+        raise RecordingError(as_options(str(error))) from None
+    return replace(experiment, notices=tuple(replace(n, message=as_options(n.message)) for n in experiment.notices))
+
+
+_OPTIONS = {
+    "axis": "--axis", "columns": "--column", "units": "--unit", "sample_period": "--sample-period",
+    "initial_voltage": "--initial-voltage", "rows": "--rows", "phases": "--phase", "include": "--include",
+    "average": "--average", "decimate": "--decimate", "format": "--format",
+}  # fmt: skip
+"""Arguments of `recording.read` to the options of the command line."""
+
+
+def as_options(text: str) -> str:
+    """A message that names arguments of `recording.read` in backquotes, with the options of the command line instead.
+
+    >>> as_options("give `sample_period`, or name it by `columns`, e.g. voltage=2")
+    'give --sample-period, or name it by --column, e.g. voltage=2'
+    """
+    return re.sub(r"`(\w+)`", lambda match: _OPTIONS.get(match[1], match[0]), text)
 
 
 def _pairs(option: str, texts: Sequence[str], kind: Callable[[str], T]) -> dict[str, T]:

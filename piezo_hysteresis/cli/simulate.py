@@ -10,6 +10,7 @@ from ..identification.protocol.drive_limits import DriveLimits
 from ..record import Experiment, Record
 from ..report.json_file import write_json
 from ..stage.simulated import SimulatedStage
+from .destination import require_new_experiment, require_new_file
 from .plant_option import add_plant_arguments, plant
 from .terminal import console, progress
 
@@ -36,6 +37,8 @@ def run(args: argparse.Namespace) -> int:
     ParameterError, StageError, RecordingError
         On a plant file, an option or a folder that is not acceptable.
     """
+    require_new_experiment("-o", args.output)
+    require_new_file("--truth", args.truth)
     parameters, truth = plant(args)
     stage = SimulatedStage(parameters, seed=args.seed, sample_period=args.sample_period)
     described = stage.description

@@ -120,7 +120,7 @@ def read(
     names = {name for r in records for name in (r.phase, r.phase.split("_")[0])}
     if unknown := set(decimate or ()) - names:
         held = ", ".join(dict.fromkeys(r.phase for r in records))
-        raise RecordingError(f"{paths[0]}: decimate: no phase {min(unknown)!r}, expected one of {held}")
+        raise RecordingError(f"{paths[0]}: `decimate`: no phase {min(unknown)!r}, expected one of {held}")
     experiment = Experiment(tuple(records), ", ".join(str(Path(path).expanduser()) for path in paths))
     return experiment.noting(*notices, *inspect(experiment))
 
@@ -170,7 +170,7 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     chosen.write(experiment, place)
 
 
-_WITHIN = "begins on a branch of its loop: what came before is not recorded; a settled stage needs initial_voltage"
+_WITHIN = "begins on a branch of its loop: what came before is not recorded; a settled stage needs `initial_voltage`"
 """Message of a record that begins in motion on its loop."""
 _IN_MOTION = "{phases}: the first sample lies on a ramp from {levels}, taken as where the stage had settled"
 """Message of records that begin on a ramp."""

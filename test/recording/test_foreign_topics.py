@@ -96,7 +96,7 @@ def test_types_that_only_the_bag_knows_and_blocks_of_samples(tmp_path, store):
             messages.append((topic, kind, k, store.types[kind](stamp, gauge(0.0, values[k : k + 10]))))
     path = bag_of(tmp_path / "bag", store, messages)
     columns = {"voltage": "/u.gauge.block", "displacement": "/y.gauge.block"}
-    with pytest.raises(RecordingError, match="give sample_period"):
+    with pytest.raises(RecordingError, match="give `sample_period`"):
         read(path, columns=columns)
     (record,) = read(path, columns=columns, sample_period=1e-3, phases="x")
     np.testing.assert_array_equal(record.voltage, VOLTAGE)

@@ -41,7 +41,7 @@ class TopicField(NamedTuple):
         """
         match = _PLACE.fullmatch(text)
         if match is None:
-            raise RecordingError(f"columns: got '{text}', expected /topic.field or /topic.field[element]")
+            raise RecordingError(f"`columns`: got '{text}', expected /topic.field or /topic.field[element]")
         element = match["element"]
         return cls(match["topic"], tuple((match["fields"] or "data").split(".")), int(element) if element else None)
 
@@ -86,7 +86,7 @@ def read_topics(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Notic
         if is_channel(name) and name != "time"
     }
     if not {"voltage", "displacement"} <= places.keys():
-        raise RecordingError(f"columns: got {', '.join(layout.columns)}, expected voltage and displacement")
+        raise RecordingError(f"`columns`: got {', '.join(layout.columns)}, expected voltage and displacement")
     series, stamped = _series(bag, places, layout.sample_period or 0.0)
     intake = _paired(series, places, layout)
     channels = {name: layout.in_si(name, intake.column(at)) for at, name in enumerate(series, 1)}
@@ -137,10 +137,10 @@ def _series(bag: Bag, places: dict[str, TopicField], period: float) -> tuple[dic
                     values = place.value(content)
                 except (AttributeError, TypeError, ValueError):
                     raise RecordingError(
-                        f"columns: {message.type} on {place.topic} has no numbers at '{'.'.join(place.fields)}'"
+                        f"`columns`: {message.type} on {place.topic} has no numbers at '{'.'.join(place.fields)}'"
                     ) from None
                 if values.size > 1 and not period:
-                    raise RecordingError(f"{place.topic} carries {values.size} samples a message; give sample_period")
+                    raise RecordingError(f"{place.topic} carries {values.size} samples a message; give `sample_period`")
                 series[name].add(((time_ns or message.time_ns) - origin) * 1e-9, values, period)
                 seen.add(name)
     missing = [places[name].topic for name in places if name not in seen]

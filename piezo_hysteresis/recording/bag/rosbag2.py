@@ -58,7 +58,9 @@ class Rosbag2:
                 records, notices = read_topics(bag, layout)
             else:
                 if layout.rows is not None:
-                    raise RecordingError(f"rows: got {layout.rows} of a bag of phases, expected none; piezo import it")
+                    raise RecordingError(
+                        f"`rows`: got {layout.rows} of a bag of phases, expected none; import it first"
+                    )
                 records, notices = _read_samples(bag, layout)
             return Experiment(tuple(records), str(path), (*bag.notices, *notices))
 
@@ -144,12 +146,13 @@ def _read_samples(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Not
         except Exception:  # the decoder raises whatever it likes on damaged bytes
             damaged += 1
         if len(streams) > 1:
-            raise RecordingError(f"holds several stages, expected one; choose an axis: {', '.join(sorted(streams))}")
+            held = ", ".join(sorted(streams))
+            raise RecordingError(f"holds several stages, expected one; choose one by `axis`: {held}")
     notices = [Notice("damaged", f"{damaged} messages cannot be decoded and are skipped")] if damaged else []
     if not streams:
         where = f" of the axis '{layout.axis}'" if layout.axis else ""
         raise RecordingError(
-            f"got no readable samples{where} (topic 'samples', {TYPE}); map foreign topics by columns, e.g. "
+            f"got no readable samples{where} (topic 'samples', {TYPE}); map foreign topics by `columns`, e.g. "
             "voltage=/ao.data displacement=/sensor.data"
         )
     (space, stream), *_ = streams.items()
@@ -215,7 +218,7 @@ def _records(
         excited |= name != IDLE
         before = stretch
     if not records:
-        raise RecordingError(f"holds only {IDLE} and {HOLD}, expected phases; include={IDLE},{HOLD} keeps those")
+        raise RecordingError(f"holds only {IDLE} and {HOLD}, expected phases; `include` keeps those")
     origin = records[0].start_time
     records = [replace(r, start_time=r.start_time - origin) for r in records]
     if unlabelled:

@@ -133,7 +133,7 @@ class SampleStream:
         if not known.any():  # one sample per block: the stamps are all there is
             steps = np.diff(np.array(self._times_ns)) * 1e-9 / np.diff(np.array(self._starts))
             if not (steps > 0).any():
-                raise RecordError("got no field 'time' and no stamps that grow, expected either; give sample_period")
+                raise RecordError("got no field 'time' and no stamps that grow, expected either; give `sample_period`")
             return np.full(periods.size, np.median(steps[steps > 0]))
         latest = np.maximum.accumulate(np.where(known, np.arange(periods.size), known.argmax()))
         return np.asarray(periods[latest])

@@ -37,7 +37,7 @@ def naming(path: Path, expected: str) -> Iterator[None]:
     except PiezoError as error:
         raise RecordingError(_named(path, error)) from None
     except MemoryError:
-        raise RecordingError(f"{path}: more than the memory holds; keep a part by rows, or average more") from None
+        raise RecordingError(f"{path}: more than the memory holds; give `rows` or a larger `average`") from None
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file or folder, expected {expected}") from None
     except OSError as error:

@@ -91,7 +91,7 @@ def onset(record: Record) -> list[Notice]:
     text = (
         f"the displacement moves by {drift:.3g} m in the first {opening} samples, the drive by "
         f"{float(np.abs(u[:opening] - u[0]).max()):.3g} V: not settled at {record.settled_voltage:.4g} V before; "
-        "give initial_voltage"
+        "give `initial_voltage`"
     )
     return [Notice("not_at_rest", text, record.phase)]
 

@@ -80,7 +80,7 @@ def split_at_gaps(
         else:
             notices.append(Notice("non_finite", f"{name} has non-finite samples: the channel is left out", phase))
     if not PERIODS[0] <= sample_period <= PERIODS[1]:
-        raise RecordError(f"sample_period: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
+        raise RecordError(f"`sample_period`: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
     good = (np.abs(voltage) < LARGEST) & (np.abs(displacement) < LARGEST)
     gaps = {**(breaks or {}), **(pauses or {})}
     edges = sorted(gaps.keys() - {0})

@@ -93,7 +93,7 @@ def _records(
     places |= guess
     for channel in ("voltage", "displacement"):
         if channel not in places:
-            raise RecordingError(f"got {_listed(variables)}, expected {given[channel]}; name it by columns")
+            raise RecordingError(f"got {_listed(variables)}, expected {given[channel]}; name it by `columns`")
     units = {c: unit_in(place, c) for c, place in places.items() if is_channel(c)}
     intakes = {c: _channel(variables, places[c], layout) for c in units}
     columns = {c: layout.in_si(c, intake.column(0), units[c]) for c, intake in intakes.items()}

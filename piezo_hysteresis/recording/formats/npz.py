@@ -63,7 +63,7 @@ class Npz:
             notices += told
             end = parts[-1].start_time + parts[-1].duration
         if not records:
-            raise RecordingError(f"{path}: average: got {layout.average}, expected fewer samples than a phase has")
+            raise RecordingError(f"{path}: `average`: got {layout.average}, expected fewer samples than a phase has")
         return Experiment(tuple(records), str(path), tuple(notices))
 
     def write(self, experiment: Experiment, path: Path) -> None:
@@ -144,6 +144,8 @@ def _time_base(
 ) -> tuple[float, dict[int, int], list[Notice]]:
     """Sample period [s] from wherever the file tells it; missing samples, where it holds times; what to tell."""
     if layout.sample_period is not None:
+        if place["time"] in values and values.size(place["time"]) > average:
+            TimeColumn.of(times()).require(layout.sample_period * average)
         return layout.sample_period * average, {}, []
     if place["sample_period"] in values or "sample_period" in layout.columns:
         period = layout.in_si("sample_period", np.array(values.number(place["sample_period"])))

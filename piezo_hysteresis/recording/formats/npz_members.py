@@ -92,7 +92,9 @@ class NpzMembers:
         member = self._members.get(name)
         if member is None:
             held = ", ".join(sorted(self._members)[:20]) or "nothing"
-            raise RecordingError(f"holds {held}, expected the key '{name}'; name it by columns or options")
+            raise RecordingError(
+                f"holds {held}, expected the key '{name}'; name it by `columns`, or give `sample_period`"
+            )
         return member
 
     def _header(self, name: str, stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:

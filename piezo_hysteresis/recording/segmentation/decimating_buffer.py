@@ -30,7 +30,7 @@ def averaged_notice(average: int, sample_period: float, phase: str = "") -> Noti
         "averaged",
         f"more than {ENOUGH} samples: {average} are averaged into one on reading, to a sample period of "
         f"{sample_period:g} s; what is faster than {0.5 / sample_period:.3g} Hz is lost. "
-        "rows keeps a part at the full rate, average=1 everything",
+        "`rows` keeps a part at the full rate, `average` = 1 keeps everything",
         phase,
     )
 
@@ -68,7 +68,7 @@ def shared_averages(sizes: Sequence[int], average: int | None) -> list[int]:
 
 def _too_many() -> RecordingError:
     return RecordingError(
-        f"got more than {MOST} samples, expected fewer; choose a part by rows, or a larger average while reading"
+        f"got more than {MOST} samples, expected fewer; choose a part by `rows`, or a larger `average`"
     )
 
 
@@ -179,5 +179,5 @@ class DecimatingBuffer:
         """
         if not self._columns[at] and (self.start or self.stop is not None):
             asked = f"{self.start}:{'' if self.stop is None else self.stop}"
-            raise RecordingError(f"rows: got {asked}, expected a part of {self.rows} rows that is not empty")
+            raise RecordingError(f"`rows`: got {asked}, expected a part of {self.rows} rows that is not empty")
         return np.frombuffer(self._columns[at], np.float64)

@@ -62,7 +62,7 @@ def labelled(
 def _named(parts: Sequence[Record], phases: Sequence[tuple[float, str]]) -> list[Record]:
     times = [float(time) for time, _ in phases]
     if not times or any(not b > a for a, b in itertools.pairwise(times)):
-        raise RecordingError(f"phases: got start times {times} s, expected growing ones")
+        raise RecordingError(f"`phases`: got start times {times} s, expected growing ones")
     origin = parts[0].start_time
     records: list[Record] = []
     for part in parts:
@@ -75,7 +75,7 @@ def _named(parts: Sequence[Record], phases: Sequence[tuple[float, str]]) -> list
                 records.append(replace(piece, initial_voltage=None) if start else piece)
     if not records:
         raise RecordingError(
-            f"phases: got start times {times} s, expected some before {parts[-1].time[-1] - origin:g} s"
+            f"`phases`: got start times {times} s, expected some before {parts[-1].time[-1] - origin:g} s"
         )
     return records
 

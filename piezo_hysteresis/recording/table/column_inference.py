@@ -11,7 +11,7 @@ from .units import plain, units_of
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$|[\s_,/:]\s*([^\s_,/:\[\]()]+)\s*$")
 """Unit at the end of a title: in brackets, or behind a separator."""
 _WORDS = {
-    "time": r"time|zeit|\bt\b|\bx value\b",
+    "time": r"time|zeit|\bt\b|\bx value\b|\bx-axis\b",
     "voltage": r"volt|drive|spannung|input|\bu\b|\bv\b|\bu_?in\b|\bv_?in\b",
     "displacement": r"disp|posi|sensor|stroke|weg\b|elong|output|\by\b|\bx\b",
 }
@@ -90,4 +90,4 @@ def inference_notice(found: Mapping[str, str], units: Mapping[str, str | None]) 
     if not found:
         return ()
     told = ", ".join(f"{c} = '{title}'{f' in {units[c]}' if units.get(c) else ''}" for c, title in found.items())
-    return (Notice("columns", f"columns taken by their titles: {told}; name others by columns"),)
+    return (Notice("columns", f"columns taken by their titles: {told}; name others by `columns`"),)

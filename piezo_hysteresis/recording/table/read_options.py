@@ -16,6 +16,9 @@ from .units import si_factor
 CHANNELS = ("time", "voltage", "displacement")
 """What a recording must hold, unless its sample period is given; `is_channel` tells what it may hold besides."""
 
+LONGEST_PERIOD = 60.0
+"""Sample period that may be given by hand [s]; a larger number is a rate in Hz."""
+
 LABELS = ("phase", "record", "continues", "truncated", "initial_voltage", "sample_period", "start_time")
 """What is constant within a record."""
 
@@ -80,21 +83,27 @@ class ReadOptions:
         for name in (*self.columns, *self.units):
             if not (is_channel(name) or name in LABELS):
                 raise RecordingError(
-                    f"columns: got channel '{name}', expected one of {', '.join((*CHANNELS, *LABELS))}, "
+                    f"`columns`: got channel '{name}', expected one of {', '.join((*CHANNELS, *LABELS))}, "
                     "or another name with voltage, displacement or temperature in it, e.g. displacement_2"
                 )
         for name, unit in self.units.items():
             si_factor(name, unit)
         if self.sample_period is not None and not (math.isfinite(self.sample_period) and self.sample_period > 0):
-            raise RecordingError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
+            raise RecordingError(f"`sample_period`: got {self.sample_period!r} s, expected a positive time")
+        if (self.sample_period or 0.0) > LONGEST_PERIOD:
+            given = float(self.sample_period or 1.0)
+            raise RecordingError(
+                f"`sample_period`: got {given:g} s, expected at most {LONGEST_PERIOD:g} s between two samples; "
+                f"if {given:g} Hz is the sample rate, give {1.0 / given:.6g}"
+            )
         if self.initial_voltage is not None and not math.isfinite(self.initial_voltage):
-            raise RecordingError(f"initial_voltage: got {self.initial_voltage!r} V, expected a finite voltage")
+            raise RecordingError(f"`initial_voltage`: got {self.initial_voltage!r} V, expected a finite voltage")
         if self.average is not None and self.average < 1:
-            raise RecordingError(f"average: got {self.average}, expected a whole number of samples, 1 or more")
+            raise RecordingError(f"`average`: got {self.average}, expected a whole number of samples, 1 or more")
         columns = {k: int(c) if isinstance(c, str) and c.isdigit() else c for k, c in self.columns.items()}
         for name, column in columns.items():
             if isinstance(column, int) and column < 1:
-                raise RecordingError(f"columns: got {column} for {name}, expected a number counted from 1")
+                raise RecordingError(f"`columns`: got {column} for {name}, expected a number counted from 1")
         object.__setattr__(self, "columns", columns)
 
     def in_si(self, channel: str, values: Samples, unit: str | None = None) -> Samples:
@@ -117,7 +126,7 @@ class ReadOptions:
         period = None if self.sample_period is None else self.sample_period * average
         if rows is not None and average > 1:
             raise RecordingError(
-                f"rows: got {self.rows} of a recording that is averaged, expected rows counted from the beginning"
+                f"`rows`: got {self.rows} of a recording that is averaged, expected rows counted from the beginning"
             )
         return replace(self, rows=rows, sample_period=period, average=average)
 
@@ -127,7 +136,7 @@ class ReadOptions:
             return slice(0, size)
         start, stop, _ = slice(*self.rows).indices(size)
         if stop <= start:
-            raise RecordingError(f"rows: got {self.rows}, expected a part of {size} rows that is not empty")
+            raise RecordingError(f"`rows`: got {self.rows}, expected a part of {size} rows that is not empty")
         return slice(start, stop)
 
     def truncates(self, part: slice) -> bool:

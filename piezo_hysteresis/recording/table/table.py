@@ -80,17 +80,17 @@ def resolve(titles: Sequence[str], width: int, layout: ReadOptions) -> Places:
             matches = [i for i, title in enumerate(titles) if column in (title.strip(), parsed[i][0])]
             at = matches[0] if matches else width
         if at >= width:
-            raise RecordingError(f"columns: got {column!r} for {channel}, expected {_listed(titles, width)}")
+            raise RecordingError(f"`columns`: got {column!r} for {channel}, expected {_listed(titles, width)}")
         places[channel] = (at, unit_in(titles[at], channel) if titles else None)
     open_ = [c for c in ("time", "voltage", "displacement") if c not in places]
     if "time" in open_ and layout.sample_period is not None:
-        open_.remove("time")
+        open_.remove("time")  # a guess is not worth a contradiction
     found = inferred_columns(titles, (at for at, _ in places.values()), open_)
     places |= {channel: (at, unit_in(titles[at], channel)) for channel, at in found.items()}
     for channel in ("voltage", "displacement"):
         if channel not in places:
             raise RecordingError(
-                f"got {_listed(titles, width)}, expected a column for {channel}; name it by columns, e.g. {channel}=2"
+                f"got {_listed(titles, width)}, expected a column for {channel}; name it by `columns`, e.g. {channel}=2"
             )
     names = {channel: titles[at].strip() for channel, at in found.items()}
     return Places(places, inference_notice(names, {channel: places[channel][1] for channel in found}))
@@ -175,11 +175,13 @@ def _stretch(
     breaks: dict[int, int] = {}
     if time is not None and (time.size > 1 or period is None):
         base = TimeColumn.of(time)
+        if layout.sample_period is not None:
+            base.require(layout.sample_period)
         period = period or base.period
         breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
         notices = base.notices(phase)
     if period is None:
-        raise RecordingError("got no times and no sample period, expected either; give sample_period")
+        raise RecordingError("got no times and no sample period, expected either; give `sample_period`")
     end = before[-1].start_time + before[-1].duration if before else 0.0
     start = _number(labels, "start_time")
     if start is None:

@@ -15,7 +15,7 @@ from ...errors import RecordingError
 from ...record import Samples
 from ..segmentation.decimating_buffer import DecimatingBuffer
 from .read_options import ReadOptions
-from .units import is_unit
+from .units import is_unit, plain
 
 BLOCK_BYTES = 1 << 20
 """Text that is parsed at a time; no line may be longer."""
@@ -98,7 +98,8 @@ class Dialect:
             return None
         filled = [[cell for cell in row if cell] for row in body if len(row) == width]
         numeric = [np.mean([_number(cell, comma) is not None for cell in row]) for row in filled if row]
-        titles = (_cells(line.lstrip(" #%"), delimiter) for line in reversed(lines[:first][-2:]))
+        above = [line for line in lines[:first] if line.strip(" \t,;#%")][-2:]
+        titles = (_cells(line.lstrip(" #%"), delimiter) for line in reversed(above))
         header = _titles(*(tuple(cells) if len(cells) == width else () for cells in titles))
         return float(np.sum(numeric)) / len(body), width, cls(delimiter, comma, first, header, width)
 
@@ -253,7 +254,7 @@ def _titles(line: tuple[str, ...] = (), above: tuple[str, ...] = ()) -> tuple[st
     """
     named = [cell for cell in line if cell]
     if above and named and all(is_unit(cell) for cell in named):
-        return tuple(f"{title} [{unit}]" if unit else title for title, unit in zip(above, line, strict=True))
+        return tuple(f"{title} [{plain(unit)}]" if unit else title for title, unit in zip(above, line, strict=True))
     return line
 
 

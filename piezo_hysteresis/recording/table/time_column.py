@@ -7,11 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import RecordError
+from ...errors import RecordError, RecordingError
 from ...record import Notice, Samples
 
 JITTER = 0.02
 """Deviation of the steps from their mean, in sample periods (rms), above which it is told."""
+
+
+LARGEST_CONTRADICTION = 0.05
+"""Share by which a sample period given by hand may differ from the times of the file."""
 
 
 def round_period(period: float, tolerance: float = 1e-12) -> float:
@@ -66,7 +70,7 @@ class TimeColumn:
         forward = steps[steps > 0]
         if not forward.size or not np.isfinite(time).all():
             raise RecordError(
-                "time: got times that are not finite or do not grow, expected seconds or ISO dates; give sample_period"
+                "time: got times that do not grow or are not finite, expected seconds or dates; give `sample_period`"
             )
         # times written with few digits stand still between their steps: then only the mean step tells
         usual = float(np.median(steps[steps >= 0]))
@@ -82,6 +86,25 @@ class TimeColumn:
         lost = np.maximum(np.rint(steps[broken] / period).astype(np.int64) - 1, 0)
         jitter = float(np.sqrt(np.mean((whole - mean) ** 2))) / period if usual > 0 else 0.0
         return cls(period, breaks, np.where(steps[broken] > 0, lost, 0), jitter)
+
+    def require(self, period: float) -> None:
+        """Compare the times with a sample period that was given by hand.
+
+        Parameters
+        ----------
+        period : float
+            Time between the samples as they are kept [s].
+
+        Raises
+        ------
+        RecordingError
+            If they differ by more than `LARGEST_CONTRADICTION`.
+        """
+        if abs(self.period / period - 1.0) > LARGEST_CONTRADICTION:
+            raise RecordingError(
+                f"`sample_period`: got {period:g} s, but the times of the file are {self.period:g} s apart; leave "
+                "it out, or name the unit of the times by `units`, e.g. time=ms"
+            )
 
     def notices(self, phase: str = "") -> list[Notice]:
         """What a reader of the data should know about their times."""

@@ -37,9 +37,18 @@ def units_of(channel: str) -> Mapping[str, float]:
     return _UNITS.get(quantity_of(channel) or channel, {})
 
 
+_WORDS: Mapping[str, str] = {
+    "second": "s", "seconds": "s", "sec": "s", "msec": "ms", "usec": "us", "volt": "V", "volts": "V", "millivolt": "mV",
+    "metre": "m", "meter": "m", "micron": "um", "microns": "um", "micrometer": "um", "micrometre": "um",
+    "nanometer": "nm", "nanometre": "nm", "kelvin": "K",
+}  # fmt: skip
+"""Units in words, as oscilloscopes and interferometers write them, to their symbols."""
+
+
 def plain(unit: str) -> str:
-    """A unit as it is typed on a keyboard: ``"[µm]"`` becomes ``"um"``."""
-    return unit.strip(" \t[]()").replace("µ", "u").replace("μ", "u")
+    """A unit as it is typed on a keyboard: ``"[µm]"`` becomes ``"um"``, ``"Volt"`` becomes ``"V"``."""
+    symbol = unit.strip(" \t[]()").replace("µ", "u").replace("μ", "u")
+    return _WORDS.get(symbol.lower(), symbol)
 
 
 def is_unit(word: str) -> bool:
@@ -79,8 +88,8 @@ def si_factor(channel: str, unit: str | float) -> float:
             unit = float(unit)
         except ValueError:
             raise RecordingError(
-                f"units: got '{unit}' for {channel}, expected one of {', '.join(known)} or the SI value of one count"
+                f"`units`: got '{unit}' for {channel}, expected one of {', '.join(known)} or the SI value of one count"
             ) from None
     if not math.isfinite(unit) or unit == 0.0:
-        raise RecordingError(f"units: got {unit} for {channel}, expected a finite number other than zero")
+        raise RecordingError(f"`units`: got {unit} for {channel}, expected a finite number other than zero")
     return float(unit)

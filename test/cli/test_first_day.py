@@ -1,0 +1,141 @@
+"""What goes wrong on a first day, as it is typed: real `piezo` processes on files as instruments write them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis import recording
+
+TIME = np.arange(400) * 5e-3
+VOLTAGE = 1.8 - 1.8 * np.cos(2 * np.pi * TIME)
+MICRONS = 12.0 * VOLTAGE
+
+
+def piezo(*words):
+    """The command in a process of its own."""
+    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def refused(*words):
+    """One line and status 2; returns the line."""
+    done = piezo(*words)
+    assert done.returncode == 2, done.stdout + done.stderr
+    (line,) = done.stderr.splitlines()
+    return line
+
+
+def table(path, head, rows=None, delimiter=","):
+    rows = np.column_stack((TIME, VOLTAGE, MICRONS)) if rows is None else rows
+    lines = (delimiter.join(f"{x:.6f}" for x in row) for row in rows.tolist())
+    path.write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def plain(tmp_path):
+    return table(tmp_path / "plain.csv", "time_s,voltage_V,displacement_um\n")
+
+
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_a_sample_period_that_contradicts_the_times_is_refused(tmp_path, plain, factor):
+    line = refused("import", plain, "-o", tmp_path / "out", "--sample-period", 5e-3 * factor)
+    assert f"--sample-period: got {5e-3 * factor:g} s, but the times of the file are 0.005 s apart" in line
+    assert "--unit" in line
+    assert not (tmp_path / "out").exists()
+    done = piezo("import", plain, "-o", tmp_path / "out", "--sample-period", 5e-3)
+    assert done.returncode == 0, done.stderr
+
+
+def test_so_it_is_in_an_npz_file(tmp_path):
+    np.savez(tmp_path / "01_x.npz", time=TIME, voltage=VOLTAGE, displacement=1e-6 * MICRONS)
+    assert "0.005 s apart" in refused("import", tmp_path / "01_x.npz", "-o", tmp_path / "o", "--sample-period", "0.05")
+
+
+def test_a_rate_given_as_a_sample_period_is_refused(tmp_path, plain):
+    line = refused("import", plain, "-o", tmp_path / "out", "--sample-period", "100")
+    assert "--sample-period: got 100 s" in line
+    assert "if 100 Hz is the sample rate, give 0.01" in line
+
+
+PICOSCOPE = "Time,Channel A,Channel B\n(ms),(V),(mV)\n\n"
+KEYSIGHT = "x-axis,1,2\nsecond,Volt,Volt\n"
+SEPARATED = "Zeit;Spannung;Weg\n[ms];[V];[µm]\n\n"
+
+
+def test_titles_and_a_row_of_units_above_an_empty_line(tmp_path):
+    rows = np.column_stack((1e3 * TIME, VOLTAGE, 1e3 * VOLTAGE))
+    pico = table(tmp_path / "pico.csv", PICOSCOPE, rows)
+    words = ["--column", "displacement=Channel B [mV]", "--column", "voltage=2", "--unit", "displacement=1.2e-8"]
+    done = piezo("import", pico, "-o", tmp_path / "out", *words, "--phase", "sine_1hz")
+    assert done.returncode == 0, done.stderr
+    (record,) = recording.read(tmp_path / "out")
+    assert record.sample_period == pytest.approx(5e-3)
+    np.testing.assert_allclose(record.displacement, 12e-6 * VOLTAGE, atol=1e-11)
+
+
+def test_columns_of_volts_are_listed_and_asked_for_by_option(tmp_path):
+    scope = table(tmp_path / "keysight.csv", KEYSIGHT)
+    line = refused("import", scope, "-o", tmp_path / "out")
+    assert "1 'x-axis [s]', 2 '1 [V]', 3 '2 [V]'" in line
+    assert "name it by --column, e.g. voltage=2" in line
+    assert "columns," not in line.split("expected")[1]
+    done = piezo("import", scope, "-o", tmp_path / "out", "--column", "voltage=2", "--column", "displacement=3",
+                 "--unit", "displacement=1e-6", "--phase", "x")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert recording.read(tmp_path / "out")[0].sample_period == pytest.approx(5e-3)
+
+
+def test_units_of_a_row_of_their_own_count(tmp_path):
+    rows = np.column_stack((1e3 * TIME, VOLTAGE, MICRONS))
+    done = piezo("import", table(tmp_path / "w.csv", SEPARATED, rows, ";"), "-o", tmp_path / "out", "--phase", "x")
+    assert done.returncode == 0, done.stderr
+    (record,) = recording.read(tmp_path / "out")
+    np.testing.assert_allclose(record.displacement, 1e-6 * MICRONS, atol=1e-11)
+    assert record.sample_period == pytest.approx(5e-3)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--column", "voltage=7"], "--column: got 7 for voltage"),
+        (["--unit", "displacement=inch"], "--unit: got 'inch'"),
+        (["--rows", "900:1000"], "--rows: got"),
+        (["--average", "0"], "--average: got 0"),
+        (["--decimate", "hum=3"], "--decimate: no phase 'hum'"),
+        (["--phase", "3=a", "--phase", "1=b"], "--phase: got start times"),
+    ],
+)
+def test_errors_name_the_options_that_were_typed(tmp_path, plain, words, says):
+    line = refused("import", plain, "-o", tmp_path / "out", *words)
+    assert says in line
+    assert "`" not in line
+
+
+@pytest.mark.parametrize("output", ["folder", "file.csv", "file.mat", "bag.mcap"])
+def test_an_output_that_exists_is_refused_before_the_work(tmp_path, plain, output):
+    place = tmp_path / output.removesuffix(".mcap")
+    if place.suffix:
+        place.write_text("mine")
+    else:
+        place.mkdir()
+        (place / "mine.txt").write_text("mine")
+    # neither the recording nor the stage is looked at before: these would be refused for another reason
+    for words in (["import", tmp_path / "missing.csv"], ["simulate", "--plant", tmp_path / "missing.yaml"]):
+        line = refused(*words, "-o", tmp_path / output)
+        assert "-o: " in line
+        assert "exists already" in line
+    assert (place if place.suffix else place / "mine.txt").read_text() == "mine"
+
+
+def test_an_empty_folder_is_a_place_to_write_to_and_other_files_are_kept_too(tmp_path, plain):
+    (tmp_path / "out").mkdir()
+    assert piezo("import", plain, "-o", tmp_path / "out").returncode == 0
+    (tmp_path / "answer.json").write_text("mine")
+    assert "--json: " in refused("import", plain, "-o", tmp_path / "two", "--json", tmp_path / "answer.json")
+    assert "--truth: " in refused("simulate", "-o", tmp_path / "three", "--truth", tmp_path / "answer.json")
+    assert (tmp_path / "answer.json").read_text() == "mine"
