@@ -23,11 +23,10 @@ MOST_LINES = 250
 """Lines of a module of the package at most."""
 LONGER = {
     "piezo_hysteresis/identification/steps/dynamics.py": 255,
-    "piezo_hysteresis/record.py": 265,
-    "piezo_hysteresis/model/model.py": 290,
-    "piezo_hysteresis/online/predictor.py": 295,
-    "piezo_hysteresis/recording/bag/rosbag2.py": 260,
-    "piezo_hysteresis/recording/table/text_cells.py": 265,
+    "piezo_hysteresis/record.py": 270,
+    "piezo_hysteresis/online/predictor.py": 270,
+    "piezo_hysteresis/recording/bag/rosbag2.py": 270,
+    "piezo_hysteresis/recording/table/text_cells.py": 270,
 }
 """Modules that are longer, and how long they may be."""
 LONGEST_SUBJECT = 72

@@ -14,13 +14,11 @@ from ..effects import CHAIN, Discretisation, Effect, HysteresisOperator, Offset
 from ..errors import ModelError
 from ..parameter import Parameter, Value
 from ..record import Record
-from .chain import Chain, ChainState, ChainTangent, Channels
+from .chain import Chain, ChainState, Channels
+from .free_run import free_run, linearised_run
 from .samples import row
 
 Array = NDArray[np.float64]
-
-HOLD_STEPS = 8
-"""Steps in which the time between two records that continue is gone through."""
 
 
 def _place(effect: Effect) -> tuple[int, int]:
@@ -205,19 +203,7 @@ class Model:
         A record starts from a stage at rest at its `settled_voltage`, unless it continues the one before it; between
         two that continue, the last voltage was held.
         """
-        outputs: list[Array] = []
-        state: ChainState | None = None
-        chain: Chain | None = None
-        for index, record in self._in_one_go([records] if isinstance(records, Record) else records):
-            before, chain = chain, self.at(record.sample_period)
-            if state is None or not record.continues:
-                state = chain.rest(record.settled_voltage, record.start_time)
-            elif before is not chain:
-                state = chain.resume(state)
-            y, state = chain.run(record.voltage, state, record.channels)
-            if index is not None:
-                outputs.append(y)
-        return outputs
+        return free_run(self, [records] if isinstance(records, Record) else records)
 
     def linearise(
         self, records: Iterable[Record], wanted: Collection[str], block: int = 8192
@@ -237,38 +223,7 @@ class Model:
         slopes : (q, k) ndarray
             ∂y/∂θ of each of them.
         """
-        wanted = frozenset(wanted)
-        state: ChainState | None = None
-        tangent: ChainTangent | None = None
-        chain: Chain | None = None
-        for index, record in self._in_one_go(records):
-            before, chain = chain, self.at(record.sample_period)
-            if state is None or tangent is None or not record.continues:
-                state = chain.rest(record.settled_voltage, record.start_time)
-                tangent = chain.rest_tangent(record.settled_voltage, wanted)
-            elif before is not chain:
-                tangent = chain.resume_tangent(state, tangent)
-                state = chain.resume(state)
-            for start in range(0, record.size, block):
-                part = slice(start, min(start + block, record.size))
-                now, u = chain.channels_in(record.channels, part), record.voltage[part].copy()
-                y, names, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
-                if index is not None:
-                    yield index, part, y, names, slopes
-
-    def _in_one_go(self, records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:
-        """The records with their index, and without one the holds between those that continue: creep goes on there."""
-        before: Record | None = None
-        for index, record in enumerate(records):
-            if before is not None and record.continues:
-                end = before.start_time + before.duration
-                steps = min(HOLD_STEPS, int((record.start_time - end) / self.sample_period))
-                if steps > 0:
-                    held = np.full(steps, before.voltage[-1])
-                    period = (record.start_time - end) / steps
-                    yield None, Record(held, held, period, "hold", start_time=end, continues=True)
-            yield index, record
-            before = record
+        return linearised_run(self, records, frozenset(wanted), block)
 
     def sensitivities(self, record: Record, wanted: Collection[str]) -> tuple[Array, dict[str, Array]]:
         """Free-run displacement (n,) of a record from rest, and ∂y/∂θ (n,) of every number `wanted`."""

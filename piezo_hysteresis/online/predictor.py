@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,6 +9,7 @@ from ..errors import DivergenceError, RecordError
 from ..model.chain import Chain, ChainState
 from ..model.model import Model
 from ..model.samples import samples
+from .prediction import Prediction
 from .running_rms import RunningRms
 from .sensor_offset import SensorOffset
 from .sequence_check import LONGEST_SILENCE, SequenceCheck
@@ -35,29 +34,6 @@ FORGETTING = 2.0
 """Voltage scales after which loops have forgotten where they came from, exponentially with the way travelled."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Prediction:
-    """What a model says about one block.
-
-    Parameters
-    ----------
-    first : int
-        First sample of the block that counts; those before it were repeated.
-    prediction, residual : (n,) ndarray
-        Predicted displacement, and measured minus predicted [m], of the samples from `first` on; empty without a model.
-    model : Model or None
-        Model they come from.
-    warming_up : bool
-        True while what the drive did unseen still matters: before the first block, or in a gap.
-    """
-
-    first: int
-    prediction: Array
-    residual: Array
-    model: Model | None
-    warming_up: bool
-
-
 class Predictor:
     """Model, carried state and voltage history of one stream of samples.
 
@@ -74,7 +50,7 @@ class Predictor:
     ----------
     model : Model or None
         Model in force.
-    continuity : Continuity
+    continuity : SequenceCheck
         Counts of received, lost and repeated samples.
 
     Notes

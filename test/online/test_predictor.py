@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
 from piezo_hysteresis.errors import DivergenceError, ModelError, RecordError
 from piezo_hysteresis.model.model import Model
-from piezo_hysteresis.online.predictor import Prediction, Predictor
+from piezo_hysteresis.online.prediction import Prediction
+from piezo_hysteresis.online.predictor import Predictor
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,6 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
 from ..inversion import Inversion
-from .bouc_wen_start import closest_loop
 from .operator import HysteresisOperator, Loop
 
 MODIFIED_BOUC_WEN = (
@@ -53,6 +52,8 @@ class ModifiedBoucWen(HysteresisOperator):
         return self["p2"] + self["A"]
 
     def started(self, loops: Sequence[Loop]) -> Self:
+        from .bouc_wen_start import closest_loop  # imports scipy.optimize, for which no node shall wait
+
         return self.with_values(**closest_loop(loops))
 
 

@@ -13,7 +13,6 @@ from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from ...blocks.block import Array
 from ...errors import IdentificationError
@@ -124,6 +123,8 @@ class HysteresisOperator(Effect):
         IdentificationError
             If no loop has weight, or the input does not move.
         """
+        from scipy.optimize import lsq_linear  # takes 0.1 s to import, for which no node shall wait
+
         range_of(loops)
         moved = [loop for loop in loops if loop.weight > 0]
         low = min(float(min(loop.v.min(), loop.start)) for loop in moved)

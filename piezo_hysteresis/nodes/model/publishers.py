@@ -9,7 +9,8 @@ from std_msgs.msg import Float64
 from ...acquisition.sample_block import SampleBlock
 from ...model.model import Model
 from ...model.model_parameters import hash_number
-from ...online.predictor import Prediction, Predictor
+from ...online.prediction import Prediction
+from ...online.predictor import Predictor
 from ..messages.conversions import live, to_stamp
 from ..messages.samples import PredictionWriter
 from ..runtime.sending import is_heard, send

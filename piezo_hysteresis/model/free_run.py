@@ -1,0 +1,75 @@
+"""Free run of a model over the records of an experiment: the state goes on from record to record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record import Record
+from .chain import Chain, ChainState, ChainTangent
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Array = NDArray[np.float64]
+
+HOLD_STEPS = 8
+"""Steps in which the time between two records that continue is gone through."""
+
+
+def free_run(model: Model, records: Iterable[Record]) -> list[Array]:
+    """Displacement [m] of every record; what `Model.simulate` returns."""
+    outputs: list[Array] = []
+    state: ChainState | None = None
+    chain: Chain | None = None
+    for index, record in _in_one_go(records, model.sample_period):
+        before, chain = chain, model.at(record.sample_period)
+        if state is None or not record.continues:
+            state = chain.rest(record.settled_voltage, record.start_time)
+        elif before is not chain:
+            state = chain.resume(state)
+        y, state = chain.run(record.voltage, state, record.channels)
+        if index is not None:
+            outputs.append(y)
+    return outputs
+
+
+def linearised_run(
+    model: Model, records: Iterable[Record], wanted: frozenset[str], block: int
+) -> Iterator[tuple[int, slice, Array, tuple[str, ...], Array]]:
+    """Displacement [m] and its sensitivities, block by block; what `Model.linearise` yields."""
+    state: ChainState | None = None
+    tangent: ChainTangent | None = None
+    chain: Chain | None = None
+    for index, record in _in_one_go(records, model.sample_period):
+        before, chain = chain, model.at(record.sample_period)
+        if state is None or tangent is None or not record.continues:
+            state = chain.rest(record.settled_voltage, record.start_time)
+            tangent = chain.rest_tangent(record.settled_voltage, wanted)
+        elif before is not chain:
+            tangent = chain.resume_tangent(state, tangent)
+            state = chain.resume(state)
+        for start in range(0, record.size, block):
+            part = slice(start, min(start + block, record.size))
+            now, u = chain.channels_in(record.channels, part), record.voltage[part].copy()
+            y, names, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
+            if index is not None:
+                yield index, part, y, names, slopes
+
+
+def _in_one_go(records: Iterable[Record], sample_period: float) -> Iterator[tuple[int | None, Record]]:
+    """The records with their index, and without one the holds between those that continue: creep goes on there."""
+    before: Record | None = None
+    for index, record in enumerate(records):
+        if before is not None and record.continues:
+            end = before.start_time + before.duration
+            steps = min(HOLD_STEPS, int((record.start_time - end) / sample_period))
+            if steps > 0:
+                held = np.full(steps, before.voltage[-1])
+                period = (record.start_time - end) / steps
+                yield None, Record(held, held, period, "hold", start_time=end, continues=True)
+        yield index, record
+        before = record
