@@ -37,6 +37,7 @@ DRIVER: tuple[Row, ...] = (
         "hold_timeout", "T_h", "s", 0.0, 0.0, 1e6, "a held voltage then gives way to the safe one; 0: never", _SOURCE
     ),
     Parameter("command_max_age", "T_c", "s", 2.0, 0.0, 1e6, "oldest command that is played", _SOURCE),
+    Parameter("claim_timeout", "T_o", "s", 10.0, 0.5, 600.0, "an owner unheard for longer has lost its claim", _SOURCE),
     Parameter("real_time_factor", "κ", "1", 1.0, 0.01, 1000.0, "speed of a simulated stage; 1: real time", _SOURCE),
     Parameter("discovery_time", "T_d", "s", 0.5, 0.0, 30.0, "wait for another driver of the same topics", _SOURCE),
 )
@@ -70,6 +71,7 @@ class DriverSettings:
     ramp_rate: float
     hold_timeout: float
     command_max_age: float
+    claim_timeout: float
     real_time_factor: float
     discovery_time: float
 

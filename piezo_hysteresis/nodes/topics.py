@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -90,6 +90,8 @@ TOPICS: dict[str, Topic] = {
         Topic("phase", String, LATCHED, "", "at every change", "driver"),
         Topic("command", PointCloud2, COMMAND, "V", "", ANYONE, senders=("identification",), readers=("driver",)),
         Topic("set_voltage", Float64, COMMAND, "V", "", ANYONE, readers=("driver",)),
+        Topic("claim", KeyValue, COMMAND, "", "", ANYONE, senders=("identification",), readers=("driver",)),
+        Topic("claimed_by", String, LATCHED, "", "at every change", "driver", readers=("identification",)),
         Topic("command_status", DiagnosticStatus, COMMAND_STATUS, "", "at every event", "driver"),
         Topic("predicted_samples", PointCloud2, SAMPLES, "m, s", "as `samples`", "model"),
         Topic("prediction", Float64, COMMAND, "m", "`live_rate`", "model"),

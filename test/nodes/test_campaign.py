@@ -28,14 +28,15 @@ def stage(monkeypatch):
     return stage
 
 
-def begun(lab, voltage, before=lambda link: None):
+def begun(lab, voltage, before=lambda link: None, phases=1):
     """The campaign of one phase with a driver, as a function that calls `before`, carries it on and returns its end."""
     node = lab.add(DriverNode, discovery_time=0.0)
     lab.do(node.begin)
+    lab.driver_node = node
     link = lab.do(lambda: DriverClient(lab.node, "driver_node"))
     lab.wait(lambda: not link.missing, "the driver")
     phase, path = ProtocolPhase("long", voltage, PERIOD), lab.folder / "run"
-    job = campaign(lab.node, link, lambda limits: Protocol("long", limits, (phase,)), path)
+    job = campaign(lab.node, link, lambda limits: Protocol("long", limits, (phase,) * phases), path)
 
     def step():
         before(link)
@@ -77,3 +78,18 @@ def test_a_word_that_is_lost_is_not_waited_for_without_limit(lab, stage, monkeyp
     told = lab.wait(begun(lab, np.zeros(200), unheard), "the end of the campaign")
     assert "never told to be done" in str(told)
     assert {record.phase for record in read(lab.folder / "run")} == {"long"}
+
+
+def test_a_stage_that_was_moved_between_two_phases_ends_the_campaign(lab, stage, monkeypatch):
+    """By what no claim keeps out: the device itself."""
+    monkeypatch.setattr("piezo_hysteresis.nodes.identification.protocol_runner._SETTLING", 0.5)
+    moved = []
+
+    def push(link):
+        if link.state == "done" and not moved:
+            moved.append(True)
+            lab.driver_node._session.streaming.ramp_to(3.0)
+
+    told = lab.wait(begun(lab, np.zeros(200), push, phases=2), "the end of the campaign")
+    assert "begins at 0 V, and the stage is at" in str(told)
+    assert "moved by somebody else" in str(told)

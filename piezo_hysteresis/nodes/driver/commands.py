@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64
 
@@ -12,9 +11,11 @@ from ...acquisition.session import DriverSession
 from ...acquisition.stop_latch import StopLatch
 from ...errors import PiezoError, StageError, printable
 from ..messages.conversions import from_stamp, waveform_from_cloud
-from ..messages.phase_text import phase_name
+from ..messages.phase_text import phase_and_owner
+from ..runtime.guarded_node import GuardedNode
 from ..runtime.node_clock import now
 from ..topics import subscribe
+from .claims import DriverClaims
 from .diagnostics import DriverDiagnostics
 from .publishers import DriverTopics
 from .stop_services import StopServices
@@ -31,7 +32,7 @@ class DriverCommands:
 
     Parameters
     ----------
-    node : rclpy.node.Node
+    node : GuardedNode
         The driver.
     diagnostics : DriverDiagnostics
         Counts the refusals.
@@ -42,10 +43,12 @@ class DriverCommands:
     """
 
     def __init__(
-        self, node: Node, diagnostics: DriverDiagnostics, latch: StopLatch, tell_latch: Callable[[], None]
+        self, node: GuardedNode, diagnostics: DriverDiagnostics, latch: StopLatch, tell_latch: Callable[[], None]
     ) -> None:
         self._node, self._diagnostics, self._latch, self._tell_latch = node, diagnostics, latch, tell_latch
         self._attached: tuple[DriverSession, DriverTopics] | None = None
+        self._claim = diagnostics.claim
+        self._claims = DriverClaims(node, self._claim, lambda: self._stage()[0].streaming, self._refuse)
         subscribe(node, "command", self._on_command)
         subscribe(node, "set_voltage", self._on_set_voltage)
         self._services = StopServices(node, stop=self._stop, cancel=self._cancel, release=self._release)
@@ -53,6 +56,7 @@ class DriverCommands:
     def attach(self, session: DriverSession, topics: DriverTopics) -> None:
         """Pass commands to this stage from now on."""
         self._attached = (session, topics)
+        self._claim.timeout = session.settings.claim_timeout
 
     def detach(self) -> None:
         """Refuse every command from now on."""
@@ -70,10 +74,11 @@ class DriverCommands:
     def _on_command(self, cloud: PointCloud2) -> None:
         name, stamp = printable(cloud.header.frame_id[:_LONGEST_NAME]), 0
         try:
+            name, owner = phase_and_owner(cloud.header.frame_id)
             stamp = from_stamp(cloud.header.stamp)
             session, topics = self._stage()
             self._latch.require_released(name)
-            name = phase_name(cloud.header.frame_id)
+            self._claim.require(owner, name)
             voltage = waveform_from_cloud(cloud, session.sample_period)
             waveform = session.check.waveform(voltage, stamp, now(self._node))
             phase = session.streaming.play(waveform, name, stamp, session.check.first_step, topics.accepted)
@@ -86,6 +91,7 @@ class DriverCommands:
     def _on_set_voltage(self, message: Float64) -> None:
         try:
             session, _ = self._stage()
+            self._claim.require("", "set_voltage")
             session.streaming.ramp_to(session.check.set_point(message.data))
         except PiezoError as error:
             self._refuse("set_voltage", 0, error)

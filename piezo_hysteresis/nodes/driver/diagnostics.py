@@ -7,6 +7,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 
+from ...acquisition.claim import Claim
 from ...acquisition.stop_latch import StopLatch
 from ...acquisition.streaming import StreamingAcquisition
 from ..messages.conversions import diagnostic
@@ -24,6 +25,13 @@ class DriverDiagnostics:
         The driver; its full name stands before every status.
     latch : StopLatch
         Of the driver: whether it was stopped.
+
+    Attributes
+    ----------
+    refused : int
+        Commands that were refused so far.
+    claim : Claim
+        Who alone may move the stage.
     """
 
     def __init__(self, node: GuardedNode, latch: StopLatch) -> None:
@@ -35,6 +43,7 @@ class DriverDiagnostics:
         self._target = 0.0
         self._seen = (time.monotonic(), 0, 0.0, 0.0)
         self.refused = 0
+        self.claim = Claim(0.0)
         node.create_timer(1.0, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def state(self, level: bytes, message: str, stage: str = "") -> None:
@@ -54,6 +63,7 @@ class DriverDiagnostics:
             "refused_commands": self.refused,
             "faults": self._node.faults,
             "stopped": self._latch.is_set,
+            "claimed_by": self.claim.owner,
         }
         if self._latch.is_set and level == DiagnosticStatus.OK:
             level, message = DiagnosticStatus.WARN, f"stopped, {message}; nothing moves until ~/release"

@@ -38,12 +38,16 @@ class CommandSender:
         """Whether the node `driver` of this namespace takes what is sent; a recorder alone plays nothing."""
         return is_taken_by(driver, self._node, self._publisher)
 
-    def send(self, phase: ProtocolPhase, leaving: Callable[[Time], None], lost: Callable[[str], None]) -> None:
+    def send(
+        self, phase: ProtocolPhase, owner: str, leaving: Callable[[Time], None], lost: Callable[[str], None]
+    ) -> None:
         """Send a phase, stamped when it is packed and leaves: its age shall be that of its way.
 
         Parameters
         ----------
         phase : ProtocolPhase
+        owner : str
+            Holder of the claim on the stage; empty where nobody claims it.
         leaving : callable
             Called with the stamp before the message is published, in the thread.
         lost : callable
@@ -51,7 +55,9 @@ class CommandSender:
         """
         self.call_off()
         self._called_off.clear()
-        self._thread = threading.Thread(target=self._send, args=(phase, leaving, lost), name="command", daemon=True)
+        self._thread = threading.Thread(
+            target=self._send, args=(phase, owner, leaving, lost), name="command", daemon=True
+        )
         self._thread.start()
 
     def call_off(self) -> None:
@@ -62,9 +68,13 @@ class CommandSender:
             self._publisher.wait_for_all_acked(Duration(seconds=_LONGEST_WAY))
             self._thread = None
 
-    def _send(self, phase: ProtocolPhase, leaving: Callable[[Time], None], lost: Callable[[str], None]) -> None:
+    def _send(
+        self, phase: ProtocolPhase, owner: str, leaving: Callable[[Time], None], lost: Callable[[str], None]
+    ) -> None:
         try:
-            cloud = command_to_cloud(phase.voltage, phase.sample_period, phase.name)
+            cloud = command_to_cloud(
+                phase.voltage, phase.sample_period, f"{phase.name}@{owner}" if owner else phase.name
+            )
             if self._called_off.is_set():
                 return
             cloud.header.stamp = self._node.get_clock().now().to_msg()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from ...errors import PiezoError
@@ -16,7 +18,8 @@ from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import ProtocolPhase
 from ..messages.conversions import values_of
 from ..runtime.guarded_node import GuardedNode
-from ..topics import subscribe
+from ..runtime.sending import send
+from ..topics import advertise, subscribe
 from .command_sender import CommandSender
 
 _NAMES = ("sample_period", "voltage_min", "voltage_max", "safe_voltage", "max_slew_rate", "ramp_rate")
@@ -25,8 +28,14 @@ _NAMES = ("sample_period", "voltage_min", "voltage_max", "safe_voltage", "max_sl
 _POLL_INTERVAL = 0.5
 """Time between two questions to the driver [s]."""
 
+_CLAIM_INTERVAL = 0.5
+"""Time between repetitions of a claim [s]."""
+
 _SAFE_WITHIN = 5e-3
 """Distance from the safe voltage that counts as there [V]: converters round, measured voltages are noisy."""
+
+_PLACE_TOLERANCE = 0.01
+"""Distance from the beginning of a phase that is none, in spans of the drive."""
 
 
 class DriverClient:
@@ -49,13 +58,22 @@ class DriverClient:
         Index of its first sample, once it plays.
     stopped : str
         Why the driver takes no command; empty where it was not stopped.
+    voltages : int
+        Messages of 'voltage' so far.
+    owner : str
+        As whom this client claims the stage.
+    holder : str
+        Who holds the claim at present; empty where nobody does.
     """
 
     def __init__(self, node: GuardedNode, driver: str) -> None:
         self._node, self._driver = node, driver
         self.limits: DriveLimits | None = None
         self.state = self.reason = self.stopped = ""
-        self.first_index = 0
+        self.first_index = self.voltages = 0
+        self.owner, self.holder = f"{node.get_name()}.{os.getpid()}", ""
+        self._claims = advertise(node, "claim")
+        self._is_claiming = False
         self._sent: tuple[str, str] | None = None
         self._newest: float | None = None
         self._pending: Future | None = None
@@ -64,6 +82,8 @@ class DriverClient:
         self._command = CommandSender(node)
         subscribe(node, "command_status", self._on_status)
         subscribe(node, "voltage", self._on_voltage)
+        subscribe(node, "claimed_by", self._on_holder)
+        node.create_timer(_CLAIM_INTERVAL, self._repeat_claim, clock=Clock(clock_type=ClockType.STEADY_TIME))
         node.create_timer(_POLL_INTERVAL, self._poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
@@ -86,6 +106,38 @@ class DriverClient:
             and abs(self._newest - self.limits.safe_voltage) <= _SAFE_WITHIN
         )
 
+    @property
+    def owns(self) -> bool:
+        """True while this client holds the claim."""
+        return self.holder == self.owner
+
+    def misplaced(self, voltage: float) -> str:
+        """Why a phase cannot begin at `voltage` [V]; empty where the stage is there, or its voltage is unknown."""
+        if self.limits is None or self._newest is None:
+            return ""
+        near = max(_SAFE_WITHIN, _PLACE_TOLERANCE * (self.limits.voltage_max - self.limits.voltage_min))
+        if abs(self._newest - voltage) <= near:
+            return ""
+        return f"it begins at {voltage:.3g} V, and the stage is at {self._newest:.3g} V"
+
+    def claim(self) -> None:
+        """Ask for the stage, and repeat the claim until it is released."""
+        self._is_claiming = True
+        self._repeat_claim()
+
+    def release(self) -> None:
+        """Give the claim up; the driver brings the stage to its safe voltage where it is not there."""
+        if self._is_claiming:
+            self._is_claiming = False
+            send(self._claims, KeyValue(key=self.owner, value="release"))
+
+    def _repeat_claim(self) -> None:
+        if self._is_claiming:
+            send(self._claims, KeyValue(key=self.owner, value="claim"))
+
+    def _on_holder(self, message: String) -> None:
+        self.holder = message.data
+
     def send(self, phase: ProtocolPhase) -> None:
         """Send a phase as a command, without waiting until it has left."""
         self._sent, self.state, self.reason = None, "sending", ""
@@ -96,7 +148,7 @@ class DriverClient:
         def lost(reason: str) -> None:
             self.state, self.reason = "refused", reason
 
-        self._command.send(phase, leaving, lost)
+        self._command.send(phase, self.owner if self.owns else "", leaving, lost)
 
     def stop(self) -> Future | None:
         """Ask the driver to end what it plays and go to the safe voltage; None where there is no driver to ask.
@@ -133,6 +185,7 @@ class DriverClient:
 
     def _on_voltage(self, message: Float64) -> None:
         self._newest = float(message.data)
+        self.voltages += 1
 
     def _on_status(self, status: DiagnosticStatus) -> None:
         values = values_of(status)

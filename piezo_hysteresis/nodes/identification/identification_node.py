@@ -168,13 +168,14 @@ class IdentificationNode(GuardedNode):
             return planned[0]
 
         self._status.experiment = str(path)
+        self._status.owner = self._driver.owner
         yield from campaign(self, self._driver, plan, path)
         save_decimation(path, {phase.name: phase.stored_every for phase in planned[0]})
         self._last = path
         yield from self._fit(identification, path)
 
     def _fit(self, job: Job, path: Path) -> Generator[Progress]:
-        self._status.experiment = str(path)
+        self._status.experiment, self._status.owner = str(path), ""
         model = self._served.model
         process = FitProcess(job, path, "" if model is None else dumps(model))
         try:

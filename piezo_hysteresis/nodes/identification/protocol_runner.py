@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...errors import PiezoError, RecordingError, StageError
+from ...errors import PiezoError, RecordingError, StageError, printable
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import Protocol, ProtocolPhase
 from ..runtime.guarded_node import GuardedNode
@@ -16,6 +16,12 @@ from .driver_client import DriverClient
 
 PATIENCE = 30.0
 """Longest wait for the driver, for an answer, and for samples [s]."""
+
+_SETTLING = 5.0
+"""Longest wait for the voltage at which a phase begins [s]."""
+
+_NEWER = 2
+"""Messages of 'voltage' after the end of a phase, of which the first may have been on its way before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +87,10 @@ def campaign(
             yield told
     except BaseException as error:  # that the iterator was closed, too
         driver.stop()
+        driver.release()
         _close_after(error, recorder)
         raise
+    driver.release()
     recorder.close()
 
 
@@ -101,6 +109,9 @@ def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol,
         lambda: not driver.missing and seen["samples"] > 0 and seen["phase"] > 0,
         lambda: driver.missing or "samples",
     )
+    driver.claim()
+    yield from _until(lambda: bool(driver.holder), lambda: "the claim on the stage")
+    _require_claim(driver)
     if not driver.is_safe:
         driver.stop()
         yield from _until(lambda: driver.is_safe, lambda: "the safe voltage")
@@ -109,6 +120,7 @@ def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol,
         told = Progress(
             "running", str(path), done / protocol.summary.duration, f"{number} of {len(protocol)} {phase.name}"
         )
+        yield from _reach(driver, phase, told)
         yield from _play(driver, recorder, phase, told)
         done += phase.duration
     # what is written lags behind the status while the computer is busy
@@ -124,6 +136,26 @@ def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Generat
         yield Progress("waiting", f"for {missing()}")
 
 
+def _require_claim(driver: DriverClient) -> None:
+    if driver.holder and not driver.owns:
+        raise StageError(f"the stage is claimed by {printable(driver.holder)}; wait until it is released")
+    if not driver.owns:
+        raise StageError("the claim on the stage has ended: this node stood still, or the driver was started again")
+
+
+def _reach(driver: DriverClient, phase: ProtocolPhase, told: Progress) -> Generator[Progress]:
+    """What is known of the voltage is a moment old: newer ones are waited for before a phase is sent."""
+    seen, deadline = driver.voltages, time.monotonic() + _SETTLING
+    while True:
+        reason = driver.misplaced(float(phase.voltage[0]))
+        if not reason and driver.voltages >= seen + _NEWER:
+            return
+        if time.monotonic() > deadline:
+            why = f"{reason}; the stage was moved by somebody else" if reason else "'voltage' is silent"
+            raise StageError(f"phase '{phase.name}': {why}")
+        yield told
+
+
 def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, told: Progress) -> Generator[Progress]:
     driver.send(phase)
     # a device that plays from its memory is silent meanwhile
@@ -137,6 +169,7 @@ def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, tol
             raise StageError(f"phase '{phase.name}': no answer on 'command_status' within {PATIENCE:g} s")
         if driver.limits is None:
             raise StageError(f"phase '{phase.name}': {driver.missing} is gone; /diagnostics and its log tell why")
+        _require_claim(driver)
         if recorder.silence > longest_silence:
             raise StageError(f"phase '{phase.name}': no samples for {longest_silence:g} s; is the driver alive?")
         if played is None and driver.state == "playing" and recorder.holds(driver.first_index + phase.voltage.size):

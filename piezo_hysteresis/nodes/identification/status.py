@@ -24,6 +24,8 @@ class IdentificationStatus:
     ----------
     experiment : str
         Path of the recording that is made or fitted.
+    owner : str
+        As whom the stage is claimed while it is driven.
     """
 
     def __init__(self, node: GuardedNode) -> None:
@@ -31,7 +33,7 @@ class IdentificationStatus:
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: identification"
         self._publisher = advertise(node, "status")
         self._diagnostics = advertise(node, DIAGNOSTICS)
-        self.experiment = ""
+        self.experiment = self.owner = ""
         self._shown: DiagnosticStatus | None = None
         self._show(DiagnosticStatus.OK, "idle", "nothing is under way")
         node.create_timer(1.0, self._repeat, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -69,6 +71,7 @@ class IdentificationStatus:
             phase=phase,
             percent=round(100 * fraction),
             experiment=self.experiment,
+            owner=self.owner,
         )
         if status != self._shown:
             self._shown = status

@@ -27,6 +27,18 @@ def phase_name(frame_id: str) -> str:
     return frame_id
 
 
+def phase_and_owner(frame_id: str) -> tuple[str, str]:
+    """Name and owner of a commanded phase, from ``"<name>@<owner>"``; the owner is empty where none is told.
+
+    Raises
+    ------
+    RecordError
+        As from `phase_name`.
+    """
+    name, _, owner = frame_id.partition("@")
+    return phase_name(name), owner
+
+
 def phase_from_text(text: str) -> tuple[int, str]:
     """Number and name of a message of `phase`, ``"<number> <name>"``.
 
