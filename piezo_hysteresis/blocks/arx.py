@@ -151,7 +151,7 @@ class ArxBlock(LinearBlock):
     def __init__(self, names: tuple[str, ...], a: Array, b: Array, delay: float) -> None:
         self.names, self.a, self.b = names, a, b
         self.gain = b.sum() / (1.0 + a.sum())
-        whole = int(delay)
+        whole = max(1, int(delay))  # below one sample the first interval of the taps is interpolated
         self.interpolation, slopes = lagrange(delay - whole)
         self.first = whole - 1
         exact = delay == whole

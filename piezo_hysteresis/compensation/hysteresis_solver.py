@@ -1,8 +1,8 @@
 """Kernels that find the v at which the hysteresis gives a wanted w, from the state before the sample.
 
-w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j play_j(v). The loop is stepped by the
-kernels that the model runs, so that the root is that of the model to rounding. The search is Newton's first step and
-then the secant, kept inside a bracket.
+w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j (p_j + b_j p_j²) with the plays p_j(v); c and b are the rows of
+one array. The loop is stepped by the kernels that the model runs, so that the root is that of the model to rounding.
+The search is Newton's first step and then the secant, kept inside a bracket.
 """
 
 from __future__ import annotations
@@ -44,10 +44,11 @@ def static_part(poly, v):
 
 @kernel
 def plays_end(c, radii, plays, v):
-    """Σ c_j play_j at v."""
+    """Σ c_j (p_j + b_j p_j²) at v."""
     total = 0.0
-    for j in range(c.size):
-        total += c[j] * max(v - radii[j], min(v + radii[j], plays[j]))
+    for j in range(radii.size):
+        p = max(v - radii[j], min(v + radii[j], plays[j]))
+        total += c[0, j] * (p + c[1, j] * p * p)
     return total
 
 
@@ -55,7 +56,7 @@ def plays_end(c, radii, plays, v):
 def output(kind, p, periods, poly, c, radii, h, last, plays, v):
     """w at v."""
     w = static_part(poly, v) + loop_end(kind, p, periods, h, last, v)
-    if c.size:
+    if radii.size:
         w += plays_end(c, radii, plays, v)
     return w
 
@@ -67,9 +68,9 @@ def slope_at(kind, p, poly, c, radii, h, last, plays, s):
     slope = (3.0 * poly[P1] * v + 2.0 * poly[SQUARE]) * v + poly[P2] + 4.0 * poly[FOURTH] * v * v * v
     if kind != NO_LOOP:
         slope += p[A] - (p[BETA] * s + p[GAMMA] * copysign(1.0, h)) * h
-    for j in range(c.size):
+    for j in range(radii.size):
         if s * (v - plays[j]) >= radii[j] * (1.0 - 1e-9):
-            slope += c[j]
+            slope += c[0, j] * (1.0 + 2.0 * c[1, j] * plays[j])
     return slope
 
 

@@ -18,6 +18,7 @@ from ..effects.drive.backlash import BacklashBlock
 from ..effects.hysteresis.bouc_wen import BoucWenBlock
 from ..effects.hysteresis.even_input_polynomial import EvenInputPolynomialBlock
 from ..effects.hysteresis.hysteresis_memory import HysteresisMemoryBlock
+from ..effects.hysteresis.level_dependent_memory import LevelDependentMemoryBlock
 from ..effects.hysteresis.published_bouc_wen import PublishedBlock
 from ..effects.material.creep_exponential import CreepExponentialBlock
 from ..errors import ModelError
@@ -38,12 +39,16 @@ KINDS = (
     BoucWenBlock,
     PublishedBlock,
     HysteresisMemoryBlock,
+    LevelDependentMemoryBlock,
     EvenInputPolynomialBlock,
     RelaxationBlock,
     CreepExponentialBlock,
     SumBlock,
 )
 """Blocks that the recursion knows; a low-pass is one of them before the hysteresis only."""
+
+LOOPS = (BoucWenBlock, PublishedBlock, HysteresisMemoryBlock, LevelDependentMemoryBlock)
+"""Blocks with a static part of their own."""
 
 FARTHEST = 1e3
 """Normalised drive beyond which no root is sought."""
@@ -70,7 +75,7 @@ class NonlinearPart:
     def __init__(self, blocks: Sequence[Block], limits: Limits, sample_period: float) -> None:
         self.blocks = [m for b in blocks for m in (b.members if isinstance(b, SumBlock) else (b,))]
         self.kind, self.loop, self.periods = solver.NO_LOOP, np.zeros(8), np.full(2, sample_period)
-        self.poly, self.weights, self.radii = np.zeros(4), np.zeros(0), np.zeros(0)
+        self.poly, self.weights, self.radii = np.zeros(4), np.zeros((2, 0)), np.zeros(0)
         self.drive = np.zeros(15)
         self.drive[[r.PER_VOLT, r.LEAD]] = 1.0
         self.drive[[r.LOWER, r.UPPER, r.REACH]] = -np.inf, np.inf, np.inf
@@ -79,7 +84,7 @@ class NonlinearPart:
         banks: list[tuple[float, Array, Array, Array]] = []
         for block in self.blocks:
             self._take(block, banks)
-        if not any(isinstance(b, BoucWenBlock | PublishedBlock | HysteresisMemoryBlock) for b in self.blocks):
+        if not any(isinstance(b, LOOPS) for b in self.blocks):
             self.poly[solver.P2] += 1.0 if not any(isinstance(b, EvenInputPolynomialBlock) for b in self.blocks) else 0
         self._bracket()
         self.bank = self._bank(banks)
@@ -104,7 +109,9 @@ class NonlinearPart:
             self.kind, self.loop = solver.PUBLISHED, np.append(block.p[:4], np.zeros(4))
             self.poly[[solver.P1, solver.P2]] = block.p[4:]
         elif isinstance(block, HysteresisMemoryBlock):
-            self.weights, self.radii = block.c, block.radii
+            self.weights, self.radii = np.vstack((block.c, np.zeros(block.c.size))), block.radii
+        elif isinstance(block, LevelDependentMemoryBlock):
+            self.weights, self.radii = np.vstack((block.c, block.bends)), block.radii
         elif isinstance(block, EvenInputPolynomialBlock):
             self.poly[[solver.SQUARE, solver.FOURTH]] = block.p_e, block.p_4
         elif isinstance(block, RelaxationBlock):
@@ -116,7 +123,8 @@ class NonlinearPart:
     def _bracket(self) -> None:
         """Where roots are sought: between the turning points of the static curve, inside the limits."""
         p1, p2, square, fourth = self.poly
-        slope = np.array([p2 + self.weights.sum(), 2.0 * square, 3.0 * p1, 4.0 * fourth])
+        c, bends = self.weights
+        slope = np.array([p2 + c.sum(), 2.0 * (square + c @ bends), 3.0 * p1, 4.0 * fourth])
         if slope[0] == 0.0:
             raise ModelError("hysteresis: the static curve has no slope at 0 V; expected p2 or plays")
         d = self.drive
@@ -155,7 +163,7 @@ class NonlinearPart:
                 state[r.HELD] = own[0]
             elif isinstance(block, BoucWenBlock | PublishedBlock):
                 state[r.H] = own[0]
-            elif isinstance(block, HysteresisMemoryBlock):
+            elif isinstance(block, HysteresisMemoryBlock | LevelDependentMemoryBlock):
                 plays = own.copy()
             elif isinstance(block, RelaxationBlock):
                 x0, z = own

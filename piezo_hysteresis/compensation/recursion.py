@@ -117,6 +117,6 @@ def invert(targets, kind, p, periods, poly, c, radii, d, bank, state, plays, las
             total = 0.0
             for j in range(radii.size):
                 plays[j] = max(v - radii[j], min(v + radii[j], plays[j]))
-                total += c[j] * plays[j]
+                total += c[0, j] * (plays[j] + c[1, j] * plays[j] * plays[j])
             state[W] += total
         relax_to(state[W], starts, direct, lead, weights, lasts, banks, ahead)

@@ -27,6 +27,7 @@ from .hysteresis.even_input_polynomial import EvenInputPolynomial
 from .hysteresis.hysteresis_exponent import HysteresisExponent
 from .hysteresis.hysteresis_memory import HysteresisMemory
 from .hysteresis.initial_state import InitialState
+from .hysteresis.level_dependent_memory import LevelDependentMemory
 from .hysteresis.operator import HysteresisOperator, Loop
 from .hysteresis.published_bouc_wen import PublishedBoucWen
 from .hysteresis.rate_dependent_hysteresis import RateDependentHysteresis
@@ -34,6 +35,7 @@ from .inversion import Inversion
 from .material.creep import Creep
 from .material.creep_exponential import CreepExponential
 from .material.creep_fractional import CreepFractional
+from .material.creep_two_rates import CreepTwoRates
 from .sensor.gain_drift import GainDrift
 from .sensor.offset import Offset
 from .sensor.sensor_bandwidth import SensorBandwidth
@@ -51,10 +53,12 @@ CHAIN: tuple[type[Effect], ...] = (
     RateDependentHysteresis,
     InitialState,
     HysteresisMemory,
+    LevelDependentMemory,
     EvenInputPolynomial,
     Creep,
     CreepExponential,
     CreepFractional,
+    CreepTwoRates,
     ExtraDelay,
     Arx,
     Softening,
@@ -80,7 +84,10 @@ OPERATORS: dict[str, type[HysteresisOperator]] = {e.name: e for e in CHAIN if is
 BASELINE: tuple[type[Effect], ...] = (BoucWen, PublishedBoucWen, Arx, Offset)
 """The published model: what the others are missing from."""
 
-CATALOGUE: tuple[type[Effect], ...] = tuple(e for e in CHAIN if e not in BASELINE)
+FINER_FORMS: tuple[type[Effect], ...] = (LevelDependentMemory, CreepTwoRates)
+"""Finer forms of effects that an identified model may hold; a search names the effect, not its form."""
+
+CATALOGUE: tuple[type[Effect], ...] = tuple(e for e in CHAIN if e not in (*BASELINE, *FINER_FORMS))
 """The effects that a Hammerstein-MBW model can lack."""
 
 BY_NAME: dict[str, type[Effect]] = {e.name: e for e in CHAIN}
@@ -105,6 +112,7 @@ __all__ = [
     "BY_NAME",
     "CATALOGUE",
     "CHAIN",
+    "FINER_FORMS",
     "HYSTERESIS",
     "OPERATORS",
     "AmplifierBandwidth",
@@ -118,6 +126,7 @@ __all__ = [
     "Creep",
     "CreepExponential",
     "CreepFractional",
+    "CreepTwoRates",
     "Effect",
     "EvenInputPolynomial",
     "ExtraDelay",
@@ -128,6 +137,7 @@ __all__ = [
     "HysteresisOperator",
     "InitialState",
     "Inversion",
+    "LevelDependentMemory",
     "Loop",
     "MainsHum",
     "Offset",

@@ -22,7 +22,8 @@ from .fit.normal_equations import Nuisance, residuals
 from .identification import Identification, PhaseError
 from .one_core import on_one_core
 from .records.conditioning_split import known_from_within
-from .records.leading_step import Blocks, steps_apart
+from .records.excitation_content import sensor_noise
+from .records.leading_step import steps_apart
 from .records.roles import HELD_OUT, Roles, roles_of
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.delay import Delay, identify_delay
@@ -32,6 +33,7 @@ from .steps.hysteresis_choice import choose_memory
 from .steps.linear_start import dynamics_of, hysteresis_signals
 from .steps.remaining_lag import lag_notices
 from .steps.three_steps import ThreeSteps, named, three_steps
+from .structure.structure_choice import choose_structure
 
 ADEQUATE = 3e-4
 """Share of the range below which a residual does not decide: no lab needs better."""
@@ -71,7 +73,8 @@ def identify(
     hysteresis : type of HysteresisOperator
         Which operator; `PublishedBoucWen` for data that Eq. (7) made.
     memory : bool
-        Take plays instead of the Bouc-Wen state where they predict better what was left out.
+        Take plays instead of the Bouc-Wen state where they predict better what was left out; without broadband records
+        choose all of the structure so, creep, square, level and mode included.
     held_out : collection of str
         Names of phases that are not fitted but judge the result.
     progress : callable, optional
@@ -125,7 +128,6 @@ def identify(
     dynamics: Dynamics | None = None
     table: tuple[OrderError, ...] = ()
     comparisons: tuple[InputComparison, ...] = ()
-    blocks: Blocks = (records, floors, roles.fitted)
     if roles.broadband:
         report("step 2: dynamics", 0.2)
         signals = hysteresis_signals(start, records, roles.broadband)
@@ -153,13 +155,19 @@ def identify(
         noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
         comparisons, more_notices = compare_inputs(joint.model, records, noise, samples, chosen)
         notices += more_notices
+    elif memory and start.hysteresis.memoryless() is not None:
+        quiet = [max(noise, ADEQUATE * reach) for noise in sensor_noise(records)]
+        choice = choose_structure(
+            start, records, quiet, roles.fitted, lambda word, part: report(word, 0.2 + 0.7 * part)
+        )
+        joint = choice.fit
+        notices += choice.notices
     else:
         report("joint fit", 0.3)
-        blocks = steps_apart(records, floors, roles.fitted)
-        joint = fit_lag(start, *blocks)
-    if memory:
+        joint = fit_lag(start, *steps_apart(records, floors, roles.fitted))
+    if memory and roles.broadband:
         report("memory", 0.9)
-        joint, more_notices = choose_memory(joint, *blocks, roles.loops if roles.broadband else blocks[2])
+        joint, more_notices = choose_memory(joint, records, floors, roles.fitted, roles.loops)
         notices += more_notices
     if not roles.broadband:
         notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted])

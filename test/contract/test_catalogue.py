@@ -5,7 +5,7 @@ from __future__ import annotations
 import runpy
 from pathlib import Path
 
-from piezo_hysteresis.effects import BASELINE, BY_NAME, CATALOGUE, CHAIN
+from piezo_hysteresis.effects import BASELINE, BY_NAME, CATALOGUE, CHAIN, FINER_FORMS
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -43,7 +43,7 @@ def test_names_and_families_are_the_published_ones() -> None:
 
 def test_every_effect_is_in_the_chain_once_and_in_order() -> None:
     assert len(BY_NAME) == len(CHAIN)
-    assert set(BASELINE) | set(CATALOGUE) == set(CHAIN)
+    assert set(BASELINE) | set(CATALOGUE) | set(FINER_FORMS) == set(CHAIN)
     places = [e.place for e in CHAIN]
     assert places == sorted(places)
 

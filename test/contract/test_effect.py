@@ -23,6 +23,7 @@ from piezo_hysteresis.effects import (
     BoucWen,
     Creep,
     Effect,
+    HysteresisMemory,
     Offset,
     PublishedBoucWen,
     Softening,
@@ -59,6 +60,8 @@ def model_with(*added: Effect) -> Model:
     base = [BoucWen(), Arx(a=[-1.2, 0.6], b=[0.3, 0.1], delay=2), Offset(y0=1e-7)]
     if any(isinstance(e, PublishedBoucWen) for e in added):
         base.pop(0)
+    if any(e.host == HysteresisMemory.name for e in added):
+        base.append(typical(HysteresisMemory))
     model = Model(tuple(base), PERIOD, voltage_scale=10.0, displacement_scale=1e-5)
     for effect in added:
         model = model.with_effect(effect)

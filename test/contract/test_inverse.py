@@ -55,6 +55,8 @@ def model_with(*added: Effect) -> Model:
     base: list[Effect] = [Arx(a=[-1.2, 0.6], b=[0.1, 0.3, 0.1], delay=2), Offset(y0=1e-7)]
     if not names & {PublishedBoucWen.name}:
         base.append(BoucWen())
+    if any(e.host == HysteresisMemory.name for e in added):
+        base.append(typical(HysteresisMemory))
     model = Model(tuple(e for e in base if e.name not in names), PERIOD, 10.0, 1e-5)
     for effect in added:
         model = model.with_effect(effect)

@@ -75,7 +75,7 @@ def test_a_slow_sine_is_the_decimated_fast_one() -> None:
     np.testing.assert_allclose(slow[100:], fast[100:], atol=1e-4 * arx.dc_gain)
 
 
-@pytest.mark.parametrize("values", [{"a": [-1.0]}, {"a": [0.0, 1.01]}, {"b": []}, {"delay": 0.5}])
+@pytest.mark.parametrize("values", [{"a": [-1.0]}, {"a": [0.0, 1.01]}, {"b": []}, {"delay": -0.5}])
 def test_an_unstable_or_empty_arx_is_refused(values: dict) -> None:
     with pytest.raises(ParameterError, match="arx"):
         Arx(**values)
@@ -169,3 +169,10 @@ def test_a_mode_that_is_there_twice_has_no_share_of_its_own() -> None:
     once = np.array([1.0, -1.0, 0.5])
     with pytest.raises(ModelError, match="twice"):
         share_of_mode(polynomial.polymul(once, once)[1:], np.ones(4), once[1:], once[1:], np.eye(4))
+
+
+def test_a_delay_below_one_sample_is_that_of_a_smooth_drive() -> None:
+    u = np.sin(2 * np.pi * np.arange(400) / 100)
+    block = Arx(b=[1.0], delay=0.3).block(Discretisation(1e-3, 1e-3))
+    y, _ = block.run(u, block.rest(0.0, 0.0))
+    assert np.abs(y - np.sin(2 * np.pi * (np.arange(400) - 0.3) / 100))[10:].max() < 1e-5

@@ -60,8 +60,8 @@ def settled_percent(model, experiment):
 def test_plays_foretell_other_amplitudes(identified, fitted, unseen):
     assert "hysteresis_memory" in identified.model
     assert identified.model["hysteresis_memory"].array("c").min() >= 0.0
-    assert settled_percent(identified.model, fitted) <= 0.38
-    assert errors(identified.model, unseen).percent <= 0.65
+    assert settled_percent(identified.model, fitted) <= 0.25
+    assert errors(identified.model, unseen).percent <= 0.6
 
 
 def test_the_bouc_wen_state_does_not(fitted, unseen, identified):
@@ -76,9 +76,8 @@ def test_delay_and_pole_come_from_the_first_moments(identified):
     assert -period / np.log(-arx.array("a")[0]) == pytest.approx(13e-3, abs=2e-3)
 
 
-def test_with_drift_the_fit_is_closer(fitted, unseen):
+def test_drift_beside_creep_does_no_harm(fitted, unseen):
     found = diagnose(fitted, effects=(ThermalDrift,))
-    assert "thermal_drift" in found.model
     assert settled_percent(found.model, fitted) <= 0.32
     assert errors(found.model, unseen).percent <= 0.65
 

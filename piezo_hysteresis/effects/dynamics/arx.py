@@ -29,7 +29,7 @@ class Arx(Effect):
     b : sequence of float
         b1 … b_nb of B(z) = b1 + b2 z⁻¹ + …, at least one.
     delay : float
-        d in samples, 1 or more; a fractional part is realised by third-order Lagrange interpolation.
+        d in samples, 0 or more; a fractional part is realised by third-order Lagrange interpolation.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class Arx(Effect):
     parameters = (
         Parameter("a", "a_i", "1", (), -1e3, 1e3, "denominator coefficients", "paper, Eq. (5)"),
         Parameter("b", "b_i", "1", (1.0,), -1e6, 1e6, "numerator coefficients", "paper, Eq. (5)"),
-        Parameter("delay", "d", "samples", 1.0, 1.0, LONGEST_DELAY, "dead time of the stage", "paper, Eq. (4)"),
+        Parameter("delay", "d", "samples", 1.0, 0.0, LONGEST_DELAY, "dead time of the stage", "paper, Eq. (4)"),
     )
 
     def check(self) -> None:

@@ -13,6 +13,7 @@ from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 from ..inversion import Inversion
+from .level_dependent_memory import LevelDependentMemoryBlock
 
 SPAN = 32.0
 """Largest radius over the smallest."""
@@ -73,6 +74,11 @@ class HysteresisMemory(Effect):
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         names = tuple(f"hysteresis_memory.c[{j}]" for j in range(self.array("c").size))
+        if terms:
+            by_bend = np.vstack((np.linspace(1.0, 0.0, self.radii.size), np.linspace(0.0, 1.0, self.radii.size)))
+            bends = np.array([terms[0]["k_narrow"], terms[0]["k_wide"]])
+            names += tuple(f"{terms[0].name}.{n}" for n in ("k_narrow", "k_wide"))
+            return LevelDependentMemoryBlock(names, self.array("c"), self.radii, self["virgin"], bends, by_bend)
         return HysteresisMemoryBlock(names, self.array("c"), self.radii, self["virgin"])
 
 

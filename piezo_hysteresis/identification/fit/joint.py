@@ -17,8 +17,6 @@ from ..steps.linear_start import dynamics_behind, dynamics_of, follower, with_dy
 from .fit import Fit, Progress, fit
 from .normal_equations import Nuisance, residuals
 
-FINER = 100
-"""Sample periods of a pure lag per sample of the record."""
 SLOWEST_POLE = 0.1
 """Longest time constant of G, as share of the longest record: slower ones are drift in disguise."""
 NEAR = 1e-7
@@ -48,7 +46,7 @@ def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fi
         for pole in (0.2, 0.8)
         for dead in (1.0, 2.0)
     ]
-    starts += [(Arx(a=(), b=(gain,), delay=lag * FINER), period / FINER, [delay]) for lag in (0.2, 1.0, 3.0)]
+    starts += [(Arx(a=(), b=(gain,), delay=lag), period, [delay]) for lag in (0.2, 1.0, 3.0)]
     fits = []
     for arx, at, free in starts:
         start = Model((model.hysteresis, arx), at, model.voltage_scale, model.displacement_scale)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,6 +129,20 @@ def noise_on_motion(values: Samples, order: int) -> float:
     """
     typical = np.median(np.abs(np.diff(values, order)))
     return float(GAUSSIAN * typical / np.sqrt(math.comb(2 * order, order)))
+
+
+def sensor_noise(records: Sequence[Record]) -> list[float]:
+    """Standard deviation of the sensor noise of every record [m], the least that any record at its period shows.
+
+    One sensor took them all: what a record shows beyond the quietest is motion, such as the ringing behind a step.
+    """
+    own = [min(noise_of(r), noise_on_motion(r.displacement, 3)) if r.size >= 8 else noise_of(r) for r in records]
+    least: list[float] = []
+    for record in records:
+        near = 1e-3 * record.sample_period
+        alike = zip(own, records, strict=True)
+        least.append(min(n for n, other in alike if abs(other.sample_period - record.sample_period) < near))
+    return least
 
 
 def excited_part(record: Record, window: int = 64) -> Record:

@@ -1,0 +1,138 @@
+"""Plays whose weights depend on the level: a term of the plays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...blocks.block import Array, Block, State
+from ...blocks.kernel import kernel
+from ...parameter import Parameter
+from ..effect import ChainPosition, Term
+from ..inversion import Inversion
+
+
+class LevelDependentMemory(Term):
+    """Weights of the plays that grow or shrink with the level at which each play stands.
+
+    Parameters
+    ----------
+    k_narrow, k_wide : float
+        Relative growth per unit of level of the narrowest and of the widest play [1]; linear in the number of the play
+        between them.
+
+    Notes
+    -----
+    A Preisach operator has, in its form of plays, one monotone function f_j for every play; this is the first bend of
+    it. Up to |k| = 0.5 and |p| = 1 every f_j is monotone, so that the operator can be inverted.
+    """
+
+    name = "level_dependent_memory"
+    family = "hysteresis"
+    place = ChainPosition.HYSTERESIS
+    host = "hysteresis_memory"
+    inversion = Inversion.EXACT
+    equation = "Σ_j c_j (p_j + k_j p_j²),  k_j from k_narrow to k_wide"
+    signature = "loops of one amplitude that are wider at one end of the range than at the other"
+    source = "Preisach operator in the form of plays, one function for each; its first bend"
+    parameters = (
+        Parameter("k_narrow", "k_1", "1", 0.0, -0.5, 0.5, "growth of the narrowest play", "Preisach", 0.0, 0.1),
+        Parameter("k_wide", "k_n", "1", 0.0, -0.5, 0.5, "growth of the widest play", "Preisach", 0.0, 0.1),
+    )
+
+
+@kernel
+def run_level_plays(v, c, bends, radii, plays, y):
+    """Σ c_j (p_j + b_j p_j²) to y (n,); plays (s,) is updated."""
+    for i in range(v.size):
+        total = 0.0
+        for j in range(radii.size):
+            p = max(v[i] - radii[j], min(v[i] + radii[j], plays[j]))
+            plays[j] = p
+            total += c[j] * (p + bends[j] * p * p)
+        y[i] = total
+
+
+@kernel
+def linearise_level_plays(v, dv, c, bends, by_bend, radii, plays, dplays, y, dy, own):
+    """`run_level_plays` with rows dv (m, n) to dy (m, n), own (s + k, n) by c and by the k numbers of the bends."""
+    s = radii.size
+    for i in range(v.size):
+        total = 0.0
+        for k in range(by_bend.shape[0]):
+            own[s + k, i] = 0.0
+        for r in range(dv.shape[0]):
+            dy[r, i] = 0.0
+        for j in range(s):
+            held, low, high = plays[j], v[i] - radii[j], v[i] + radii[j]
+            p = max(low, min(high, held))
+            plays[j] = p
+            if held <= low:
+                for r in range(dv.shape[0]):
+                    dplays[r, j] = dv[r, i] if held < low else max(dplays[r, j], dv[r, i])
+            elif held >= high:
+                for r in range(dv.shape[0]):
+                    dplays[r, j] = dv[r, i] if held > high else min(dplays[r, j], dv[r, i])
+            own[j, i] = p + bends[j] * p * p
+            total += c[j] * own[j, i]
+            for k in range(by_bend.shape[0]):
+                own[s + k, i] += c[j] * by_bend[k, j] * p * p
+            for r in range(dv.shape[0]):
+                dy[r, i] += c[j] * (1.0 + 2.0 * bends[j] * p) * dplays[r, j]
+        y[i] = total
+
+
+class LevelDependentMemoryBlock(Block):
+    """Σ c_j (p_j + b_j p_j²), b = numbers @ by_bend; state p (s,).
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the weights, then of the k numbers.
+    c, radii : (s,) ndarray
+        Weights and half widths of the plays.
+    virgin : float
+        0 where a stage at rest has centred plays, 1 where each is as the way from 0 V has left it.
+    numbers : (k,) ndarray
+        Numbers of the bends.
+    by_bend : (k, s) ndarray
+        Share of each number in the bend of each play.
+    """
+
+    keeps_state = True
+
+    def __init__(
+        self, names: tuple[str, ...], c: Array, radii: Array, virgin: float, numbers: Array, by_bend: Array
+    ) -> None:
+        self.names, self.c, self.radii, self.virgin = names, c, radii, virgin
+        self.by_bend, self.bends = by_bend, numbers @ by_bend
+
+    def static(self, x0: float) -> float:
+        p = self.rest(x0, 0.0)
+        return float(self.c @ (p + self.bends * p * p))
+
+    def static_slopes(self, x0: float) -> tuple[float, Array]:
+        p = self.rest(x0, 0.0)
+        slope = float(self.c @ ((1.0 + 2.0 * self.bends * p) * self._rest_slopes(x0)))
+        return slope, np.concatenate((p + self.bends * p * p, self.by_bend @ (self.c * p * p)))
+
+    def rest(self, x0: float, time: float) -> State:
+        return x0 - self.virgin * np.clip(x0, -self.radii, self.radii)
+
+    def _rest_slopes(self, x0: float) -> Array:
+        return np.asarray(1.0 - self.virgin * (abs(x0) < self.radii))
+
+    def run(self, x: Array, state: State) -> tuple[Array, State]:
+        y, state = np.empty_like(x), state.copy()
+        run_level_plays(x, self.c, self.bends, self.radii, state, y)
+        return y, state
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return np.outer(dx0, self._rest_slopes(x0))
+
+    def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
+        rows = np.empty((len(dx) + len(self.names), x.size))
+        mapped, own = rows[: len(dx)], rows[len(dx) :]
+        incoming = np.ascontiguousarray(dx)
+        linearise_level_plays(x, incoming, self.c, self.bends, self.by_bend, self.radii, state, tangent, y, mapped, own)
+        return y, rows, state, tangent

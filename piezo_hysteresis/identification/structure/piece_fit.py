@@ -1,0 +1,201 @@
+"""A joint fit to pieces of records: one sensor zero per record, whatever the number of its pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects import Arx
+from ...errors import DivergenceError, ParameterError
+from ...model.model import Model
+from ..fit.bounded_step import bounded_step
+from ..fit.fit import gauge
+from ..fit.normal_equations import grams
+from .pieces import WEIGHTS, RecordPiece
+
+Array = NDArray[np.float64]
+
+STIFF = 1e-9
+"""Share of the diagonal that keeps undetermined directions where they are."""
+FARTHEST = 1e10
+"""Damping beyond which no step helps."""
+LARGEST_POLE = 0.999
+"""Radius of the pole of a lag, at most."""
+POLE, GAIN, DELAY = (f"{Arx.name}.{n}" for n in ("a[0]", "b[0]", "delay"))
+"""Numbers of a lag."""
+PERFECT = 1e-9
+"""Cost of data without noise from a model of the same form: nothing is left to fit."""
+CONVERGED = 1e-4
+"""Relative decrease of the cost at which the fit ends."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PieceFit:
+    """A model fitted to pieces, and the inner products there.
+
+    Parameters
+    ----------
+    model : Model
+        With the fitted values.
+    names : tuple of str
+        Free numbers.
+    matrices : (p, q + r + 1, q + r + 1) ndarray
+        Of every piece, over its samples and its floor squared: sensitivities of the q numbers, the zeros of the r
+        records, and the residual.
+    weights : (p,) ndarray
+        Of the pieces; their sum is 1.
+    cost : float
+        Weighted mean of R², zeros free.
+    converged : bool
+        False where the limit of iterations came first.
+    iterations : int
+        Linearisations.
+    """
+
+    model: Model
+    names: tuple[str, ...]
+    matrices: Array
+    weights: Array
+    cost: float
+    converged: bool
+    iterations: int
+
+    @property
+    def total(self) -> Array:
+        """Weighted sum of the matrices."""
+        return np.asarray(np.tensordot(self.weights, self.matrices, 1))
+
+    @property
+    def zeros(self) -> Array:
+        """Zeros of the records at their best [m], shape (r,)."""
+        total, numbers = self.total, len(self.names)
+        matrix, cross = total[numbers:-1, numbers:-1], total[numbers:-1, -1]
+        return np.asarray(np.linalg.lstsq(matrix, cross, rcond=None)[0])
+
+    @property
+    def squares(self) -> Array:
+        """R² of every piece, shape (p,)."""
+        zeros, own = self.zeros, slice(len(self.names), -1)
+        return np.array([m[-1, -1] - 2.0 * zeros @ m[own, -1] + zeros @ m[own, own] @ zeros for m in self.matrices])
+
+    def box(self) -> tuple[Array, Array]:
+        """How far every number may move, down and up; zeros without end."""
+        values = self.model.values()
+        rows = [self.model.row(n) for n in self.names]
+        now = np.array([values[n] for n in self.names])
+        zeros = np.full(self.matrices.shape[1] - 1 - now.size, np.inf)
+        ends = [(r.lower, r.upper) for r in rows]
+        if POLE in self.names:
+            ends[self.names.index(POLE)] = (-LARGEST_POLE, 0.0)
+        low, high = np.array(ends).T - now
+        return np.concatenate((low, -zeros)), np.concatenate((high, zeros))
+
+
+def linearised(
+    model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float], names: Sequence[str]
+) -> tuple[Array, Array]:
+    """Matrices and weights of the pieces that count, as in `PieceFit`."""
+    origins = sorted({p.origin for p in pieces if WEIGHTS[p.kind] > 0.0})
+    zeros = [np.array([np.full(p.record.size, float(p.origin == o)) for o in origins]) for p in pieces]
+    found = grams(model, [p.record for p in pieces], names, None, zeros)
+    counted = [i for i, p in enumerate(pieces) if WEIGHTS[p.kind] > 0.0]
+    weights = np.array([WEIGHTS[pieces[i].kind] for i in counted])
+    for origin in origins:
+        mine = np.array([pieces[i].origin == origin for i in counted])
+        weights[mine] /= weights[mine].sum()
+    matrices = np.array([found[i].matrix / (found[i].size * floors[pieces[i].origin] ** 2) for i in counted])
+    return matrices, weights / weights.sum()
+
+
+def cost_of(total: Array, numbers: int) -> float:
+    """Weighted mean of R² with the zeros at their best."""
+    zeros, cross = total[numbers:-1, numbers:-1], total[numbers:-1, -1]
+    return float(total[-1, -1] - cross @ np.linalg.lstsq(zeros, cross, rcond=None)[0])
+
+
+def fit_pieces(
+    model: Model,
+    pieces: Sequence[RecordPiece],
+    floors: Sequence[float],
+    names: Sequence[str],
+    max_iterations: int = 25,
+    damping: float = 1e-6,
+) -> PieceFit:
+    """Fit the numbers `names` by damped Gauss-Newton inside the bounds of their table.
+
+    Parameters
+    ----------
+    model : Model
+        Start.
+    pieces : sequence of RecordPiece
+        In order.
+    floors : sequence of float
+        Floor of every record [m].
+    names : sequence of str
+        Free numbers.
+    max_iterations : int
+        Linearisations at most.
+    damping : float
+        Of the first step, share of the diagonal.
+    """
+    names = tuple(names)
+    matrices, weights = linearised(model, pieces, floors, names)
+    now = PieceFit(model, names, matrices, weights, np.inf, False, 1)
+    now = PieceFit(model, names, matrices, weights, cost_of(now.total, len(names)), False, 1)
+    while now.iterations < max_iterations and now.cost > PERFECT:
+        better = None
+        while better is None and damping < FARTHEST:
+            better = _step(now, pieces, floors, damping)
+            damping = max(damping * (10.0 if better is None else 0.1), 1e-9)
+        if better is None:
+            break
+        gain = 1.0 - better.cost / now.cost
+        now = better
+        if gain < CONVERGED and damping <= 1.0:
+            break
+    converged = now.iterations < max_iterations
+    return PieceFit(now.model, names, now.matrices, now.weights, now.cost, converged, now.iterations)
+
+
+def _step(now: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float], damping: float) -> PieceFit | None:
+    total, names = now.total, now.names
+    step = best_step(now, total, damping)
+    values = now.model.values()
+    try:
+        moved = {n: values[n] + d for n, d in zip(names, step.tolist(), strict=False)}
+        rows = {n: now.model.row(n) for n in names}
+        model = now.model.with_values({n: min(max(v, rows[n].lower), rows[n].upper) for n, v in moved.items()})
+        matrices, weights = linearised(model, pieces, floors, names)
+    except (DivergenceError, ParameterError):
+        return None
+    cost = cost_of(np.tensordot(weights, matrices, 1), len(names))
+    if not cost < now.cost:
+        return None
+    return PieceFit(model, names, matrices, weights, cost, False, now.iterations + 1)
+
+
+def best_step(now: PieceFit, total: Array, damping: float = 0.0) -> Array:
+    """Change of numbers and zeros that `total`, some sum of the matrices, asks for."""
+    directions = free_directions(now)
+    hessian = directions.T @ total[:-1, :-1] @ directions
+    diagonal = np.maximum(np.diag(hessian), 1e-30)
+    hessian = hessian + np.diag((damping + STIFF) * diagonal)
+    low, high = now.box()
+    single = (directions != 0.0).sum(axis=0) == 1
+    rows = directions.argmax(axis=0)
+    low, high = np.where(single, low[rows], -np.inf), np.where(single, high[rows], np.inf)
+    slope = directions.T @ total[:-1, -1]
+    return np.asarray(directions @ bounded_step(hessian, slope, low - 1e-300, high + 1e-300))
+
+
+def free_directions(now: PieceFit) -> Array:
+    """Directions (q + r, d) in which numbers and zeros may move, G(1) held."""
+    own = gauge(now.model, now.names)
+    zeros = now.matrices.shape[1] - 1 - len(now.names)
+    whole = np.zeros((own.shape[0] + zeros, own.shape[1] + zeros))
+    whole[: own.shape[0], : own.shape[1]] = own
+    whole[own.shape[0] :, own.shape[1] :] = np.eye(zeros)
+    return whole

@@ -1,0 +1,176 @@
+"""`RecordPiece`: a part of a record with one rate and one amplitude of the drive, or the step or the hold before it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.kernel import kernel
+from ...record import Record, Samples
+from ..records.leading_step import step_length
+
+SWING = 0.005
+"""Share of the range of the drive that a turn must go back, so that noise is none."""
+PER_DECADE = 2
+"""Classes of the rate per decade."""
+AMPLITUDES = 3
+"""Classes of the amplitude, equal shares of the largest."""
+FEWEST = 32
+"""Samples of a piece at least."""
+MOST = 24
+"""Pieces of a record from which its drive has no rates of its own, and equal pieces are cut."""
+EQUAL = 5
+"""Equal pieces."""
+JUMP = 0.02
+"""Share of the range of the drive that a first sample must be off its settled level, to be a step."""
+STILL = 1e-3
+"""Share of the range within which a drive holds."""
+RINGS = 0.05
+"""Longest time that counts as the first moments behind a step [s], and at most a quarter of its hold."""
+
+
+class Kind(StrEnum):
+    """What the drive does in a piece."""
+
+    STEP = "step"
+    HOLD = "hold"
+    LOOP = "loop"
+    CARRYING = "carrying"
+
+
+WEIGHTS = {Kind.STEP: 0.1, Kind.HOLD: 0.5, Kind.LOOP: 1.0, Kind.CARRYING: 0.0}
+"""Weight in a fit: a mode that rings must not drown the creep behind it, nor one level the loops."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RecordPiece:
+    """A part of a record.
+
+    Parameters
+    ----------
+    record : Record
+        Its samples; continues the piece before it.
+    origin : int
+        Index of the record that it was cut from.
+    kind : Kind
+        What the drive does.
+    rate : int
+        Class of the rate, of loops.
+    amplitude : int
+        Class of the amplitude, of loops.
+    """
+
+    record: Record
+    origin: int
+    kind: Kind
+    rate: int = 0
+    amplitude: int = 0
+
+
+def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[RecordPiece]:
+    """Every record cut in pieces; those not in `fitted` only carry the state of the stage.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        In order.
+    fitted : collection of int
+        Indices of the records to cut.
+    """
+    largest = max(float(np.ptp(np.append(records[i].voltage, records[i].settled_voltage))) for i in fitted)
+    found: list[RecordPiece] = []
+    for index, record in enumerate(records):
+        if index in fitted:
+            found += _cut(record, index, largest)
+        else:
+            found.append(RecordPiece(record, index, Kind.CARRYING))
+    return found
+
+
+def _cut(record: Record, index: int, largest: float) -> list[RecordPiece]:
+    u = record.voltage
+    stop, opening = 0, []
+    if not record.continues and abs(u[0] - record.settled_voltage) > JUMP * largest:
+        moving = np.flatnonzero(np.abs(u - u[0]) > STILL * largest)
+        stop = int(moving[0]) if moving.size else u.size
+        first = min(stop // 4, max(FEWEST, round(RINGS / record.sample_period)))
+        if first >= FEWEST:
+            opening = [(first, Kind.STEP, 0, 0), (stop, Kind.HOLD, 0, 0)]
+        elif length := step_length(record):
+            stop, opening = length, [(length, Kind.STEP, 0, 0)]
+        else:
+            stop = 0
+    edges = opening + [(stop + end, Kind.LOOP, rate, size) for end, rate, size in _loops(record, u[stop:], largest)]
+    parts = record.split(*(end for end, *_ in edges[:-1]))
+    parts = (parts[0], *(replace(part, initial_voltage=None) for part in parts[1:]))
+    return [
+        RecordPiece(part, index, kind, rate, size) for part, (_, kind, rate, size) in zip(parts, edges, strict=True)
+    ]
+
+
+def _loops(record: Record, u: Samples, largest: float) -> list[tuple[int, int, int]]:
+    """Ends of the stretches of one rate and one amplitude, with the classes of both."""
+    if not u.size:
+        return []
+    turns = np.empty(u.size, np.int64)
+    count = find_turns(u, SWING * largest, turns)
+    edges = np.concatenate((turns[:count], [u.size - 1]))
+    starts = np.concatenate(([0], edges[:-1]))
+    times = np.maximum(edges - starts, 1) * record.sample_period
+    spans = np.abs(u[edges] - u[starts])
+    rates = np.round(PER_DECADE * np.log10(0.5 / times)).astype(int)
+    # one swing more or less is not another rate
+    rates = np.array([int(np.median(rates[max(0, k - 1) : k + 2])) for k in range(rates.size)])
+    sizes = np.minimum((AMPLITUDES * spans / largest).astype(int), AMPLITUDES - 1)
+    found: list[tuple[int, int, int]] = []
+    for end, rate, size in zip((edges + 1).tolist(), rates.tolist(), sizes.tolist(), strict=True):
+        before = found[-2][0] if len(found) > 1 else 0
+        if found and (found[-1][1:] == (rate, size) or found[-1][0] - before < FEWEST):
+            found[-1] = (end, rate, size)
+        else:
+            found.append((end, rate, size))
+    if len(found) > 1 and found[-1][0] - found[-2][0] < FEWEST:
+        end = found.pop()[0]
+        found[-1] = (end, *found[-1][1:])
+    if len(found) > MOST:
+        found = [(u.size, int(np.median(rates)), 0)]
+    return _with_parts(found)
+
+
+def _with_parts(found: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+    """A stretch longer than all others together in equal parts."""
+    parts, begin = list[tuple[int, int, int]](), 0
+    for end, rate, size in found:
+        count = EQUAL if end - begin > found[-1][0] / 2 and end - begin >= EQUAL * FEWEST else 1
+        parts += [(begin + (k + 1) * (end - begin) // count, rate, size) for k in range(count)]
+        begin = end
+    return parts
+
+
+@kernel
+def find_turns(u: Samples, least: float, turns: NDArray[np.int64]) -> int:
+    """Indices at which u (n,) turns back by more than `least`, to turns (n,); their number."""
+    count = 0
+    low, high, at_low, at_high, direction = u[0], u[0], 0, 0, 0
+    for i in range(u.size):
+        if u[i] > high:
+            high, at_high = u[i], i
+        if u[i] < low:
+            low, at_low = u[i], i
+        if direction >= 0 and high - u[i] > least:
+            if direction > 0:
+                turns[count] = at_high
+                count += 1
+            direction, low, at_low = -1, u[i], i
+            high, at_high = u[i], i
+        elif direction <= 0 and u[i] - low > least:
+            if direction < 0:
+                turns[count] = at_low
+                count += 1
+            direction, high, at_high = 1, u[i], i
+            low, at_low = u[i], i
+    return count

@@ -1,0 +1,200 @@
+"""Structures of a model, judged on rates, amplitudes and records that were left out, from inner products alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects import Creep, CreepTwoRates, EvenInputPolynomial, LevelDependentMemory
+from ..fit.bounded_step import bounded_step
+from ..steps.linear_start import dynamics_of
+from .piece_fit import GAIN, POLE, STIFF, PieceFit
+from .pieces import WEIGHTS, Kind, RecordPiece
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MOST_LEFT_OUT = 0.75
+"""Share of the experiment that a fold may leave out, every record counting the same."""
+FEWEST = 3
+"""Folds below which every piece is one more."""
+FAST, SLOW = f"{CreepTwoRates.name}.gamma_fast", f"{CreepTwoRates.name}.gamma_slow"
+
+
+@dataclass(frozen=True, slots=True)
+class ModelStructure:
+    """Which of the optional effects a model holds.
+
+    Parameters
+    ----------
+    square : bool
+        The even term of the drive.
+    creep_rates : int
+        Numbers of the creep: 0, 1 (logarithmic) or 2.
+    level : bool
+        Weights of the plays that depend on the level.
+    """
+
+    square: bool
+    creep_rates: int
+    level: bool
+
+    @property
+    def size(self) -> int:
+        """Number of numbers."""
+        return int(self.square) + self.creep_rates + 2 * int(self.level)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the optional effects."""
+        creep = ((), (Creep.name,), (CreepTwoRates.name,))[self.creep_rates]
+        square = (EvenInputPolynomial.name,) if self.square else ()
+        return (*square, *creep, *((LevelDependentMemory.name,) if self.level else ()))
+
+    def is_held(self, name: str) -> bool:
+        """Whether the number `name` is off in this structure."""
+        owner = name.partition(".")[0]
+        return (
+            (owner == EvenInputPolynomial.name and not self.square)
+            or (owner == LevelDependentMemory.name and not self.level)
+            or (owner == CreepTwoRates.name and self.creep_rates == 0)
+        )
+
+
+STRUCTURES = tuple(
+    ModelStructure(square, rates, level) for square in (False, True) for rates in (0, 1, 2) for level in (False, True)
+)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Judged:
+    """How well a structure predicts what was left out.
+
+    Parameters
+    ----------
+    structure : ModelStructure
+        Its effects.
+    score : float
+        Mean over the folds of ln max(1, R²).
+    step : (q,) ndarray
+        Change of the numbers that all pieces ask for.
+    without : (k, q) ndarray
+        The same with each fold left out.
+    """
+
+    structure: ModelStructure
+    score: float
+    step: Array
+    without: Array
+
+
+def folds_of(pieces: Sequence[RecordPiece]) -> list[Mask]:
+    """Sets of the pieces that count to leave out, as masks: every rate, every amplitude, every record.
+
+    Where these are few, every piece. Nothing is left out beside which little remains.
+    """
+    counted = [p for p in pieces if WEIGHTS[p.kind] > 0.0]
+    loops = np.array([p.kind is Kind.LOOP for p in counted])
+    labels = (
+        np.array([p.rate for p in counted]),
+        np.array([p.amplitude for p in counted]),
+        np.array([p.origin for p in counted]),
+    )
+    sizes = np.array([p.record.size for p in counted], dtype=np.float64)
+    totals = {o: sizes[labels[2] == o].sum() for o in np.unique(labels[2])}
+    shares = sizes / np.array([totals[o] for o in labels[2]]) / len(totals)
+    found: list[Mask] = []
+    for which, label in enumerate(labels):
+        values = np.unique(label[loops])
+        if values.size > 1:
+            found += [(label == v) & (loops | (which == 2)) for v in values]
+    found = [mask for mask in found if shares[mask].sum() <= MOST_LEFT_OUT]
+    if len(found) < FEWEST:
+        found += [np.arange(loops.size) == k for k in np.flatnonzero(loops)]
+    unique = {mask.tobytes(): mask for mask in found if not mask.all()}
+    return list(unique.values())
+
+
+def judge(full: PieceFit, pieces: Sequence[RecordPiece], structures: Sequence[ModelStructure]) -> Iterator[Judged]:
+    """Every structure inside the fitted full one, with the bounds of its numbers kept.
+
+    Parameters
+    ----------
+    full : PieceFit
+        Of a model that holds all optional effects.
+    pieces : sequence of RecordPiece
+        Those of the fit.
+    structures : sequence of ModelStructure
+        To be judged.
+    """
+    folds = folds_of(pieces)
+    kinds = [p.kind for p in pieces if WEIGHTS[p.kind] > 0.0]
+    held = np.array([k is Kind.HOLD for k in kinds])
+    for structure in structures:
+        free, fixed, low, high = _space(full, structure)
+        whole = _solve(full.total, free, fixed, low, high)
+        logs, steps = [], []
+        if held.any():  # what a hold shows of creep no other piece does: it is not left out
+            logs.append(_logs(full, whole, held, False))
+        for mask in folds:
+            weights = np.where(mask, 0.0, full.weights)
+            if not weights.any():
+                continue
+            step = _solve(np.tensordot(weights, full.matrices, 1), free, fixed, low, high)
+            logs.append(_logs(full, step, mask, True))
+            steps.append(step[: len(full.names)])
+        numbers = len(full.names)
+        score = float(np.mean(logs)) if logs else float("nan")
+        yield Judged(structure, score, whole[:numbers], np.array(steps).reshape(len(steps), numbers))
+
+
+def _space(full: PieceFit, structure: ModelStructure) -> tuple[Array, Array, Array, Array]:
+    """Directions in which a structure is free, where it stands in those that are not, and the bounds."""
+    size = full.matrices.shape[1] - 1
+    values = full.model.values()
+    low, high = full.box()
+    fixed, kept = np.zeros(size), list(range(size))
+    free = np.eye(size)
+    for k, name in enumerate(full.names):
+        if structure.is_held(name):
+            fixed[k] = -values[name]
+            kept.remove(k)
+    if structure.creep_rates == 1 and FAST in full.names:
+        fast, slow = full.names.index(FAST), full.names.index(SLOW)
+        # both rates move together, from the fast one
+        free[slow, fast] = 1.0
+        fixed[slow] = values[FAST] - values[SLOW]
+        kept.remove(slow)
+    if GAIN in full.names and (lag := full.names.index(GAIN)) in kept:
+        free[lag, full.names.index(POLE)] = dynamics_of(full.model).dc_gain  # G(1) is held
+        kept.remove(lag)
+    return free[:, kept], fixed, low[kept], high[kept]
+
+
+def _solve(total: Array, free: Array, fixed: Array, low: Array, high: Array) -> Array:
+    hessian = free.T @ total[:-1, :-1] @ free
+    diagonal = np.maximum(np.diag(hessian), 1e-30)
+    slope = free.T @ (total[:-1, -1] - total[:-1, :-1] @ fixed)
+    step = bounded_step(hessian + np.diag(STIFF * diagonal), slope, low - 1e-300, high + 1e-300)
+    return np.asarray(fixed + free @ step)
+
+
+def _logs(full: PieceFit, step: Array, mask: Mask, zero_free: bool) -> float:
+    """Mean ln max(1, R²) of the pieces in `mask`; the zero of a record of which nothing was fitted is free."""
+    numbers, logs = len(full.names), []
+    zeros = np.arange(numbers, step.size)
+    rest = full.matrices[~mask].sum(axis=0) if not mask.all() else np.zeros_like(full.matrices[0])
+    step = step.copy()
+    for z in zeros:
+        mine = np.flatnonzero(mask & (full.matrices[:, z, z] > 0.0))
+        if zero_free and mine.size and rest[z, z] <= 0.0:
+            total = full.matrices[mine].sum(axis=0)
+            step[z] = 0.0
+            step[z] = (total[z, -1] - total[z, :-1] @ step) / total[z, z]
+    for matrix in full.matrices[mask]:
+        square = matrix[-1, -1] - 2.0 * step @ matrix[:-1, -1] + step @ matrix[:-1, :-1] @ step
+        logs.append(np.log(max(1.0, float(square))))
+    return float(np.mean(logs))

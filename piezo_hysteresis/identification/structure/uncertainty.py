@@ -1,0 +1,83 @@
+"""How sure the numbers of a chosen structure are: residual, folds left out, and structures that are still possible."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...effects import Creep
+from ...errors import IdentificationError
+from ..fit.fit import Fit
+from .piece_fit import Array, PieceFit, free_directions
+from .pieces import Kind, RecordPiece
+from .scores import FAST, Judged
+
+OPEN = 0.4
+"""Difference of scores within which a structure is still possible: what it would change is uncertainty."""
+
+
+def spread_of(full: PieceFit, final: PieceFit, chosen: Judged, judged: Sequence[Judged]) -> Array:
+    """Covariance of the chosen numbers from folds left out and from structures that are still possible."""
+    numbers = len(full.names)
+    own = chosen.without - chosen.step
+    count = len(own)
+    spread = own.T @ own * ((count - 1.0) / count) if count > 1 else np.zeros((numbers, numbers))
+    likely = [j for j in judged if j.score <= chosen.score + OPEN and j is not chosen]
+    if likely:
+        off = np.array([j.step - chosen.step for j in likely])
+        spread = spread + off.T @ off / len(likely)
+    place = {n: k for k, n in enumerate(full.names)}
+    rows = [place.get(n, place.get(FAST) if n == f"{Creep.name}.gamma" else None) for n in final.names]
+    picked = np.zeros((len(final.names),) * 2)
+    known = [k for k, r in enumerate(rows) if r is not None]
+    there = [r for r in rows if r is not None]
+    picked[np.ix_(known, known)] = spread[np.ix_(there, there)]
+    return picked
+
+
+def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float], spread: Array) -> Fit:
+    """In the form of every other fit; the variance of the residual is added to `spread`."""
+    numbers = len(found.names)
+    total = found.total
+    counted = [p for p in pieces if p.kind is not Kind.CARRYING]
+    inverse = _inverse(found)
+    # the residual is structure, not noise: a piece of n samples counts as √n of them
+    meat = np.zeros_like(total[:-1, :-1])
+    left = found.squares
+    for weight, square, matrix, piece in zip(found.weights, left, found.matrices, counted, strict=True):
+        meat += weight**2 * square / np.sqrt(piece.record.size) * matrix[:-1, :-1]
+    covariance = (inverse @ meat @ inverse)[:numbers, :numbers]
+    origins = sorted({p.origin for p in counted})
+    rms = []
+    for origin in origins:
+        mine = [k for k, p in enumerate(counted) if p.origin == origin]
+        sizes = np.array([counted[k].record.size for k in mine])
+        rms.append(float(np.sqrt(sizes @ left[mine] / sizes.sum())) * floors[origin])
+    values, rows = found.model.values(), {n: found.model.row(n) for n in found.names}
+    bounds = tuple(n for n in found.names if values[n] in (rows[n].lower, rows[n].upper))
+    if not np.isfinite(covariance).all():
+        raise IdentificationError("structure: the inner products of the fit are not finite; check the records")
+    return Fit(
+        model=found.model,
+        names=found.names,
+        covariance=covariance + spread,
+        cost=found.cost,
+        rms=tuple(rms),
+        nuisances=tuple(np.array([z]) for z in found.zeros),
+        at_bounds=bounds,
+        converged=found.converged,
+        iterations=found.iterations,
+    )
+
+
+def _inverse(found: PieceFit) -> Array:
+    """Of the normal equations, in the directions that are free; numbers at a bound stay there."""
+    directions = free_directions(found)
+    low, high = found.box()
+    stuck = (low >= 0.0) | (high <= 0.0)
+    directions = directions[:, ~np.any(directions[stuck] != 0.0, axis=0)]
+    hessian = directions.T @ found.total[:-1, :-1] @ directions
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    inverse = np.linalg.pinv(hessian * np.outer(scale, scale), rcond=1e-6, hermitian=True) * np.outer(scale, scale)
+    return np.asarray(directions @ inverse @ directions.T)

@@ -1,0 +1,61 @@
+"""The structure of a model of a stage that creeps, bends and rings: steps and growing sines of an independent plant."""
+
+import numpy as np
+import pytest
+
+from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.discrepancy.residual.residual import errors
+from piezo_hysteresis.effects import CreepTwoRates, ExtraResonance, HysteresisMemory
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.structure.pieces import Kind, pieces_of
+from piezo_hysteresis.record import Experiment
+
+PERIOD = 5e-4
+STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
+
+
+def played(stage, frequencies, **shape):
+    drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD, **shape)) for f in frequencies)
+    return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
+
+
+def percents(model, experiment):
+    return [row.percent for row in errors(model, experiment, Nuisance(offset=True)).rows]
+
+
+@pytest.fixture(scope="module")
+def identified():
+    return identify(played(STAGE, (1.0, 50.0)), memory=True)
+
+
+def test_a_rate_between_two_is_predicted(identified):
+    assert max(percents(identified.model, played(STAGE, (1.0, 10.0, 50.0)))) < 0.3
+
+
+def test_what_the_stage_does_is_in_the_model(identified):
+    assert HysteresisMemory.name in identified.model
+    assert identified.model[HysteresisMemory.name]["virgin"] == 1.0
+    creep = identified.model[CreepTwoRates.name]
+    assert 0.0 < creep["gamma_fast"] < creep["gamma_slow"] < 0.03
+    mode = identified.model[ExtraResonance.name]
+    assert mode["f0"] == pytest.approx(STAGE.mode, rel=0.01)
+    assert mode["zeta"] == pytest.approx(STAGE.zeta, abs=0.01)
+
+
+def test_one_rate_predicts_others_and_larger_amplitudes():
+    one = identify(played(STAGE, (1.0,)), memory=True)
+    assert max(percents(one.model, played(STAGE, (1.0, 10.0, 50.0)))) < 0.6
+    small = identify(played(STAGE, (1.0, 50.0), levels=(0.2, 0.4, 0.6)), memory=True)
+    assert max(percents(small.model, played(STAGE, (1.0, 50.0)))) < 0.6
+
+
+def test_a_record_is_cut_by_what_its_drive_does():
+    u = np.concatenate((growing_sine(1.0, PERIOD, (0.3, 0.9)), growing_sine(20.0, PERIOD, (0.9,), hold=0.0)))
+    record = Nanopositioner().play(u, PERIOD)
+    pieces = pieces_of([record], [0])
+    assert [p.kind for p in pieces[:3]] == [Kind.STEP, Kind.HOLD, Kind.LOOP]
+    loops = [p for p in pieces if p.kind is Kind.LOOP]
+    assert len({p.rate for p in loops}) == 2 and len({p.amplitude for p in loops}) >= 2
+    assert sum(p.record.size for p in pieces) == u.size
+    assert all(p.record.continues for p in pieces[1:])
