@@ -22,6 +22,7 @@ MOST_LEFT_OUT = 0.75
 FEWEST = 3
 """Folds below which every piece is one more."""
 FAST, SLOW = f"{CreepTwoRates.name}.gamma_fast", f"{CreepTwoRates.name}.gamma_slow"
+"""Rates of the creep in the full model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,7 @@ class ModelStructure:
 STRUCTURES = tuple(
     ModelStructure(square, rates, level) for square in (False, True) for rates in (0, 1, 2) for level in (False, True)
 )
+"""All that are offered."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
