@@ -85,7 +85,7 @@ def section(effect: type[Effect]) -> str:
     )
     return (
         f"## `{effect.name}`\n\n{summary}\n\n{', '.join(facts)}.\n\n    {effect.equation}\n\n"
-        f"*Shows as:* {effect.signature}.\n*Source:* {effect.source}.\n\n"
+        f"*How it shows:* {effect.signature}.\n*Source:* {effect.source}.\n\n"
         + table("symbol | in code | unit | default | bounds | off at | meaning", rows)
     )
 

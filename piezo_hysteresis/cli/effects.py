@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console(file=sys.stdout, highlight=False)
     if args.name is None:
         console.print(listing())
-        console.print("all about one: piezo effects NAME")
+        console.print("For the details of one effect, type: piezo effects NAME")
     else:
         describe(effect_named(args.name), console)
     return 0
@@ -38,7 +38,9 @@ def run(args: argparse.Namespace) -> int:
 
 def listing() -> Table:
     """One line for every effect, in the order in which they act."""
-    table = Table("effect", "family", "place", "how its absence shows", title="Catalogue of effects, in chain order")
+    table = Table(
+        "effect", "family", "place", "how it shows in the residual", title="Catalogue of effects, in chain order"
+    )
     for effect in CHAIN:
         name = f"[dim]{effect.name}[/dim]" if effect in BASELINE else f"[bold]{effect.name}[/bold]"
         table.add_row(name, effect.family, effect.place.name.lower(), effect.signature)
@@ -46,11 +48,11 @@ def listing() -> Table:
 
 
 def describe(effect: type[Effect], console: Console) -> None:
-    """Everything the class says about itself."""
+    """Print all details of one effect."""
     summary = (effect.__doc__ or "").strip().splitlines()[0]
     console.print(f"[bold]{effect.name}[/bold]  ({effect.family}, {effect.place.name.lower()})  {summary}")
     console.print(f"    {effect.equation}", markup=False)
-    console.print(f"Shows as: {effect.signature}", markup=False)
+    console.print(f"How it shows: {effect.signature}", markup=False)
     console.print(f"Source: {effect.source}", markup=False)
     for label, value in (("Term of", effect.host), ("Needs the channel", effect.channel)):
         if value:

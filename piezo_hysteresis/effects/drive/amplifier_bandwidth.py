@@ -16,7 +16,7 @@ FOUND_BY = (1e-5, 2e-5, 5e-5, 1.5e-4)
 
 
 class AmplifierBandwidth(Effect):
-    """One pole before the hysteresis.
+    """The amplifier acts as one first-order pole before the hysteresis.
 
     Parameters
     ----------
@@ -29,7 +29,10 @@ class AmplifierBandwidth(Effect):
     family = "lag"
     place = ChainPosition.DRIVE
     equation = "τ ẏ + y = x"
-    signature = "lag growing with frequency at every amplitude; below one sample not separable from the other lags"
+    signature = (
+        "The lag grows with frequency at every amplitude. If τ is below one sample, it cannot be separated "
+        "from the other lags"
+    )
     source = "R·C of amplifier and actuator, 15–60 µs"
     parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-2, "time constant R·C", "R·C", 0.0, 2e-5),)
 

@@ -18,7 +18,7 @@ UNLIMITED = 1e9
 
 
 class AmplifierSaturation(Effect):
-    """Drive voltage that bends into its limits.
+    """The amplifier limits the drive voltage, with a smooth bend into each limit.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class AmplifierSaturation(Effect):
     family = "amplifier"
     place = ChainPosition.DRIVE
     equation = "y = x − ramp(x − upper) + ramp(lower − x),  ramp(e) = (e + c)²/(4c) inside |e| < c, max(e, 0) outside"
-    signature = "one-sided flattening at the end of the range"
+    signature = "The loop is flattened at one end of the range"
     source = "output limits of high-voltage amplifiers"
     parameters = (
         Parameter("lower", "u_min", "V", -UNLIMITED, -UNLIMITED, 1e3, "lower limit", "data sheets", -UNLIMITED, 1.0),

@@ -19,7 +19,7 @@ UNLIMITED = 1e9
 
 
 class AmplifierSlewLimit(Effect):
-    """Drive voltage that cannot change faster than the amplifier can charge the actuator.
+    """The drive voltage cannot change faster than the amplifier can charge the actuator.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class AmplifierSlewLimit(Effect):
     family = "amplifier"
     place = ChainPosition.DRIVE
     equation = "|dy/dt| ≤ S = I_max/C"
-    signature = "triangles instead of fast large signals"
+    signature = "Fast large signals become triangles"
     source = "0.5 A into 20 µF: 25 V/ms behind the amplifier"
     parameters = (
         Parameter("S", "S", "V/s", UNLIMITED, 1e-2, UNLIMITED, "largest slope of the drive", "I_max/C", UNLIMITED, 1e3),

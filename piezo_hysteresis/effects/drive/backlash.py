@@ -17,7 +17,7 @@ FOUND_BY = (0.001, 0.002, 0.005, 0.01)
 
 
 class Backlash(Effect):
-    """Play between drive and actuator, centred at rest.
+    """Backlash between drive and actuator, centred at rest.
 
     Parameters
     ----------
@@ -30,9 +30,9 @@ class Backlash(Effect):
     family = "hysteresis"
     place = ChainPosition.DRIVE
     equation = "y_i = max(x_i − b, min(x_i + b, y_(i−1)))"
-    signature = "a small-signal gain that drops below b; ARX fits at two noise amplitudes disagree"
+    signature = "The gain drops for signals smaller than b. ARX models fitted at two noise amplitudes disagree"
     source = "play operator; 0.1–1 % of range"
-    parameters = (Parameter("b", "b", "V", 0.0, 0.0, 1e3, "half width of the play", "play operator", 0.0, 0.02),)
+    parameters = (Parameter("b", "b", "V", 0.0, 0.0, 1e3, "half width of the backlash", "play operator", 0.0, 0.02),)
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:

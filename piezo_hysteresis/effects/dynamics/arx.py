@@ -20,7 +20,7 @@ LONGEST_DELAY = 1e6
 
 
 class Arx(Effect):
-    """G(z) = B(z)/A(z)·z^(−d) from w to the position, Eq. (4) and (5).
+    """Linear dynamics G(z) = B(z)/A(z)·z^(−d) from w to the position, Eq. (4) and (5).
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Arx(Effect):
     family = "dynamics"
     place = ChainPosition.DYNAMICS
     equation = "G(z) = z^(−d) (b1 + b2 z⁻¹ + …)/(1 + a1 z⁻¹ + …)"
-    signature = "linear resonances and lag, the same at every amplitude"
+    signature = "Resonances and lag are the same at every amplitude"
     source = "paper, Eq. (4), (5)"
     parameters = (
         Parameter("a", "a_i", "1", (), -1e3, 1e3, "denominator coefficients", "paper, Eq. (5)"),

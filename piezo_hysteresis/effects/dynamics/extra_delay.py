@@ -13,7 +13,7 @@ from ..inversion import Inversion
 
 
 class ExtraDelay(Effect):
-    """Delay by any time, between hysteresis and dynamics.
+    """A delay of any length between hysteresis and dynamics.
 
     Parameters
     ----------
@@ -32,7 +32,10 @@ class ExtraDelay(Effect):
     family = "lag"
     place = ChainPosition.DYNAMICS
     equation = "y(t) = x(t − τ)"
-    signature = "phase linear in frequency at every amplitude; below one sample not separable from the other lags"
+    signature = (
+        "The phase is linear in frequency at every amplitude. If τ is below one sample, it cannot be "
+        "separated from the other lags"
+    )
     source = "Lagrange interpolation; conversion and transport times"
     parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-2, "dead time", "converters", 0.0, 2e-5),)
 

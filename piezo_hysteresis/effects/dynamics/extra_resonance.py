@@ -21,7 +21,7 @@ RESOLVED = 0.25
 
 
 class ExtraResonance(Effect):
-    """Mode that takes part with a share r.
+    """A further mode that carries the share r of the static response.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class ExtraResonance(Effect):
     family = "dynamics"
     place = ChainPosition.DYNAMICS
     equation = "y = x + r (q − x),  q̈/ω0² + 2 ζ q̇/ω0 + q = x,  ω0 = 2π f0"
-    signature = "ringing at one frequency after steps, a peak in error over response"
+    signature = "The stage rings at one frequency after steps. The ratio of residual to response has a peak there"
     source = "modes of the structure, ζ 0.005–0.03"
     parameters = (
         Parameter("r", "r", "1", 0.0, -2.0, 2.0, "share of the mode", "modal superposition", 0.0, 0.02),

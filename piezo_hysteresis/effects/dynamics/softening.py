@@ -15,7 +15,7 @@ FOUND_BY = (0.01, 0.03, 0.1)
 
 
 class Softening(Term):
-    """Restoring force of the dominant mode that is not proportional to its deflection.
+    """The restoring force of the dominant mode is not proportional to its deflection.
 
     Parameters
     ----------
@@ -39,7 +39,10 @@ class Softening(Term):
     path: ClassVar[type[Path]] = WholePath
     """What the mode passes on its way to the sensor."""
     equation = "m ẍ + c ẋ + k x (1 + k2 |x| + k3 x²) = k w"
-    signature = "a resonance that moves with amplitude: large chirps across it; statically a sensor cubic"
+    signature = (
+        "The resonance moves with amplitude, which large chirps across it show. On slow drive the effect "
+        "equals a cubic sensor nonlinearity"
+    )
     source = "Duffing oscillator on the modal coordinate"
     parameters = (
         Parameter("k2", "k2", "1", 0.0, -0.5, 0.5, "change of stiffness with |x|", "Duffing", 0.0, 0.02),

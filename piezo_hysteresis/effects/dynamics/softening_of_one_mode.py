@@ -10,7 +10,7 @@ from .softening import Softening
 
 
 class SofteningOfOneMode(Softening):
-    """Restoring force of the dominant mode that is not proportional to its deflection, beside modes that are linear.
+    """The restoring force of the dominant mode is not proportional to its deflection; the other modes stay linear.
 
     Parameters
     ----------
@@ -27,6 +27,6 @@ class SofteningOfOneMode(Softening):
     name = "softening_of_one_mode"
     inversion = Inversion.IMPOSSIBLE
     entry = "softening"
-    signature = "as softening, on a stage of several modes"
+    signature = "The residual looks as for softening, on a stage of several modes"
     source = "Duffing oscillator as one term of a modal expansion"
     path: ClassVar[type[Path]] = OwnPath

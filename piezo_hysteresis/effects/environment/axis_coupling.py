@@ -12,7 +12,7 @@ from ..inversion import Inversion
 
 
 class AxisCoupling(Effect):
-    """Part of the other axis' displacement that this axis reads too.
+    """The sensor of this axis also measures a part of the other axis' displacement.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class AxisCoupling(Effect):
     place = ChainPosition.ENVIRONMENT
     channel = "other_displacement"
     equation = "y = x + (κ0 + κ1 q) q"
-    signature = "coherent with the displacement of the other axis, whatever this axis is driven with"
+    signature = "The residual is coherent with the displacement of the other axis, whatever the drive of this axis"
     source = "cross-coupling of XY stages; 0.5–1.2 % of the other axis' motion"
     parameters = (
         Parameter("kappa0", "κ0", "1", 0.0, -0.5, 0.5, "coupling at the origin", "XY stages", 0.0, 0.01),

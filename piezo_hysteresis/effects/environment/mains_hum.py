@@ -16,7 +16,7 @@ from ..inversion import Inversion
 
 
 class MainsHum(Effect):
-    """Sines at the mains frequency and its harmonics, with their own amplitude and phase in every record.
+    """Sines at the mains frequency and its harmonics, with an amplitude and phase of their own in every record.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class MainsHum(Effect):
     family = "disturbance"
     place = ChainPosition.ENVIRONMENT
     equation = "y = x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)]"
-    signature = "a line that is unrelated to the drive and present at rest"
+    signature = "The spectrum has a line that does not depend on the drive and is present at rest"
     source = "pick-up of the mains, 50 or 60 Hz and harmonics"
     parameters = (
         Parameter("f", "f", "Hz", 50.0, 10.0, 100.0, "mains frequency", "mains", scale=0.01),

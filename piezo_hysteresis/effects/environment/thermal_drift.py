@@ -15,7 +15,7 @@ from ..inversion import Inversion
 
 
 class ThermalDrift(Effect):
-    """Displacement that approaches a new zero exponentially, whatever the drive does.
+    """The displacement approaches a new zero exponentially with time, whatever the drive.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class ThermalDrift(Effect):
     family = "drift"
     place = ChainPosition.ENVIRONMENT
     equation = "y = x + D (1 − e^(−t/τ))"
-    signature = "a function of absolute time only, the same in rest phases and under drive"
+    signature = "The residual depends on absolute time only. It is the same in rest phases and under drive"
     source = "first-order warm-up of the stage; 0.1–1 µm/K, 1–60 min"
     parameters = (
         Parameter("D", "D", "m", 0.0, -1e-4, 1e-4, "final drift", "first-order warm-up", 0.0, 1e-7),

@@ -15,7 +15,7 @@ from ..inversion import Inversion
 
 
 class ThermalExpansion(Effect):
-    """Displacement proportional to the recorded temperature.
+    """A displacement proportional to the recorded temperature.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class ThermalExpansion(Effect):
     place = ChainPosition.ENVIRONMENT
     channel = "temperature"
     equation = "y = x + κ (T − T0)"
-    signature = "follows the temperature, whatever the drive does"
+    signature = "The residual follows the temperature, whatever the drive"
     source = "linear expansion; 0.1–1 µm/K"
     parameters = (
         Parameter("kappa", "κ", "m/K", 0.0, -1e-4, 1e-4, "expansion between sensor and stage", "expansion", 0.0, 1e-7),

@@ -8,7 +8,7 @@ from ..inversion import Inversion
 
 
 class AsymmetricHysteresis(Term):
-    """Loss of the hysteresis state that differs between rising and falling drive, and with the sign of the state.
+    """The loss of the hysteresis state differs between rising and falling drive, and with the sign of the state.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class AsymmetricHysteresis(Term):
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"
     equation = "dh = (dh of bouc_wen) + φ1 dv·h + φ2 |dv|·|h|"
-    signature = "different curvature of the rising and the falling branch, at several turning levels"
+    signature = "The rising and the falling branch have different curvature, at several turning levels"
     source = "Zhu & Rui 2014, asymmetric Bouc-Wen"
     parameters = (
         Parameter(

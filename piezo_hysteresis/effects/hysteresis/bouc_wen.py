@@ -86,7 +86,7 @@ class BoucWen(ModifiedBoucWen):
     name = "bouc_wen"
     inversion = Inversion.EXACT
     equation = "w = p1 v³ + p2 v + h;  dh = A dv − β|dv|h − γ dv|h|"
-    signature = "rate-independent loops with one memory state, saturating at |A|/(β + γ sgn A)"
+    signature = "The loops do not depend on rate. They have one memory state, which saturates at |A|/(β + γ sgn A)"
     source = "paper, Eq. (2), (3), (6); exact step for n = 1"
     parameters = MODIFIED_BOUC_WEN
 

@@ -11,7 +11,7 @@ from ..inversion import Inversion
 
 
 class EvenInputPolynomial(Effect):
-    """Square and fourth power of the normalised drive added to the hysteresis output.
+    """The square and the fourth power of the normalised drive are added to the hysteresis output.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class EvenInputPolynomial(Effect):
     family = "static"
     place = ChainPosition.HYSTERESIS
     equation = "w + p_e v² + p_4 v⁴"
-    signature = "loops that differ between the two signs of a bipolar drive; invisible on unipolar drive"
+    signature = "The loops differ between the two signs of a bipolar drive. The effect is invisible on a unipolar drive"
     source = "completes the odd polynomial of paper, Eq. (3), as its text asks for symmetric drives"
     parameters = (
         Parameter("p_e", "p_e", "1", 0.0, -1e2, 1e2, "square term", "paper, Sec. 2", 0.0, 0.05),

@@ -14,7 +14,7 @@ FOUND_BY = (1.3, 1.7)
 
 
 class HysteresisExponent(Term):
-    """Loss of the hysteresis state that grows with a power of its size.
+    """The loss of the hysteresis state grows with a power of the state.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class HysteresisExponent(Term):
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"
     equation = "dh = A dv − (β |dv| h + γ dv |h|)·|h/h_ref|^(n−1),  h_ref = 0.2"
-    signature = "loop shape that changes with amplitude, at four amplitudes or more"
+    signature = "The shape of the loop changes with amplitude. Four amplitudes or more are needed to see it"
     source = "paper, Eq. (2), general n; Ismail et al. 2009"
     parameters = (Parameter("n", "n", "1", 1.0, 1.0, 4.0, "exponent of the loss", "paper, Eq. (2)", 1.0, 0.2),)
 

@@ -20,7 +20,7 @@ SPAN = 32.0
 
 
 class HysteresisMemory(Effect):
-    """Plays of several half widths added to the hysteresis output: a Prandtl-Ishlinskii operator.
+    """Play operators of several half widths are added to the hysteresis output (Prandtl-Ishlinskii operator).
 
     Parameters
     ----------
@@ -42,12 +42,17 @@ class HysteresisMemory(Effect):
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     equation = "w + Σ_j c_j p_j,  p_j = max(v − r_j, min(v + r_j, p_j before))"
-    signature = "errors in nested and decaying minor loops: return to the point where a loop was left"
+    signature = (
+        "The residual is large in nested and decaying minor loops, where the stage returns to the point at "
+        "which it left a loop"
+    )
     source = "Prandtl-Ishlinskii operator; Gu et al. 2016"
     parameters = (
         Parameter("c", "c_j", "1", (0.0,) * 8, 0.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
         Parameter("reach", "r_max", "1", 0.5, 1e-3, 10.0, "half width of the widest play", "Gu 2016", fixed=True),
-        Parameter("virgin", "f_0", "1", 0.0, 0.0, 1.0, "at rest: 0 relaxed, 1 as come from 0 V", "Gu 2016", fixed=True),
+        Parameter(
+            "virgin", "f_0", "1", 0.0, 0.0, 1.0, "state at rest: 0 relaxed, 1 reached from 0 V", "Gu 2016", fixed=True
+        ),
     )
 
     @classmethod

@@ -8,7 +8,7 @@ from ..inversion import Inversion
 
 
 class InitialState(Term):
-    """Hysteresis state at the start of every record that does not continue another, the stage settled with it.
+    """The hysteresis state at the start of every record that does not continue another record.
 
     Parameters
     ----------
@@ -22,6 +22,9 @@ class InitialState(Term):
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"
     equation = "h(0) = h0"
-    signature = "an error at the start of a record only, gone after the first large swing; demagnetise first"
+    signature = (
+        "The residual is large at the start of a record only and vanishes after the first large swing. "
+        "Demagnetise the stage before a record"
+    )
     source = "initial condition of paper, Eq. (2)"
     parameters = (Parameter("h0", "h0", "1", 0.0, -1.0, 1.0, "remanent hysteresis state", "paper, Eq. (2)", 0.0, 0.05),)

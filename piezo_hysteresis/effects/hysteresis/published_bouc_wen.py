@@ -14,7 +14,7 @@ from .bouc_wen import MODIFIED_BOUC_WEN, BoucWen, ModifiedBoucWen
 
 
 class PublishedBoucWen(ModifiedBoucWen):
-    """Modified Bouc-Wen by the explicit step of Eq. (7), with the exponent n of Eq. (2).
+    """Modified Bouc-Wen operator with the explicit step of Eq. (7) and the exponent n of Eq. (2).
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class PublishedBoucWen(ModifiedBoucWen):
     name = "published_bouc_wen"
     inversion = Inversion.EXACT
     equation = "w_i = p1 v_i³ + p2 v_i + h_i;  h_i = h_(i−1) + A Δv − β|Δv||h|^(n−1)h − γ Δv|h|^n"
-    signature = "as bouc_wen, but dependent on the sample rate"
+    signature = "The loops are those of bouc_wen, but depend on the sample rate"
     source = "paper, Eq. (6), (7); exponent of Eq. (2)"
     parameters = (
         *MODIFIED_BOUC_WEN,

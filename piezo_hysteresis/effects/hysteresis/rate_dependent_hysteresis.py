@@ -14,7 +14,7 @@ FOUND_BY = (-0.03, 0.03)
 
 
 class RateDependentHysteresis(Term):
-    """Loop slope A that depends on the speed of the normalised drive.
+    """The loop slope A depends on the speed of the normalised drive.
 
     Parameters
     ----------
@@ -38,7 +38,10 @@ class RateDependentHysteresis(Term):
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"
     equation = "A_eff = A [1 + k ((|v̇|/v0)^a − 1)/a]"
-    signature = "an error of the sign of h that grows with frequency and amplitude, and collapses on |v̇|"
+    signature = (
+        "The residual has the sign of h and grows with frequency and amplitude. Plotted against |v̇|, all "
+        "records fall on one curve"
+    )
     source = "Al Janaideh et al. 2011, rate-dependent Prandtl-Ishlinskii; here on A of paper, Eq. (2)"
     parameters = (
         Parameter("k", "k", "1", 0.0, -0.5, 0.5, "change of loop slope with speed", "Al Janaideh 2011", 0.0, 0.05),
@@ -46,7 +49,7 @@ class RateDependentHysteresis(Term):
             "a", "a", "1", 0.5, -0.5, 1.0, "exponent of the rate law; 0 is logarithmic", "Al Janaideh 2011", scale=0.3
         ),
         Parameter(
-            "jumps", "f_j", "1", 1.0, 0.0, 1.0, "change in one slow sample: 1 jump, 0 ramp", "sampling", fixed=True
+            "jumps", "f_j", "1", 1.0, 0.0, 1.0, "change within a slow sample: 1 jump, 0 ramp", "sampling", fixed=True
         ),
     )
 

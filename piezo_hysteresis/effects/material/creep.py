@@ -22,7 +22,7 @@ PER_DECADE = 2
 
 
 class Creep(Effect):
-    """Displacement that goes on growing with the logarithm of the time since every change of level.
+    """After every change of level the displacement continues to grow with the logarithm of time.
 
     Parameters
     ----------
@@ -52,7 +52,8 @@ class Creep(Effect):
     place = ChainPosition.MATERIAL
     equation = "y = w + γ Σ_j ½ (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w;  after a step: 1 + γ log10(t/0.1 s)"
     signature = (
-        "grows with log t after each change of level; on sines a gain falling linearly in log f at constant phase"
+        "The residual grows with log t after each change of level. On sines the gain falls linearly in log f "
+        "while the phase is constant"
     )
     source = "Croft, Shed, Devasia 2001; relaxation bank of the logarithmic law"
     parameters: ClassVar[tuple[Parameter, ...]] = (

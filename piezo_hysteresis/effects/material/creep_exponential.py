@@ -20,7 +20,7 @@ FASTEST = 5e-3
 
 
 class CreepExponential(Effect):
-    """Relaxations added to the response: the classical creep model of spring and damper pairs.
+    """Creep as a sum of first-order relaxations, the classical model of springs and dampers.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class CreepExponential(Effect):
     family = "creep"
     place = ChainPosition.MATERIAL
     equation = "Y/W = 1 + Σ_k c_k/(1 + τ_k s)"
-    signature = "grows after each change of level and ends after some τ, unlike logarithmic creep"
+    signature = "The residual grows after each change of level and stops after some τ, unlike logarithmic creep"
     source = "Croft, Shed, Devasia 2001, Kelvin-Voigt creep"
     parameters = (
         Parameter("c", "c_k", "1", (0.0, 0.0), 0.0, 0.2, "final share of each relaxation", "Croft 2001", 0.0, 0.01),

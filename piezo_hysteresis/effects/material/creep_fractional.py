@@ -13,7 +13,7 @@ from .creep import PER_DECADE, REFERENCE_TIME, Creep, settled_mix
 
 
 class CreepFractional(Creep):
-    """Creep whose rate per decade grows or shrinks with time, as a fractional (power-law) element creeps.
+    """Creep whose rate per decade grows or shrinks with time, as in a fractional (power-law) element.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class CreepFractional(Creep):
         "y = w + γ Σ_j g_j (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w,  g_j = ½ (τ_j/0.1)^λ;  "
         "after a step: 1 + γ ((t/0.1 s)^λ − 1)/(λ ln 10)"
     )
-    signature = "as logarithmic creep, but faster or slower than log t"
+    signature = "The residual looks as for logarithmic creep, but grows faster or slower than log t"
     source = "fractional creep as a bank of relaxations; Croft, Shed, Devasia 2001 for λ = 0"
     parameters = (
         Creep.parameters[0],

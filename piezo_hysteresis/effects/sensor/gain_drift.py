@@ -15,7 +15,7 @@ from ..inversion import Inversion
 
 
 class GainDrift(Effect):
-    """Gain that approaches a new value exponentially with absolute time.
+    """The gain approaches a new value exponentially with absolute time.
 
     Parameters
     ----------
@@ -34,7 +34,10 @@ class GainDrift(Effect):
     family = "drift"
     place = ChainPosition.SENSOR
     equation = "y = x [1 + g (1 − e^(−t/τ))]"
-    signature = "an error proportional to the displacement that grows with time: repeat the first triangle at the end"
+    signature = (
+        "The residual is proportional to the displacement and grows with time. Repeat the first triangle at "
+        "the end to see it"
+    )
     source = "first-order warm-up; 0.05–0.5 %/K"
     parameters = (
         Parameter("g", "g", "1", 0.0, -0.5, 0.5, "final relative change of gain", "first-order warm-up", 0.0, 0.01),

@@ -11,7 +11,7 @@ from ..inversion import Inversion
 
 
 class Offset(Effect):
-    """y + y0 + r·y_rest: reading of the sensor where the model is at zero, and at rest.
+    """Zero of the sensor, y0, and settling at rest beyond the model, r·y_rest.
 
     Parameters
     ----------
@@ -38,11 +38,13 @@ class Offset(Effect):
     family = "sensor"
     place = ChainPosition.ENVIRONMENT
     equation = "y = x + y0 + r x_rest"
-    signature = "a constant in every record"
+    signature = "The residual is constant in every record"
     source = "definition of the sensor's zero"
     parameters = (
         Parameter("y0", "y0", "m", 0.0, -1.0, 1.0, "reading at zero displacement", "definition", 0.0, 1e-6),
-        Parameter("settling", "r", "1", 0.0, -0.5, 0.5, "settling at rest beyond the model", "definition", 0.0, 0.01),
+        Parameter(
+            "settling", "r", "1", 0.0, -0.5, 0.5, "additional settling at rest, relative", "definition", 0.0, 0.01
+        ),
     )
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:

@@ -11,7 +11,7 @@ from ..inversion import Inversion
 
 
 class SensorBandwidth(Effect):
-    """Equal poles after everything that moves.
+    """The sensor acts as one or several equal first-order poles.
 
     Parameters
     ----------
@@ -26,7 +26,9 @@ class SensorBandwidth(Effect):
     family = "lag"
     place = ChainPosition.SENSOR
     equation = "Y/X = 1/(1 + τ s)^n"
-    signature = "lag and roll-off of everything measured; below one sample not separable from the other lags"
+    signature = (
+        "Everything measured lags and rolls off. If τ is below one sample, it cannot be separated from the other lags"
+    )
     source = "bandwidth settings of capacitive sensors: 50 Hz, 500 Hz, 5 kHz"
     parameters = (
         Parameter("tau", "τ", "s", 0.0, 0.0, 1e-1, "time constant of each pole", "sensor settings", 0.0, 2e-5),

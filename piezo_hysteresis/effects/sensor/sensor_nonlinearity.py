@@ -11,7 +11,7 @@ from ..inversion import Inversion
 
 
 class SensorNonlinearity(Effect):
-    """Square and cube of the position added to the reading.
+    """The sensor adds the square and the cube of the position to its reading.
 
     Parameters
     ----------
@@ -31,7 +31,10 @@ class SensorNonlinearity(Effect):
     family = "static"
     place = ChainPosition.SENSOR
     equation = "y = x + s2 x² + s3 x³"
-    signature = "harmonics of the position itself, also at the resonance; on unipolar drive absorbed by p1 and p2"
+    signature = (
+        "The residual holds harmonics of the position itself, also at the resonance. On a unipolar drive p1 "
+        "and p2 absorb the effect"
+    )
     source = "capacitive sensors 0.02–0.1 %, strain gauges 0.1–1 %"
     parameters = (
         Parameter("s2", "s2", "1", 0.0, -1.0, 1.0, "square term", "sensor data sheets", 0.0, 0.01),
