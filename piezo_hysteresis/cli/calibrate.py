@@ -1,7 +1,7 @@
-"""``piezo calibrate``: the delay of a card from output to input, wired together, as a parameter file for the driver.
+"""Measure the delay of a card whose output is wired to its input, and write a parameter file for the driver.
 
-No stage and no amplifier may be connected: noise is put out. The delay of the card is kept apart from that of the
-stage; it is taken off what the driver records.
+Disconnect the stage and the amplifier first, because the card puts out noise. The driver subtracts the measured delay from
+its recordings, so that only the delay of the stage remains.
 """
 
 from __future__ import annotations

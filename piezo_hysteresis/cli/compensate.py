@@ -1,4 +1,4 @@
-"""``piezo compensate``: the drive voltage that makes a stage follow a path, and the error to expect.
+"""Compute the drive voltage that makes a stage follow a path, and the expected error.
 
 Nothing is played: the command is written to a file, beside what can be had of the path and how far the stage will be
 off. Send it with the driver node, or with a program of your own.
@@ -35,13 +35,21 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--voltage-max", metavar="V", type=float, default=10.0, help="default: 10")
     parser.add_argument("--max-slew-rate", metavar="V/S", type=float, default=math.inf, help="default: no limit")
     parser.add_argument(
-        "--rest-voltage", metavar="V", type=float, default=0.0, help="voltage at which the stage rests before"
+        "--rest-voltage", metavar="V", type=float, default=0.0, help="voltage at which the stage rests before the path"
     )
-    parser.add_argument("--approach", metavar="S", type=float, default=0.05, help="way to the path (default: 0.05 s)")
-    parser.add_argument("--approximate", action="store_true", help="leave out effects that cannot be turned round")
-    parser.add_argument("--allow-partial", action="store_true", help="write the command of a path that is out of reach")
-    parser.add_argument("--figures", metavar="FOLDER", help="write the figure with its data")
-    parser.add_argument("--json", metavar="FILE", help="result for machines")
+    parser.add_argument(
+        "--approach",
+        metavar="S",
+        type=float,
+        default=0.05,
+        help="duration of the approach to the path [s] (default: 0.05)",
+    )
+    parser.add_argument("--approximate", action="store_true", help="leave out effects that cannot be inverted")
+    parser.add_argument(
+        "--allow-partial", action="store_true", help="write the voltage even if a part of the path cannot be reached"
+    )
+    parser.add_argument("--figures", metavar="FOLDER", help="folder for the figure and its data")
+    parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
     parser.set_defaults(run=run)
 
 

@@ -1,4 +1,4 @@
-"""``piezo diagnose``: where the model is wrong, which effect is missing, and the gap after adding it."""
+"""Show where a model is wrong, name the missing effect, and measure the gap after adding it."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Declare the subcommand."""
     parser = subparsers.add_parser("diagnose", description=__doc__)
     reading.add_arguments(parser)
-    parser.add_argument("--model", metavar="FILE", help="model file to begin with; default: identify one first")
-    parser.add_argument("-o", "--output", metavar="FILE", help="write the model with what was found added")
-    parser.add_argument("--report", metavar="FILE", help="write the page, with figures beside it")
-    parser.add_argument("--json", metavar="FILE", help="answer for machines")
+    parser.add_argument("--model", metavar="FILE", help="model file to start from; default: identify a model first")
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the extended model to this file")
+    parser.add_argument("--report", metavar="FILE", help="write the HTML page, and its figures beside it")
+    parser.add_argument("--json", metavar="FILE", help="write the answer as JSON")
     parser.set_defaults(run=run)
 
 

@@ -1,4 +1,4 @@
-"""``piezo effects``: the catalogue, printed from the classes."""
+"""Print the catalogue of physical effects, or the details of one effect."""
 
 from __future__ import annotations
 

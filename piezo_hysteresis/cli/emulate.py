@@ -1,4 +1,4 @@
-"""``piezo emulate``: a controller without hardware, to rehearse an experiment and its failures over a real socket."""
+"""Emulate a controller behind a TCP port, to rehearse an experiment and its faults without hardware."""
 
 from __future__ import annotations
 
@@ -40,11 +40,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--host", default="127.0.0.1", help="address to listen at (default: this machine only)")
     parser.add_argument("--port", type=int, help=f"TCP port, 0 for any free one (default: {_PORT})")
     add_plant_arguments(parser)
-    parser.add_argument("--servo-time", metavar="S", type=float, default=50e-6, help="of gcs2 [s] (default: 5e-05)")
+    parser.add_argument(
+        "--servo-time", metavar="S", type=float, default=50e-6, help="servo time of gcs2 [s] (default: 5e-05)"
+    )
     parser.add_argument(
         "--command-per-volt", metavar="C", type=float, default=1.0, help="of gcs2: open-loop command over piezo volt"
     )
-    parser.add_argument("--fault", action="append", default=[], metavar="FAULT", help="a failure to play; repeatable")
+    parser.add_argument(
+        "--fault", action="append", default=[], metavar="FAULT", help="fault to inject, see below (repeatable)"
+    )
     parser.set_defaults(run=run)
 
 

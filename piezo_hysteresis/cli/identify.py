@@ -1,4 +1,4 @@
-"""``piezo identify``: delay, dynamics and hysteresis from whatever was recorded, with uncertainties."""
+"""Identify delay, dynamics and hysteresis of a stage from a recording, with uncertainties."""
 
 from __future__ import annotations
 
@@ -22,11 +22,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser("identify", description=__doc__)
     reading.add_arguments(parser)
     parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
-    parser.add_argument("--json", metavar="FILE", help="result for machines")
+    parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
     parser.add_argument(
         "--orders", metavar=("NA", "NB"), nargs=2, type=int, help="orders of the ARX (default: 8 8, as published)"
     )
-    parser.add_argument("--choose-orders", action="store_true", help="lowest orders that are as good as any")
+    parser.add_argument(
+        "--choose-orders", action="store_true", help="choose the lowest orders that predict as well as any"
+    )
     operator = parser.add_mutually_exclusive_group()
     operator.add_argument(
         "--hysteresis",
@@ -42,9 +44,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         const=PublishedBoucWen.name,
         help="Bouc-Wen in the discrete form of the paper, Eq. (7)",
     )
-    parser.add_argument("--no-memory", action="store_true", help="keep the Bouc-Wen state, whatever plays would reach")
     parser.add_argument(
-        "--held-out", metavar="PHASE", action="append", help=f"not fitted but judged (default: {', '.join(HELD_OUT)})"
+        "--no-memory", action="store_true", help="use the Bouc-Wen state even if play operators predict better"
+    )
+    parser.add_argument(
+        "--held-out",
+        metavar="PHASE",
+        action="append",
+        help=f"phase that is not fitted and judges the model (default: {', '.join(HELD_OUT)})",
     )
     parser.set_defaults(run=run)
 

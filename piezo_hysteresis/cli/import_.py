@@ -1,4 +1,4 @@
-"""``piezo import``: a foreign recording as an experiment folder, with phases named and its quality told."""
+"""Convert a recording of other software into an experiment, name its phases and check its data."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "-o", "--output", metavar="FOLDER", required=True, help="folder, or file ending .csv .mat .mcap"
     )
-    parser.add_argument("--json", metavar="FILE", help="phases and findings for machines")
+    parser.add_argument("--json", metavar="FILE", help="write phases and findings as JSON")
     parser.set_defaults(run=run)
 
 

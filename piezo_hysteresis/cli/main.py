@@ -15,15 +15,15 @@ from ..errors import IdentificationError, PiezoError, printable
 
 COMMANDS = {
     "simulate": "play a protocol to a simulated stage and record it",
-    "emulate": "be a controller without hardware, behind a TCP port",
-    "calibrate": "measure the delay of a card, kept apart from that of the stage",
+    "emulate": "emulate a controller behind a TCP port",
+    "calibrate": "measure the delay of a card without a stage",
     "identify": "identify a model from an experiment",
-    "validate": "judge a model in free run on an experiment",
-    "diagnose": "say where a model is wrong and which effect is missing",
-    "compensate": "turn a model round: the drive voltage for a wanted displacement",
+    "validate": "compare a model with an experiment in free-run simulation",
+    "diagnose": "find where a model is wrong and which effect is missing",
+    "compensate": "compute the drive voltage for a wanted displacement",
     "report": "write one page about an experiment and its models",
-    "import": "turn a foreign recording into an experiment folder",
-    "effects": "the catalogue of physical effects",
+    "import": "convert a recording of other software into an experiment",
+    "effects": "list the catalogue of physical effects",
 }
 """Subcommand to what it does; each lives in a file of its own, loaded only when it is asked for."""
 
@@ -62,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="piezo", description="Hysteresis and dynamics of piezo stages: models, identification, what is missing."
+        prog="piezo", description="Identify models of piezo stages, check them, and find missing physical effects."
     )
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
     for name, summary in COMMANDS.items():

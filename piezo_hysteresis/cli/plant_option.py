@@ -14,10 +14,12 @@ from ..yaml_file import read_yaml
 
 def add_plant_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare ``--plant``, ``--seed``, ``--noise`` and ``--hidden``."""
-    parser.add_argument("--plant", metavar="FILE", help="YAML with parameters of the stage, part.quantity: value")
-    parser.add_argument("--seed", type=int, default=0, help="of noise and random drives (default: 0)")
-    parser.add_argument("--noise", metavar="SHARE", type=float, help="sensor noise, rms over full stroke, e.g. 0.0005")
-    parser.add_argument("--hidden", metavar="SEED", type=int, help="hide an effect drawn by this seed in the stage")
+    parser.add_argument(
+        "--plant", metavar="FILE", help="YAML file with parameters of the stage, e.g. creep.gamma: 0.015"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the noise and of random waveforms (default: 0)")
+    parser.add_argument("--noise", metavar="SHARE", type=float, help="RMS sensor noise over full stroke, e.g. 0.0005")
+    parser.add_argument("--hidden", metavar="SEED", type=int, help="hide an effect that this seed selects")
 
 
 def plant(args: argparse.Namespace) -> tuple[PlantParameters, dict[str, Any]]:

@@ -18,10 +18,17 @@ T = TypeVar("T")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the experiment and what the file may not say about itself."""
     parser.add_argument(
-        "experiment", metavar="EXPERIMENT", nargs="+", help="recording: folder of .npz, bag, .csv, .mat, …; or several"
+        "experiment",
+        metavar="EXPERIMENT",
+        nargs="+",
+        help="one or several recordings: bag, folder of .npz, .csv, .mat, …",
     )
-    group = parser.add_argument_group("reading, where the recording does not say it")
-    group.add_argument("--format", choices=tuple(recording.FORMATS), help="default: what the path looks like")
+    group = parser.add_argument_group("options for reading, if the recording lacks the information")
+    group.add_argument(
+        "--format",
+        choices=tuple(recording.FORMATS),
+        help="format of the file (default: chosen by the look of the path)",
+    )
     group.add_argument("--axis", metavar="NS", help="namespace of one stage in a bag of several, e.g. /stage_x")
     group.add_argument(
         "--column",
@@ -39,9 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--sample-period", metavar="S", type=float, help="time between samples [s]")
     group.add_argument(
-        "--initial-voltage", metavar="V", type=float, help="drive at which the stage had settled before every phase [V]"
+        "--initial-voltage",
+        metavar="V",
+        type=float,
+        help="drive voltage at which the stage rested before every phase [V]",
     )
-    group.add_argument("--rows", metavar="FROM:TO", help="part of a record in one piece, as a Python slice")
+    group.add_argument("--rows", metavar="FROM:TO", help="range of rows to read, as a Python slice")
     group.add_argument(
         "--phase",
         metavar="[TIME=]NAME",
@@ -50,7 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="name of the only phase, or start time [s] and name of each (repeatable)",
     )
     group.add_argument(
-        "--include", metavar="NAME", action="append", default=[], help="keep phases left out otherwise: idle, hold"
+        "--include",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="keep phases that are otherwise left out: idle, hold",
     )
     group.add_argument(
         "--average",

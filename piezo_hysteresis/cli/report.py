@@ -1,4 +1,4 @@
-"""``piezo report``: one self-contained page about an experiment and the models held against it."""
+"""Write one self-contained page that compares an experiment with models."""
 
 from __future__ import annotations
 
@@ -18,16 +18,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Declare the subcommand."""
     parser = subparsers.add_parser("report", description=__doc__)
     reading.add_arguments(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", default="report.html", help="page (default: report.html)")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", default="report.html", help="HTML page to write (default: report.html)"
+    )
     parser.add_argument(
         "--model",
         metavar="[LABEL=]FILE",
         action="append",
         default=[],
-        help="model file; the first is the one before, the last the one reported (repeatable)",
+        help="model file; the last one is reported, the first one is shown for comparison (repeatable)",
     )
-    parser.add_argument("--answer", metavar="FILE", help="answer of piezo diagnose --json")
-    parser.add_argument("--zero-per-phase", action="store_true", help="sensor zero free in every phase, not only once")
+    parser.add_argument("--answer", metavar="FILE", help="file written by piezo diagnose --json")
+    parser.add_argument(
+        "--zero-per-phase", action="store_true", help="estimate the sensor zero in every phase instead of once"
+    )
     parser.add_argument("--title", default="Piezo stage: model against measurement", help="heading of the page")
     parser.set_defaults(run=run)
 

@@ -1,4 +1,4 @@
-"""``piezo simulate``: play a protocol to the simulated stage and record it, to rehearse without hardware or ROS."""
+"""Play a protocol to the simulated stage and record it. No hardware and no ROS are needed."""
 
 from __future__ import annotations
 
@@ -21,11 +21,15 @@ PROTOCOLS = {"paper": protocol.paper, "short": protocol.short, "rich": protocol.
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
     parser = subparsers.add_parser("simulate", description=__doc__)
-    parser.add_argument("-o", "--output", metavar="FOLDER", required=True, help="experiment to write")
-    parser.add_argument("--protocol", choices=tuple(PROTOCOLS), default="short", help="what is played (default: short)")
+    parser.add_argument("-o", "--output", metavar="FOLDER", required=True, help="folder of the experiment to write")
+    parser.add_argument(
+        "--protocol", choices=tuple(PROTOCOLS), default="short", help="protocol to play (default: short)"
+    )
     add_plant_arguments(parser)
-    parser.add_argument("--truth", metavar="FILE", help="write what was hidden to this JSON file")
-    parser.add_argument("--sample-period", metavar="S", type=float, default=2e-5, help="[s] (default: 2e-05)")
+    parser.add_argument("--truth", metavar="FILE", help="write the hidden effect to this JSON file")
+    parser.add_argument(
+        "--sample-period", metavar="S", type=float, default=2e-5, help="sample period [s] (default: 2e-05)"
+    )
     parser.set_defaults(run=run)
 
 

@@ -1,4 +1,4 @@
-"""``piezo validate``: how well a model predicts an experiment in free run, and whether the residual knows the drive."""
+"""Show how well a model predicts an experiment in free run, and whether the residual depends on the drive."""
 
 from __future__ import annotations
 
@@ -23,9 +23,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser("validate", description=__doc__)
     parser.add_argument("model", metavar="MODEL", help="model file")
     reading.add_arguments(parser)
-    parser.add_argument("--zero-per-phase", action="store_true", help="sensor zero free in every phase, not only once")
-    parser.add_argument("--figures", metavar="FOLDER", help="write the figures with their data")
-    parser.add_argument("--json", metavar="FILE", help="result for machines")
+    parser.add_argument(
+        "--zero-per-phase", action="store_true", help="estimate the sensor zero in every phase instead of once"
+    )
+    parser.add_argument("--figures", metavar="FOLDER", help="folder for the figures and their data")
+    parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
     parser.set_defaults(run=run)
 
 
