@@ -1,7 +1,7 @@
 """Measure the delay of a card whose output is wired to its input, and write a parameter file for the driver.
 
-Disconnect the stage and the amplifier first, because the card puts out noise. The driver subtracts the measured delay from
-its recordings, so that only the delay of the stage remains.
+Disconnect the stage and the amplifier first, because the card puts out noise. The driver subtracts the measured delay
+from its recordings, so that only the delay of the stage remains.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Compute the drive voltage that makes a stage follow a path, and the expected error.
 
-Nothing is played: the command is written to a file, beside what can be had of the path and how far the stage will be
-off. Send it with the driver node, or with a program of your own.
+Nothing moves. The command is written to a file, and the expected error and the reachable part of the path are printed.
+Send the command with the driver node or with your own program.
 """
 
 from __future__ import annotations

@@ -29,16 +29,16 @@ def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
     span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
     missing = []
     if not any(_longest_hold(r, MOVED * span) >= HOLD for r in records):
-        missing.append((Creep.name, "no level is held for a second or more after it was changed"))
+        missing.append((Creep.name, "no level is held for a second or more after a change"))
     contents = [excitation_content(r) for r in records]
     kinds = ["slow loops" if c.is_slow else r.phase.split("_")[0] for r, c in zip(records, contents, strict=True)]
     if len(set(kinds)) == len(kinds):
-        missing.append((f"{ThermalDrift.name} and {GainDrift.name}", "no kind of phase is there twice"))
+        missing.append((f"{ThermalDrift.name} and {GainDrift.name}", "no kind of phase was recorded twice"))
     if not _has_smaller_loops(records):
-        missing.append((f"{HysteresisMemory.name} and {HysteresisExponent.name}", "all loops have one amplitude"))
+        missing.append((f"{HysteresisMemory.name} and {HysteresisExponent.name}", "all loops have the same amplitude"))
     if not any(c.is_broadband for c in contents):
-        missing.append((f"{ExtraResonance.name} and the lags", "no drive moves the dynamics: no noise, no multisine"))
-    return tuple(Notice("not_tested", f"{what} can hardly be seen: {why}") for what, why in missing)
+        missing.append((f"{ExtraResonance.name} and lags", "no drive excites the dynamics (noise, multisine)"))
+    return tuple(Notice("not_tested", f"these data can hardly show {what}: {why}") for what, why in missing)
 
 
 def _longest_hold(record: Record, least: float) -> float:

@@ -149,7 +149,10 @@ def identify(
                 samples = again
                 joint, dynamics, more_notices = fit_behind(joint.model, samples)
             notices.append(
-                Notice("delay_from_fit", f"no step to read it from: delay of {samples} samples from the dynamics")
+                Notice(
+                    "delay_from_fit",
+                    f"no step was recorded; the delay of {samples} samples was taken from the dynamics",
+                )
             )
         notices += more_notices
         noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
@@ -176,14 +179,19 @@ def identify(
     zero = float(np.mean([e.mean() for e in residuals(joint.model, records)]))
     joint = replace(joint, model=joint.model.with_effect(Offset(y0=zero)))
     if not joint.converged:
-        notices.append(Notice("not_converged", f"the joint fit stopped after {joint.iterations} linearisations"))
+        notices.append(Notice("not_converged", f"the joint fit did not converge in {joint.iterations} linearisations"))
     notices += [
-        Notice("at_bound", f"{name} stopped at a bound of its table")
+        Notice("at_bound", f"{name} reached a bound of its range")
         for name in joint.at_bounds
         if joint.model.row(name).off != joint.values[name]  # a play without weight is none
     ]
     if not any(not p.is_fitted for p in phases):
-        notices.append(Notice("nothing_held_out", "all records were fitted: the errors are not those of a prediction"))
+        notices.append(
+            Notice(
+                "nothing_held_out",
+                "all records were fitted, so that the errors are not prediction errors; hold out a phase to get them",
+            )
+        )
     found = Identification(joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices))
     origin = provenance(experiment, found.free_run_error, found.free_run_percent)
     return replace(found, model=replace(joint.model, provenance=origin))

@@ -137,7 +137,8 @@ def fit_dynamics(
     notices = dynamics.notices
     if reached != orders:
         message = (
-            f"na, nb = {orders[0]}, {orders[1]} are more than the data support; {reached[0]}, {reached[1]} were used"
+            f"the data do not determine orders na = {orders[0]}, nb = {orders[1]}; {reached[0]}, "
+            f"{reached[1]} were used instead"
         )
         notices += (Notice("order_reduced", message),)
     return joint, dynamics, notices

@@ -53,9 +53,7 @@ def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice,
         if samples:
             records.append(replace(record[:samples], phase=CARRYING[0]))
             record = replace(record[samples:], truncated=False, initial_voltage=None)
-            message = (
-                f"begins in an unknown state: its first {samples} samples, up to a full loop, only carry the state"
-            )
+            message = f"the initial state is unknown; the first {samples} samples, up to a full loop, are not fitted"
             notices.append(Notice("conditioning_length", message, record.phase))
         records.append(record)
     return replace(experiment, records=tuple(records)), tuple(notices)

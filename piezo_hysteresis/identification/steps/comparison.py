@@ -103,7 +103,13 @@ def compare_inputs(
     notices = []
     worst = max(comparisons, key=lambda c: abs(c.from_v / c.from_w - 1.0), default=None)
     if worst is not None and abs(worst.from_v / worst.from_w - 1.0) > TOLERANCE:
-        notices.append(Notice("inputs_disagree", f"G differs as seen from v and from w; {worst}", "noise"))
+        notices.append(
+            Notice(
+                "inputs_disagree",
+                f"the frequency response G differs between the inputs v and w, which is a sign of hysteresis; {worst}",
+                "noise",
+            )
+        )
     gains = [c.gain_from_w for c in comparisons]
     if len(gains) > 1 and max(gains) > (1.0 + TOLERANCE) * min(gains):
         message = ", ".join(f"{c.gain_from_w:.4g} at {c.amplitude:.3g} V" for c in comparisons)

@@ -159,13 +159,20 @@ def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 
             continue
         onsets.append(Onset(at.sample_period, n, low * at.sample_period, high * at.sample_period))
     messages = {
-        "delay_ambiguous": f"onset at sample {samples} or {int(first)}: noise hides the first response",
-        "delay_unresolved": f"the response begins within one sample period of {finest:.3g} s: only a bound is known",
+        "delay_ambiguous": f"the response begins at sample {samples} or {int(first)}; noise hides the first response",
+        "delay_unresolved": (
+            f"the response begins within one sample period of {finest:.3g} s, so that only an "
+            "upper bound of the delay is known"
+        ),
     }
     notices = [Notice(kind, message, "step") for kind, message in messages.items() if kind in doubtful_notices]
     if max(o.earliest for o in onsets) >= min(o.latest for o in onsets) + 1e-12:
         answers = ", ".join(
             f"{o.earliest * 1e6:.4g} to {o.latest * 1e6:.4g} µs at {o.sample_period:.3g} s" for o in onsets
         )
-        notices.append(Notice("delay_inconsistent", f"sample times disagree on the delay: {answers}", "step"))
+        notices.append(
+            Notice(
+                "delay_inconsistent", f"records of different sample periods give different delays: {answers}", "step"
+            )
+        )
     return Delay(samples, tuple(onsets), response, tuple(notices))

@@ -169,7 +169,9 @@ def identify_arx(
             theta, _ = _solve(triangle(whitened, orders, delay))
         a, b, mirrored = _reflected(theta[:na], theta[na:])
         reflected_notices = (
-            Notice("unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored inside"),
+            Notice(
+                "unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored into the unit circle"
+            ),
         )
         arx = settling(a, b, delay)
         if arx is None:  # the iterations run away

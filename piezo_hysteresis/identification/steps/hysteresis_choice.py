@@ -95,14 +95,18 @@ def choose_memory(
     # the mean of logarithms keeps one bad block from deciding
     of_plays, of_state = (float(np.mean(np.log(np.maximum(e, 1.0)))) for e in (plays_error, state_error))
     message = (
-        f"on blocks left out plays reach {np.exp(of_plays):.3g} times the floor, "
-        f"a Bouc-Wen state {np.exp(of_state):.3g} times (geometric means)"
+        f"in cross-validation play operators reach {np.exp(of_plays):.3g} times the floor and "
+        f"a Bouc-Wen state reaches {np.exp(of_state):.3g} times the floor (geometric means)"
     )
     lead = of_plays - of_state
     if lead > np.log(TIE):
         return joint, (Notice("memory", f"{message}: the state is kept"),)
     clear = lead < -np.log(TIE)
-    because = "turning points are remembered" if clear else "the data do not decide, plays foretell other loops better"
+    because = (
+        "the stage remembers its turning points"
+        if clear
+        else "the data do not decide, and play operators predict other loops better"
+    )
     kept, kept_floors = select(records, floors, fitted)
     free = [*linear_numbers(plays), *(n for n in joint.names if n.startswith(f"{Arx.name}."))]
     found = fit(plays, kept, free, floors=kept_floors, nuisance=Nuisance(offset=True))

@@ -47,8 +47,10 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent]) -> tuple[Notice
     notices = [
         Notice(
             "lag_only",
-            f"no broadband record, the drive reaches {highest:.3g} Hz: of the dynamics only a lag is reported, "
-            f"{1e3 * value:.4g} ms ± {1.96e3 * error:.2g} ms (95 %); record noise, a chirp or steps for more",
+            f"no record is broadband and the drive ends at {highest:.3g} Hz, so that of the "
+            "dynamics only a lag is reported, "
+            f"{1e3 * value:.4g} ms ± {1.96e3 * error:.2g} ms (95 %); record noise, a chirp or "
+            "steps to identify the dynamics",
         )
     ]
     moving = [c for c in contents if c.span > 0.0]
@@ -56,7 +58,8 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent]) -> tuple[Notice
         c.bandwidth for c in moving
     ):
         message = (
-            "one frequency only: a lag and a narrow play turn its loop alike, the lag is less sure than its interval"
+            "the drive has one frequency only, where a lag and a narrow backlash look alike; the "
+            "lag is less certain than its interval"
         )
         notices.append(Notice("one_frequency", message))
     return tuple(notices)

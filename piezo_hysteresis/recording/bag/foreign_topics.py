@@ -160,10 +160,12 @@ def _records(
     notices = base.notices()
     if held:
         notices.append(
-            Notice("held", "channels come on different topics: every sample has the newest value of the other")
+            Notice(
+                "held", "the channels are on different topics; every sample takes the newest value of the other channel"
+            )
         )
     if not stamped:
-        notices.append(Notice("time_base", "messages carry no stamps: their times of reception are used"))
+        notices.append(Notice("time_base", "the messages have no time stamps; their times of reception are used"))
     breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
     parts, told = split_at_gaps(channels, layout.sample_period or base.period, breaks, truncated=truncated)
     records, proposed = labelled(parts, layout.phases)

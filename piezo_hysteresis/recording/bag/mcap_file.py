@@ -76,11 +76,12 @@ class McapFile:
                     break
             where = file.tell()
         if damaged:
-            self.notices.append(Notice("damaged", f"{self.path.name}: {damaged} damaged chunks are skipped"))
+            self.notices.append(Notice("damaged", f"{self.path.name}: {damaged} damaged chunks were skipped"))
         if not ended:
             self.notices.append(
                 Notice(
-                    "cut", f"{self.path.name} ends without its index after {where} of {size} bytes: read up to there"
+                    "cut",
+                    f"{self.path.name} ends without its index after {where} of {size} bytes; the part before was read",
                 )
             )
 

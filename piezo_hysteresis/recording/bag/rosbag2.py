@@ -148,7 +148,7 @@ def _read_samples(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Not
         if len(streams) > 1:
             held = ", ".join(sorted(streams))
             raise RecordingError(f"holds several stages, expected one; choose one by `axis`: {held}")
-    notices = [Notice("damaged", f"{damaged} messages cannot be decoded and are skipped")] if damaged else []
+    notices = [Notice("damaged", f"{damaged} messages could not be decoded and were skipped")] if damaged else []
     if not streams:
         where = f" of the axis '{layout.axis}'" if layout.axis else ""
         raise RecordingError(
@@ -185,16 +185,21 @@ def _records(
             notices.append(Notice("gap", f"{lost} in {places} places", name, severe))
         if paused := sum(n for at, n in stretch.pauses.items() if at):
             held = f"{paused} samples ({paused * stretch.sample_period:.3g} s) were not measured"
-            notices.append(Notice("pause", f"{held} while the device held its voltage and was read out", name))
+            notices.append(Notice("pause", f"{held} while the device held its voltage and its memory was read", name))
         if left_out and moves:
-            text = f"the drive moved by {_travel(stretch):.3g} V before the first phase: taken as settled after it"
+            text = (
+                f"the drive moved by {_travel(stretch):.3g} V before the first phase; the stage is "
+                "assumed to have settled afterwards"
+            )
             notices.append(Notice("moved", text, name))
         if not left_out:
             begins = stretch.phase == 0 if stretch.first else stretch.lost == 0
             if excited and not kept:
-                notices.append(Notice("history", "begins after phases that are not recorded: taken as settled", name))
+                notices.append(
+                    Notice("history", "earlier phases were not recorded; the stage is assumed to have settled", name)
+                )
             if not slow.size:
-                text = f"its {stretch.size} samples are fewer than the {average} to be averaged: left out"
+                text = f"its {stretch.size} samples are fewer than the {average} to be averaged; the phase was left out"
                 notices.append(Notice("averaged", text, name))
                 continue
             if layout.average is None and average > 1:
@@ -211,7 +216,9 @@ def _records(
                 initial_voltage=float(before.channels["voltage"][-1]) if before and begins and not kept else None,
             )
             if not begins:
-                notices.append(Notice("truncated", "its beginning is not recorded: the initial state is unknown", name))
+                notices.append(
+                    Notice("truncated", "its beginning was not recorded; the initial state is unknown", name)
+                )
             records += parts
             notices += told
             kept = True
@@ -239,7 +246,7 @@ def _name(stretch: Segment, names: PhaseNames, notices: list[Notice]) -> str:
     if not name:
         name = phase_name(stretch.channels["voltage"], stretch.sample_period)
         notices.append(
-            Notice("proposed", f"phase number {stretch.phase} has no recorded name: taken for '{name}'", name)
+            Notice("proposed", f"phase number {stretch.phase} has no recorded name; '{name}' is assumed", name)
         )
     return name
 

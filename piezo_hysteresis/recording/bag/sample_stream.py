@@ -115,7 +115,7 @@ class SampleStream:
         stretches: list[Segment] = []
         notices: list[Notice] = []
         if self._uneven:
-            text = f"times within {self._uneven} of {len(self._starts)} blocks are uneven: taken as uniform"
+            text = f"times within {self._uneven} of {len(self._starts)} blocks are uneven; uniform times are assumed"
             notices.append(Notice("time_base", text))
         end = 0.0
         for run in self._runs():
@@ -176,10 +176,14 @@ class SampleStream:
     def _cut(self, run: _Run, begin: float, split_phases: bool, notices: list[Notice]) -> Iterator[Segment]:
         pieces, repeated = _swept(run.pieces)
         if repeated:
-            notices.append(Notice("duplicate", f"{repeated} samples came more than once: the first ones count"))
+            notices.append(
+                Notice("duplicate", f"{repeated} samples were received more than once; the first ones are used")
+            )
         late = sum(b[1] < a[1] for a, b in zip(pieces, pieces[1:], strict=False))
         if late:
-            notices.append(Notice("non_monotonic", f"{late} pieces came out of order: sorted by their index"))
+            notices.append(
+                Notice("non_monotonic", f"{late} pieces were received out of order and were sorted by their index")
+            )
         starts = [start for start, _, _ in pieces]
         lost = [0] + [start - _end(earlier) for start, earlier in zip(starts[1:], pieces, strict=False)]
         pausing = self._after_pause if self._tells_pauses(pieces) else set()

@@ -64,7 +64,7 @@ class SqliteFile:
                             raise sqlite3.DatabaseError("its messages are longer than the file")
                         yield *topics[topic], time_ns, data
             except (sqlite3.Error, MemoryError) as error:
-                self.notices.append(Notice("cut", f"{self.path.name} is damaged ({error}): read up to there"))
+                self.notices.append(Notice("cut", f"{self.path.name} is damaged ({error}); the part before was read"))
 
     def _size(self) -> int:
         """Bytes of the file and of its write-ahead log; RecordingError where one of them is a pipe or a device."""

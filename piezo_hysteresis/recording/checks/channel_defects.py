@@ -67,8 +67,8 @@ def _stuck(record: Record) -> list[Notice]:
     runs, at_rail = runs[moved], at_rail[moved]
     notices = []
     for kind, part, text in (
-        ("clipped", runs[at_rail], "the displacement is cut off at {:.4g} m"),
-        ("stuck", runs[~at_rail], "the displacement stands still at {:.4g} m"),
+        ("clipped", runs[at_rail], "the displacement is clipped at {:.4g} m"),
+        ("stuck", runs[~at_rail], "the displacement stays at {:.4g} m"),
     ):
         if len(part):
             samples = int((part[:, 1] - part[:, 0]).sum())
@@ -98,7 +98,7 @@ def _clipped_voltage(record: Record) -> list[Notice]:
                 samples += b - a
     if not samples:
         return []
-    text = f"the voltage is cut off for {samples} samples while the displacement goes on"
+    text = f"the voltage is clipped for {samples} samples while the displacement continues"
     return [Notice("clipped", text, record.phase, severe=samples > _SEVERE_SHARE * record.size)]
 
 

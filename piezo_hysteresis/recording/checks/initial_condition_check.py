@@ -90,7 +90,8 @@ def onset(record: Record) -> list[Notice]:
         return []
     text = (
         f"the displacement moves by {drift:.3g} m in the first {opening} samples, the drive by "
-        f"{float(np.abs(u[:opening] - u[0]).max()):.3g} V: not settled at {record.settled_voltage:.4g} V before; "
+        f"{float(np.abs(u[:opening] - u[0]).max()):.3g} V; the stage had not settled at "
+        f"{record.settled_voltage:.4g} V; "
         "give `initial_voltage`"
     )
     return [Notice("not_at_rest", text, record.phase)]
@@ -135,8 +136,9 @@ def origins(experiment: Experiment) -> list[Notice]:
         # the noise of a long record takes longest, and most records begin alike
         if apart > _APART * stroke and all(apart > _NOISE * _noise(r.displacement) for r in (record, alike[0])):
             text = (
-                f"begins at {record.voltage[0]:.4g} V as {alike[0].phase} does, but {apart:.3g} m from there: a zero "
-                "taken anew, a stage that had not settled, or drift; the model has one zero and starts from rest"
+                f"begins at {record.voltage[0]:.4g} V as {alike[0].phase} does, but {apart:.3g} m "
+                "away: the sensor zero was "
+                "changed, the stage had not settled, or it drifted; the model has one zero and starts from rest"
             )
             return [Notice("origins_differ", text, record.phase)]
     return []

@@ -66,12 +66,14 @@ def _units(experiment: Experiment, spans: Samples) -> list[Notice]:
     u_peak = max(float(np.abs(r.voltage).max()) for r in experiment)
     notices = []
     if u_span == 0.0:
-        notices.append(Notice("constant", "the voltage never changes: nothing was driven", severe=True))
+        notices.append(Notice("constant", "the voltage never changes; check that the stage was driven", severe=True))
     elif not VOLTAGE_RANGE[0] <= u_peak <= VOLTAGE_RANGE[1]:
         text = f"largest voltage {u_peak:.3g} V, expected 1 mV to 1.2 kV{_likely(u_peak, VOLTAGE_RANGE)}"
         notices.append(Notice("units", text, severe=True))
     if y_span == 0.0:
-        notices.append(Notice("constant", "the displacement never changes: sensor dead or wrong column", severe=True))
+        notices.append(
+            Notice("constant", "the displacement never changes; check the sensor and the column", severe=True)
+        )
     elif not DISPLACEMENT_RANGE[0] <= y_span <= DISPLACEMENT_RANGE[1]:
         text = f"range of displacement {y_span:.3g} m, expected 1 nm to 2 mm{_likely(y_span, DISPLACEMENT_RANGE)}"
         notices.append(Notice("units", text, severe=True))
@@ -86,7 +88,10 @@ def _gain(experiment: Experiment, gain: float) -> list[Notice]:
     parts = [r.displacement[_excerpt(r)] for r in experiment if r.size > 8]
     noise = min((float(np.median(np.abs(np.diff(y, 3)))) / 3.0 for y in parts), default=0.0)
     if gain < FAINT[0] and 0.0 < noise < FAINT[1]:
-        text = f"displacement per volt {gain:.2g} m/V with a noise of {noise:.1g} m: a unit may be off by 1e+3"
+        text = (
+            f"displacement per volt {gain:.2g} m/V with a noise of {noise:.1g} m: a unit may be "
+            "wrong by a factor of 1000"
+        )
         return [Notice("units", text)]
     return []
 
@@ -113,7 +118,7 @@ def _scale(experiment: Experiment, spans: Samples) -> list[Notice]:
             )
         elif usual > 0.0 and not 1 / _SCALE_MISMATCH < gain / usual < _SCALE_MISMATCH and not np.isnan(gain):
             power = 3 * round(float(np.log10(gain / usual)) / 3)
-            text = f"displacement per volt is 1e{power:+d} times that of the other phases: another unit"
+            text = f"displacement per volt is 1e{power:+d} times that of the other phases; its unit may differ"
             notices.append(Notice("scale", text, record.phase, severe=True))
     return notices
 
@@ -127,7 +132,7 @@ def _order(experiment: Experiment) -> list[Notice]:
     for before, after in zip(experiment.records, experiment.records[1:], strict=False):
         overlap = before.start_time + before.duration - after.start_time
         if overlap > max(0.01 * before.duration, 2 * before.sample_period):
-            text = f"begins {overlap:.3g} s before the phase before it ends: start times or a sample period are wrong"
+            text = f"begins {overlap:.3g} s before the end of the previous phase; check start times and sample periods"
             notices.append(Notice("time_base", text, after.phase))
     return notices
 
@@ -139,7 +144,7 @@ def _named_frequency(record: Record) -> list[Notice]:
         return []
     if float(found[1]) * record.duration < _FEWEST_PERIODS:
         return []  # the ends of a single period have a say in its frequency
-    text = f"the drive moves at {found[1]} Hz: the name, or the sample period {record.sample_period:g} s, is wrong"
+    text = f"the drive moves at {found[1]} Hz; the name or the sample period {record.sample_period:g} s is wrong"
     return [Notice("sample_period", text, record.phase, severe=True)]
 
 
@@ -174,6 +179,6 @@ def _polarity_and_lead(moving: list[Record]) -> list[Notice]:
         notices.append(Notice("polarity", "the displacement falls when the voltage rises", slowest.phase))
     if angle > _LEADS and lag_of(slowest) is None:
         lead = angle / 360.0 * (1.0 / _fundamental(slowest)[0])
-        text = f"the displacement leads the voltage by {angle:.1f}° ({lead:.3g} s): one channel is shifted in time"
+        text = f"the displacement leads the voltage by {angle:.1f}° ({lead:.3g} s); one channel is shifted in time"
         notices.append(Notice("leads", text, slowest.phase, severe=True))
     return notices

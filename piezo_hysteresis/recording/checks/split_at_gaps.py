@@ -78,7 +78,7 @@ def split_at_gaps(
         if (np.abs(channels[name]) < LARGEST).all():
             kept[name] = channels[name]
         else:
-            notices.append(Notice("non_finite", f"{name} has non-finite samples: the channel is left out", phase))
+            notices.append(Notice("non_finite", f"{name} has non-finite samples; the channel was left out", phase))
     if not PERIODS[0] <= sample_period <= PERIODS[1]:
         raise RecordError(f"`sample_period`: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
     good = (np.abs(voltage) < LARGEST) & (np.abs(displacement) < LARGEST)
@@ -93,13 +93,13 @@ def split_at_gaps(
     pieces = [(a, b) for a, b in pieces if b - a >= shortest]
     dropped = good.size - sum(b - a for a, b in pieces)
     if bad := int(np.count_nonzero(~good)):
-        text = f"{bad} of {good.size} samples are not finite: dropped"
+        text = f"{bad} of {good.size} samples are not finite and were dropped"
         notices.append(Notice("non_finite", text, phase, severe=bad > good.size // 2))
     if dropped > bad:
-        text = f"{dropped - bad} samples between holes too close to each other are dropped"
+        text = f"{dropped - bad} samples between closely spaced gaps were dropped"
         notices.append(Notice("split", text, phase, severe=dropped > good.size // 2))
     if len(pieces) > 1:
-        notices.append(Notice("split", f"the phase is split at its holes into {len(pieces)} records", phase))
+        notices.append(Notice("split", f"the phase was split at its gaps into {len(pieces)} records", phase))
     begin = float(labels.pop("start_time", 0.0))
     missing = np.cumsum([0, *(gaps[e] for e in edges)])
     records: list[Record] = []

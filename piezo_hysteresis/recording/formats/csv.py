@@ -57,7 +57,7 @@ class Csv:
             if layout.average is None and cells.average > 1:
                 notices.append(averaged_notice(cells.average, records[0].sample_period))
             if cells.bad:
-                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or no number"))
+                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number"))
             return Experiment(tuple(records), str(path), tuple(notices))
 
     def write(self, experiment: Experiment, path: Path) -> None:

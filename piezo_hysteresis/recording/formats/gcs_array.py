@@ -55,16 +55,19 @@ class GcsArrayFormat:
             rest = layout.with_period(period if period > 0 else None).after_reading(cells.average)
             records, notices = table_records(channels, [], rest, truncated=layout.passes_over)
             said = ", ".join(f"{name} = '{titles[at]}'" for name, at in numbers.items())
-            notices.append(Notice("columns", f"columns taken: {said}; positions without a unit in um"))
+            notices.append(Notice("columns", f"columns used: {said}; positions without a unit are taken in µm"))
             declared = int(header.get("NDATA", "-1"))
             if declared >= 0 and layout.rows is None and cells.average == 1 and channels["voltage"].size != declared:
                 notices.append(
-                    Notice("cut", f"got {channels['voltage'].size} rows of the {declared} that the header declares")
+                    Notice(
+                        "cut",
+                        f"the file has {channels['voltage'].size} of the {declared} rows that its header declares",
+                    )
                 )
             if layout.average is None and cells.average > 1:
                 notices.append(averaged_notice(cells.average, records[0].sample_period))
             if cells.bad:
-                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or no number"))
+                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number"))
             return Experiment(tuple(records), str(path), tuple(notices))
 
 

@@ -28,8 +28,8 @@ def averaged_notice(average: int, sample_period: float, phase: str = "") -> Noti
     """What was lost where a recording was averaged because it is long; `sample_period` [s] is the one reached."""
     return Notice(
         "averaged",
-        f"more than {ENOUGH} samples: {average} are averaged into one on reading, to a sample period of "
-        f"{sample_period:g} s; what is faster than {0.5 / sample_period:.3g} Hz is lost. "
+        f"the recording has more than {ENOUGH} samples; {average} were averaged into one, to a sample period of "
+        f"{sample_period:g} s; motion above {0.5 / sample_period:.3g} Hz is lost; to keep it, use "
         "`rows` keeps a part at the full rate, `average` = 1 keeps everything",
         phase,
     )

@@ -56,7 +56,7 @@ def labelled(
             records.append(replace(cut, phase=name, initial_voltage=None if start else part.initial_voltage))
         said += [f"{name} from {part.start_time + start * part.sample_period:.6g} s" for start, name in proposal]
     more = f" and {len(said) - 12} more" if len(said) > 12 else ""
-    return records, [Notice("proposed", f"phases named by their drive: {', '.join(said[:12])}{more}")]
+    return records, [Notice("proposed", f"the phases were named by their drive: {', '.join(said[:12])}{more}")]
 
 
 def _named(parts: Sequence[Record], phases: Sequence[tuple[float, str]]) -> list[Record]:

@@ -114,7 +114,7 @@ class TimeColumn:
                 Notice(
                     "time_base",
                     f"steps of the time base scatter by {100 * self.jitter:.1f} % of the sample period "
-                    f"{self.period:g} s: taken as uniform",
+                    f"{self.period:g} s; uniform times are assumed",
                     phase,
                     severe=self.jitter > 0.5,
                 )
@@ -122,5 +122,5 @@ class TimeColumn:
         if missing := int(self.lost.sum()):
             told.append(Notice("gap", f"{missing} samples are missing in {int((self.lost > 0).sum())} places", phase))
         if back := int((self.lost == 0).sum()):
-            told.append(Notice("non_monotonic", f"time stands still or runs back {back} times", phase, severe=back > 1))
+            told.append(Notice("non_monotonic", f"the time does not increase at {back} places", phase, severe=back > 1))
         return told
