@@ -16,7 +16,7 @@ from math import ceil, copysign, expm1, log, log1p
 
 import numpy as np
 
-from .kernel import kernel
+from .kernel import inlined, kernel
 
 LOOP = ("A", "beta", "gamma", "phi1", "phi2", "n", "k", "a")
 """Names of the loop parameters, in the order of their array."""
@@ -65,7 +65,7 @@ def advance(h, drive, length, r_same, r_flipped):
     return end
 
 
-@kernel
+@inlined
 def plain_step(h, dv, a, beta, gamma):
     """h after the n = 1 loop without terms has gone by dv ≠ 0.
 

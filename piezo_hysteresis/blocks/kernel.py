@@ -31,11 +31,16 @@ except ImportError:
         """Leave the loop as plain Python."""
         return function
 
+    inlined = kernel
 else:
 
     def kernel(function: F) -> F:
         """Compile the loop to machine code at first use and keep it on disk."""
         return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+
+    def inlined(function: F) -> F:
+        """A kernel of one sample that is compiled into the loops that call it: no call, and no wait for one."""
+        return numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)(function)
 
     @intrinsic
     def _rounded_once(typing: Any, x: Any, y: Any, z: Any) -> Any:
