@@ -84,7 +84,7 @@ def plain_step(h, dv, a, beta, gamma):
     return end
 
 
-@kernel
+@inlined
 def general_step(h, dv, p, sample_period, jump_period):
     """h after the loop with all its terms has gone by dv ≠ 0. A jump takes `jump_period`, all else `sample_period`."""
     n, k = p[EXPONENT], p[RATE]

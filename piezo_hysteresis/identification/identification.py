@@ -8,8 +8,10 @@ import numpy as np
 
 from ..effects import Arx
 from ..model.model import Model
-from ..record import Notice, Samples
+from ..record import Experiment, Notice, Samples
 from .fit.fit import Fit
+from .fit.normal_equations import Nuisance, residuals
+from .records.roles import Roles
 from .steps.comparison import InputComparison
 from .steps.delay import Delay
 from .steps.dynamics import Dynamics, OrderError
@@ -39,6 +41,26 @@ class PhaseError:
     rms: float
     percent: float
     is_fitted: bool
+
+
+def phase_errors(model: Model, experiment: Experiment, roles: Roles, reach: float) -> tuple[PhaseError, ...]:
+    """Free-run errors of the records that were fitted, then of those held out.
+
+    Parameters
+    ----------
+    model : Model
+    experiment : Experiment
+    roles : Roles
+        Which records were fitted.
+    reach : float
+        Range of the displacement of the experiment [m].
+    """
+    errors = residuals(model, experiment.records, Nuisance(offset=True))
+    rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
+    return tuple(
+        PhaseError(experiment[i].phase, rms[i], 100.0 * rms[i] / reach, i in roles.fitted)
+        for i in (*roles.fitted, *roles.held_out)
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -18,8 +18,8 @@ from ..model.provenance import provenance
 from ..record import Experiment, Notice, Record
 from .fit.fit import Fit, Progress
 from .fit.joint import fit_dynamics, fit_lag
-from .fit.normal_equations import Nuisance, residuals
-from .identification import Identification, PhaseError
+from .fit.normal_equations import residuals
+from .identification import Identification, phase_errors
 from .one_core import on_one_core
 from .records.conditioning_split import known_from_within
 from .records.excitation_content import sensor_noise
@@ -175,7 +175,7 @@ def identify(
     if not roles.broadband:
         notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted])
     report("free run", 0.95)
-    phases = _free_run(joint.model, experiment, roles, reach)
+    phases = phase_errors(joint.model, experiment, roles, reach)
     zero = float(np.mean([e.mean() for e in residuals(joint.model, records)]))
     joint = replace(joint, model=joint.model.with_effect(Offset(y0=zero)))
     if not joint.converged:
@@ -243,12 +243,3 @@ def _behind_the_gauge(
         return fit_hysteresis(frame, records, loops).model
     gain = published.dynamics.arx.dc_gain / dynamics_of(frame).dc_gain
     return frame.with_hysteresis(published.model.hysteresis.scaled(gain))
-
-
-def _free_run(model: Model, experiment: Experiment, roles: Roles, reach: float) -> tuple[PhaseError, ...]:
-    errors = residuals(model, experiment.records, Nuisance(offset=True))
-    rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
-    return tuple(
-        PhaseError(experiment[i].phase, rms[i], 100.0 * rms[i] / reach, i in roles.fitted)
-        for i in (*roles.fitted, *roles.held_out)
-    )
