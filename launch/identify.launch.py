@@ -9,6 +9,8 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from piezo_hysteresis.nodes.runtime.launch_values import parameter_file
+
 
 def generate_launch_description() -> LaunchDescription:
     stage = Path(__file__).with_name("stage.launch.py")  # declares the arguments
@@ -17,19 +19,13 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def identification(context: LaunchContext) -> list[Node]:
-    namespace, file, sim_time = (
-        LaunchConfiguration(name).perform(context) for name in ("namespace", "params_file", "use_sim_time")
-    )
+    namespace, file = (LaunchConfiguration(name).perform(context) for name in ("namespace", "params_file"))
     config = Path(get_package_share_directory("piezo_hysteresis")) / "config"
     node = Node(
         package="piezo_hysteresis",
         executable="identification_node",
         namespace=namespace,
-        parameters=[
-            str(config / "identification.yaml"),
-            *([file] if file else []),
-            {"use_sim_time": sim_time == "true"},
-        ],
+        parameters=[str(config / "identification.yaml"), *parameter_file("params_file", file)],
         output="screen",
         sigterm_timeout="30",  # it leaves the stage safe and the recording readable
     )

@@ -10,6 +10,8 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from piezo_hysteresis.nodes.runtime.launch_values import SWITCH, parameter_file, switch
+
 ARGUMENTS = (
     ("bag", None, "path of the bag"),
     ("axis", "", "namespace of the axis in the bag, e.g. stage_x"),
@@ -23,7 +25,15 @@ PLAYED = ("samples", "phase", "model")
 
 
 def generate_launch_description() -> LaunchDescription:
-    arguments = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
+    arguments = [
+        DeclareLaunchArgument(
+            name,
+            default_value=value,
+            description=text,
+            choices=list(SWITCH) if name == "use_sim_time" else None,
+        )
+        for name, value, text in ARGUMENTS
+    ]
     return LaunchDescription([*arguments, OpaqueFunction(function=actions)])
 
 
@@ -39,8 +49,8 @@ def actions(context: LaunchContext) -> list[Action]:
         namespace=value["namespace"],
         parameters=[
             str(config / "model.yaml"),
-            *([value["params_file"]] if value["params_file"] else []),
-            {"use_sim_time": value["use_sim_time"] == "true", **model},
+            *parameter_file("params_file", value["params_file"]),
+            {"use_sim_time": switch("use_sim_time", value["use_sim_time"]), **model},
         ],
         output="screen",
     )

@@ -8,39 +8,51 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
+from piezo_hysteresis.nodes.runtime.launch_values import SWITCH, parameter_file, switch
+
+SIGTERM_TIMEOUT = "30"
+"""A driver ramps to its safe voltage before it ends; launch shall not kill it meanwhile [s]."""
+
 ARGUMENTS = (
-    ("namespace", "", "namespace of the axis, e.g. stage_x"),
-    ("params_file", "", "parameter file for all nodes, read after those in share/piezo_hysteresis/config"),
-    ("use_sim_time", "false", "stamps follow /clock"),
-    ("model_file", "", "first model of the model node; empty: it waits for the topic model"),
-    ("stage", "", "back end of the driver: simulated, replay; empty: as the parameter files say"),
-    ("autostart", "true", "configure and activate the driver at start"),
-)
+    ("namespace", "", "namespace of the axis, e.g. stage_x", None),
+    ("params_file", "", "parameter file for all nodes, read after those in share/piezo_hysteresis/config", None),
+    ("use_sim_time", "false", "the model node follows /clock; a driver never does", list(SWITCH)),
+    ("model_file", "", "first model of the model node; empty: it waits for the topic model", None),
+    ("stage", "", f"back end of the driver: {', '.join(BACK_ENDS)}; empty: as the parameter files say",
+     ["", *BACK_ENDS]),
+    ("autostart", "true", "configure and activate the driver at start", list(SWITCH)),
+)  # fmt: skip
 
 
 def generate_launch_description() -> LaunchDescription:
-    arguments = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
+    arguments = [
+        DeclareLaunchArgument(name, default_value=value, description=text, choices=choices)
+        for name, value, text, choices in ARGUMENTS
+    ]
     return LaunchDescription([*arguments, OpaqueFunction(function=nodes)])
 
 
 def nodes(context: LaunchContext) -> list[Node]:
-    value = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
+    value = {name: LaunchConfiguration(name).perform(context) for name, _, _, _ in ARGUMENTS}
     config = Path(get_package_share_directory("piezo_hysteresis")) / "config"
 
     def node(executable: str, defaults: str, **parameters: object) -> Node:
-        files = [str(config / defaults), *([value["params_file"]] if value["params_file"] else [])]
+        files = [str(config / defaults), *parameter_file("params_file", value["params_file"])]
         return Node(
             package="piezo_hysteresis",
             executable=executable,
             namespace=value["namespace"],
-            parameters=[*files, {"use_sim_time": value["use_sim_time"] == "true", **parameters}],
+            parameters=[*files, parameters],
             output="screen",
-            sigterm_timeout="30",  # a driver ramps to its safe voltage first
+            sigterm_timeout=SIGTERM_TIMEOUT,
         )
 
     stage = {"stage": value["stage"]} if value["stage"] else {}
-    model = {"model_file": value["model_file"]} if value["model_file"] else {}
+    model: dict[str, object] = {"model_file": value["model_file"]} if value["model_file"] else {}
+    if switch("use_sim_time", value["use_sim_time"]):
+        model["use_sim_time"] = True
     return [
-        node("driver_node", "driver.yaml", autostart=value["autostart"] == "true", **stage),
+        node("driver_node", "driver.yaml", autostart=switch("autostart", value["autostart"]), **stage),
         node("model_node", "model.yaml", **model),
     ]

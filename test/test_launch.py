@@ -7,6 +7,7 @@ import pytest
 
 launch = pytest.importorskip("launch", reason="no wheels of launch exist; runs on a ROS 2 installation")
 pytest.importorskip("launch_ros")
+from launch_ros.utilities import evaluate_parameters  # noqa: E402
 
 FOLDER = Path(__file__).parents[1] / "launch"
 
@@ -48,3 +49,28 @@ def test_replay_plays_no_command(tmp_path):
     assert words[words.index("--remap") + 1 :] == [
         "/stage_x/samples:=/replay/samples", "/stage_x/phase:=/replay/phase", "/stage_x/model:=/replay/model",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("autostart", "maybe"), ("use_sim_time", "yes"), ("params_file", "/nowhere/at_all.yaml"), ("stage", "nothing")],
+)
+def test_words_that_mean_nothing_are_refused(name, value):
+    """`launch` itself refuses words that are no choice, the launch file the rest; nothing is started."""
+    context = launch.LaunchContext()
+    context.launch_configurations[name] = value
+    entities = load("stage").generate_launch_description().entities
+    with pytest.raises((RuntimeError, ValueError), match=name):
+        _ = [entity.visit(context) for entity in entities]
+
+
+def test_only_the_model_node_follows_simulated_time():
+    context = launch.LaunchContext()
+    stage = load("stage")
+    context.launch_configurations.update({name: value for name, value, _, _ in stage.ARGUMENTS}, use_sim_time="True")
+    given = {}
+    for node in stage.nodes(context):
+        given[node.node_executable] = evaluate_parameters(context, node._Node__parameters)[-1]
+    assert "use_sim_time" not in given["driver_node"]
+    assert given["driver_node"]["autostart"] is True
+    assert given["model_node"]["use_sim_time"] is True

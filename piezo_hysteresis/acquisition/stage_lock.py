@@ -63,7 +63,7 @@ def _lock(what: str) -> TextIO:
         holder = file.read(20).strip() or "unknown"
         file.close()
         raise StageError(
-            f"{what} is driven by process {holder} already; stop that driver or take another namespace"
+            f"{what} is held by process {holder} already; end that one or take another namespace"
         ) from None
     file.truncate(0)
     file.write(f"{os.getpid()}\n")

@@ -24,7 +24,7 @@ def _own_folder(tmp_path, monkeypatch):
 
 def test_the_second_is_refused_until_the_first_releases():
     first = StageLock(["device A", "namespace /x"])
-    with pytest.raises(StageError, match="namespace /x is driven by process"):
+    with pytest.raises(StageError, match="namespace /x is held by process"):
         StageLock(["device B", "namespace /x"])
     StageLock(["device B"]).release()
     first.release()

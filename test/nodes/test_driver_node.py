@@ -82,7 +82,7 @@ def test_a_second_driver_refuses_until_the_first_is_gone(lab, same_machine, tmp_
     environment = {} if same_machine else {"XDG_RUNTIME_DIR": str(other)}
     second = lab.driver("-r", "__node:=second", environment=environment, discovery_time=10.0, **IDEAL)
     lab.wait(lambda: any(s.name == "second: stage" and s.level == b"\x02" for a in told for s in a.status), "an error")
-    assert ("is driven by process" if same_machine else "published by another driver") in second.output
+    assert ("is held by process" if same_machine else "published by another driver") in second.output
     assert lab.state("second") == "unconfigured"
     first.signal(signal.SIGINT)
     assert first.wait() == 0

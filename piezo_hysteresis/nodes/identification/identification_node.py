@@ -13,6 +13,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from ...acquisition.stage_lock import StageLock
 from ...effects import HYSTERESIS, Arx, Offset
 from ...errors import ParameterError, PiezoError, reason_of
 from ...identification.protocol.drive_limits import DriveLimits
@@ -61,6 +62,8 @@ class IdentificationNode(GuardedNode):
         super().__init__("identification_node", allow_undeclared_parameters=True)
         declare(self, IDENTIFICATION)
         read(self, IDENTIFICATION)
+        driver = self.resolve_topic_name(self._value("driver"))
+        self._lock = StageLock([f"the identification of {driver} in domain {self.context.get_domain_id()}"])
         self._status = IdentificationStatus(self)
         self._driver = DriverClient(self, self._value("driver"))
         self._models = advertise(self, "model")
@@ -85,6 +88,7 @@ class IdentificationNode(GuardedNode):
 
     def end(self) -> None:
         """Abort what is under way, while services still work."""
+        self._lock.release()
         if self._job is not None:
             self._end_job()
             asked = self._driver.stop()

@@ -1,0 +1,50 @@
+"""What launch arguments mean, and one identification node for a driver."""
+
+import signal
+
+import pytest
+
+from piezo_hysteresis.errors import ParameterError
+from piezo_hysteresis.nodes.runtime.launch_values import parameter_file, switch
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("true", True), ("True", True), ("1", True), ("False", False), ("0", False)]
+)
+def test_a_switch_means_what_one_types(text, value):
+    assert switch("autostart", text) is value
+
+
+@pytest.mark.parametrize("text", ["", "yes", "TRUE", " true", "2", "nonsense\x1b[2J"])
+def test_other_words_are_refused(text):
+    with pytest.raises(ParameterError, match="expected one of true, True, 1, false, False, 0"):
+        switch("autostart", text)
+
+
+def test_a_parameter_file_that_is_missing_is_refused(tmp_path):
+    file = tmp_path / "stage.yaml"
+    with pytest.raises(ParameterError, match="expected a file that exists"):
+        parameter_file("params_file", str(file))
+    with pytest.raises(ParameterError):
+        parameter_file("params_file", str(tmp_path))
+    file.touch()
+    assert parameter_file("params_file", str(file)) == [str(file)]
+    assert parameter_file("params_file", "") == []
+
+
+@pytest.mark.nodes
+def test_one_identification_node_per_driver(lab):
+    """The second one of a driver does not start; that of another driver does; a killed one leaves no lock."""
+    first = lab.start("identification_node")
+    lab.wait(lambda: "identification_node" in lab.node.get_node_names(), "the first node")
+    second = lab.start("identification_node")
+    assert second.wait() == 2
+    assert f"is held by process {first.pid} already" in second.output
+    other = lab.start("identification_node", namespace="/other")
+    lab.wait(lambda: ("identification_node", "/other") in lab.node.get_node_names_and_namespaces(), "another axis")
+    first.signal(signal.SIGKILL)
+    first.wait()
+    again = lab.start("identification_node")
+    lab.pause(3.0)
+    assert again.is_running
+    assert other.is_running
