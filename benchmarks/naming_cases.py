@@ -74,25 +74,29 @@ class Case:
             return frozenset()
         return frozenset(BY_NAME[n].family for n in self.truth)
 
-    def experiment(self) -> Experiment:
-        """Its data."""
+    def player(self) -> tuple[Plant | PackagedPlant, int]:
+        """The stage, and the seed of its drive."""
         rng = np.random.default_rng([self.seed, zlib.crc32(self.label.encode())])
         seed = int(rng.integers(1 << 31))
         if self.plant == "packaged":
-            player = PackagedPlant(_packaged(self, seed), seed)
-        else:
-            hidden = {n: _draw(n, rng) for n in self.truth}
-            plays = self.group == "plays"
-            if plays:
-                hidden.pop("hysteresis_memory", None)
-            player = Plant.random(
-                rng,
-                noise=self.noise,
-                plays=plays,
-                volt=float(rng.choice([1.0, 10.0, 125.0])),
-                hidden={**hidden, **self.extra},
-                thorough=self.plant == "thorough",
-            )
+            return PackagedPlant(_packaged(self, seed), seed), seed
+        hidden = {n: _draw(n, rng) for n in self.truth}
+        plays = self.group == "plays"
+        if plays:
+            hidden.pop("hysteresis_memory", None)
+        plant = Plant.random(
+            rng,
+            noise=self.noise,
+            plays=plays,
+            volt=float(rng.choice([1.0, 10.0, 125.0])),
+            hidden={**hidden, **self.extra},
+            thorough=self.plant == "thorough",
+        )
+        return plant, seed
+
+    def experiment(self) -> Experiment:
+        """Its data."""
+        player, seed = self.player()
         return poor(player, seed) if self.group == "poor" else rich(player, seed, self.layout)
 
 

@@ -18,6 +18,7 @@ from ..model.model import Model
 from ..record import Experiment, Notice
 from .diagnosis import Diagnosis, Verdict
 from .excitation_check import missing_excitation
+from .form_uncertainty import with_form_uncertainty
 from .gap import Gap, measure_gap
 from .next_experiment import decide
 from .residual.explicit_step import KIND, is_stepped, without_steps
@@ -172,7 +173,10 @@ def _concluded(
     gap = gap_of(final, final_training_data.nuisance)
     falls = not named or gap.falls
     if named and not falls:
-        named, final, gap = False, first, gap_of(first, training_data.nuisance)
+        named, final, final_training_data = False, first, training_data
+        gap = gap_of(first, training_data.nuisance)
+    fitted = replace(final_training_data, records=whole)
+    final = with_form_uncertainty(final, fitted, baseline_setup.whole_noise, baseline_setup.span)
     progress("next experiment", 0.95)
     verdict, reason = verdict_of(selection, named, falls, gap)
     return Diagnosis(

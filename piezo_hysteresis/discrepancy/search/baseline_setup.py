@@ -80,6 +80,11 @@ class BaselineSetup:
         """The records that are fitted, long."""
         return tuple(select_records(shortened(self.records, FITTED), self.least.tolist(), self.fitted)[0])
 
+    @property
+    def whole_noise(self) -> Array:
+        """Noise of those records [m]; infinite where one only carries the state of the stage."""
+        return np.array(select_records(self.records, self.noise.tolist(), self.fitted)[1])
+
     def is_coarse(self, model: Model) -> bool:
         """Whether by this model slow samples have lost something else, by more than the floor of a record."""
         again = intersample_error(model, self.given)

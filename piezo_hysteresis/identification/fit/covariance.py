@@ -54,6 +54,21 @@ def covariance(
     for w, m, e in zip(weights, inner, residuals(model, records, nuisance), strict=True):
         variance = e @ e / max(1.0, e.size - directions.shape[1] / len(records))
         meat += w * w * variance * colour(e) * m
+    return sandwich(bread, meat, directions)
+
+
+def sandwich(bread: Array, meat: Array, directions: Array) -> Array:
+    """Covariance (q, q) of the numbers: ``D B⁻¹ M B⁻¹ Dᵀ``.
+
+    Parameters
+    ----------
+    bread : (p, p) ndarray
+        Normal equations B along the directions.
+    meat : (p, p) ndarray
+        Covariance M of their right-hand side.
+    directions : (q, p) ndarray
+        In which the q numbers may move, D.
+    """
     diagonal = np.diag(bread)
     scale = np.divide(
         1.0, np.sqrt(np.abs(diagonal)), out=np.zeros(diagonal.size), where=diagonal > np.finfo(float).tiny

@@ -1,0 +1,61 @@
+"""How well the numbers of a model are known when its form is not exact.
+
+The standard errors of a fit treat its residual as noise. With a hundred thousand samples they become so small that the
+form of the model decides: another sampling of the same law, another integration, dynamics of another order. Every such
+difference is a structured misfit that no test can see below the adequacy floor, and that effects which trade against
+each other amplify. Brynjarsdóttir and O'Hagan 2014, Sec. 3: an interval that leaves it out excludes the truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..identification.fit.covariance import sandwich
+from ..identification.fit.fit import Fit, gauge
+from ..identification.fit.normal_equations import grams
+from .residual.noise_floor import ADEQUACY
+from .search.training_data import TrainingData
+
+Array = NDArray[np.float64]
+
+PIECES = 16.0
+"""Independent pieces of the structured misfit in one record, so that a longer record tells no more about a parameter.
+
+Chosen by the coverage of intervals on stages of other form (`python -m benchmarks.coverage`)."""
+
+
+def with_form_uncertainty(fit: Fit, training_data: TrainingData, noise: Array, span: float) -> Fit:
+    """The fit with a covariance that holds the uncertainty of the model's form.
+
+    Parameters
+    ----------
+    fit : Fit
+        To the training data.
+    training_data : TrainingData
+        The records that were fitted, and their floors.
+    noise : (r,) ndarray
+        Noise of every record [m].
+    span : float
+        Range of the displacement over the experiment [m].
+
+    Notes
+    -----
+    The misfit of a record is taken as a random function of rms δ that has `PIECES` independent pieces. The right-hand
+    side of the normal equations then has the covariance δ² (n/PIECES) SᵀS, S the sensitivities of n samples. δ is the
+    adequacy floor, or what the residual holds beyond noise where that is more.
+    """
+    directions = gauge(fit.model, fit.names)
+    bread = np.zeros((directions.shape[1],) * 2)
+    meat = np.zeros_like(bread)
+    products = grams(fit.model, training_data.records, fit.names, training_data.nuisance)
+    for gram, floor, quiet in zip(products, training_data.floors, noise, strict=True):
+        if np.isfinite(floor):
+            weight = 1.0 / (gram.size * floor**2)
+            misfit = max((ADEQUACY * span) ** 2, gram.rms**2 - quiet**2)
+            inner = directions.T @ gram.matrix[:-1, :-1] @ directions
+            bread += weight * inner
+            meat += weight**2 * misfit * gram.size / PIECES * inner
+    return replace(fit, covariance=fit.covariance + sandwich(bread, meat, directions))

@@ -1,0 +1,44 @@
+"""Intervals that do not shrink with the length of a record: closed form for one gain."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.discrepancy.form_uncertainty import PIECES, with_form_uncertainty
+from piezo_hysteresis.discrepancy.residual.noise_floor import ADEQUACY
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
+from piezo_hysteresis.effects import Arx, BoucWen, Offset
+from piezo_hysteresis.identification.fit.fit import fit
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.record import Record
+
+MODEL = Model((BoucWen(A=0.0, p1=0.0, p2=1.0), Arx(a=(), b=(1.0,), delay=1), Offset()), 1e-3, 1.0, 1e-5)
+SPAN = 2e-5
+
+
+def errors_of(size, misfit=0.0):
+    """Standard errors of p2 without and with the form, from a sine with white noise and a slow misfit."""
+    rng = np.random.default_rng(3)
+    u = np.sin(2 * np.pi * 5 * np.arange(size) / size)
+    (y,) = MODEL.simulate(Record(u, np.zeros(size), 1e-3))
+    noise = 1e-9
+    slow = misfit * np.sqrt(2.0) * np.cos(2 * np.pi * 3 * np.arange(size) / size)
+    record = Record(u, y + noise * rng.normal(size=size) + slow, 1e-3)
+    training_data = TrainingData((record,), np.array([noise]), Nuisance(), extent_of([record], MODEL))
+    found = fit(MODEL, (record,), ["bouc_wen.p2"], floors=[noise])
+    wider = with_form_uncertainty(found, training_data, np.array([noise]), SPAN)
+    return found.standard_errors["bouc_wen.p2"], wider.standard_errors["bouc_wen.p2"]
+
+
+@pytest.mark.parametrize("size", [1_000, 100_000])
+def test_the_form_is_known_to_the_adequacy_floor_however_long_the_record(size):
+    """p2 moves y by a sine of amplitude 1e-5 m: δ/√PIECES over its rms."""
+    alone, wider = errors_of(size)
+    expected = ADEQUACY * SPAN / np.sqrt(PIECES) / (1e-5 / np.sqrt(2.0))
+    assert np.sqrt(wider**2 - alone**2) == pytest.approx(expected, rel=0.05)
+
+
+def test_a_misfit_that_is_seen_counts_with_its_size():
+    alone, wider = errors_of(10_000, misfit=1e-7)
+    expected = 1e-7 / np.sqrt(PIECES) / (1e-5 / np.sqrt(2.0))
+    assert np.sqrt(wider**2 - alone**2) == pytest.approx(expected, rel=0.1)
