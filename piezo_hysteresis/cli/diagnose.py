@@ -64,13 +64,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _comparison(found: Diagnosis) -> ModelComparison:
-    models, nuisances = {}, {}
+    models = {}
     if found.baseline is not None:
         models["before"] = found.baseline
     if found.selection is not None and found.selection.accepted and found.model not in (None, found.baseline):
         assert found.model is not None
         models["after"] = found.model
-        free = found.selection.accepted[-1].best.training_data.nuisance
-        # hum has an amplitude and a phase of its own in every record
-        nuisances = {"after": free} if free.hum_frequency is not None else {}
-    return compare(found.experiment, models, nuisances)
+    return compare(found.experiment, models)

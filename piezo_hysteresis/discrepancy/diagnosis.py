@@ -104,6 +104,7 @@ class Diagnosis:
                     "name": effect.public_name(),
                     "law": effect.name,
                     "family": effect.family,
+                    "predicted_live": effect.is_predicted_live(),
                     "member_certain": step.member_certain,
                     "explained_fraction": round(self.selection.explained(step.best.score), 4),
                     "parameters": self._parameters(effect.name),
@@ -129,6 +130,7 @@ class Diagnosis:
         return {
             "before": None if gap is None else gap.before,
             "after": None if gap is None else gap.after,
+            "live": None if gap is None else gap.live,
             "floor": None if gap is None else gap.floor,
             "after_interval_95": None if gap is None else list(gap.interval_95),
             "unseen": False if gap is None else gap.unseen,

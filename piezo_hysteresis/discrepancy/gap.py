@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,9 @@ class Gap:
         Record by record.
     unseen : bool
         True where none of the records was used for fitting or choosing; False where all had to be.
+    live : float
+        Of the extended model without what was fitted in each of these records: the residual to expect of it when it
+        predicts [% of range]. Equal to `after` but for effects that are not predicted live.
     """
 
     before: float
@@ -52,6 +55,7 @@ class Gap:
     interval_95: tuple[float, float]
     per_phase: tuple[PhaseGap, ...]
     unseen: bool
+    live: float
 
     @property
     def falls(self) -> bool:
@@ -99,6 +103,9 @@ def measure_gap(
         left = residuals(model, records, nuisance)
         rows.append([100.0 * float(np.sqrt(np.mean(left[i] ** 2))) / stroke for i in chosen])
     before, after = np.array(rows[0]), np.array(rows[1])
+    steady = replace(nuisances[1], hum_frequency=None)
+    predicted = left if steady == nuisances[1] else residuals(models[1], records, steady)
+    live = [100.0 * float(np.sqrt(np.mean(predicted[i] ** 2))) / stroke for i in chosen]
     least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
     squares = after**2
     spread = 1.96 * float(squares.std(ddof=1)) / np.sqrt(squares.size) if squares.size > 1 else float(squares[0])
@@ -113,4 +120,5 @@ def measure_gap(
             for i, b, a, f in zip(chosen, before, after, least, strict=True)
         ),
         unseen=unseen,
+        live=float(np.sqrt(np.mean(np.square(live)))),
     )

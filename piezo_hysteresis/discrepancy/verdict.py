@@ -35,6 +35,14 @@ def is_makeshift(selection: Selection) -> bool:
     return linear and selection.score.excess > LINEAR_LEAVES
 
 
+def not_predicted_live(name: str, live: float) -> str:
+    """What a user must know of an effect that has numbers of its own in every recording; `live` in % of range."""
+    return (
+        f"{name.replace('_', ' ').capitalize()} is explained in the recordings, where it has been fitted to each; "
+        f"it is not predicted live, where an error of {live:.2g} % of range stays."
+    )
+
+
 def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Verdict, str]:
     """Named, nothing missing, or unknown, and why.
 
@@ -57,7 +65,9 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
             if gap.after <= np.sqrt(ADEQUATE) * gap.floor
             else f"a gap of {gap.after / gap.floor:.1f} floors remains unexplained"
         )
-        return Verdict.NAMED, f"The model misses {names}: {100 * closed:.0f} % of the gap is explained; {rest}."
+        said = f"The model misses {names}: {100 * closed:.0f} % of the gap is explained; {rest}."
+        fitted = [s.best.effect.public_name() for s in selection.accepted if not s.best.effect.is_predicted_live()]
+        return Verdict.NAMED, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
     many = gap.unseen and len(gap.per_phase) >= FEWEST
     foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
     if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):

@@ -164,6 +164,11 @@ class Effect(ABC):
         return cls.entry or cls.name
 
     @classmethod
+    def is_predicted_live(cls) -> bool:
+        """False for an effect with numbers of its own in every recording: no model can know them in advance."""
+        return not any(row.per_record for row in cls.parameters)
+
+    @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         """Values at which a search for the effect begins.
 

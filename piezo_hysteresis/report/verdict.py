@@ -73,6 +73,12 @@ def _fit_sentences(comparison: ModelComparison) -> tuple[str, ...]:
     ]
     if before is not None:
         sentences.append(f"Before, it was {nanometre(before.rms)}, {before.percent:.3g} % of range.")
+    model = comparison.model
+    fitted = [] if model is None else [e.public_name() for e in model.effects if not e.is_predicted_live()]
+    sentences += [
+        f"{name.replace('_', ' ').capitalize()} is fitted to each recording in this error; it is not predicted live."
+        for name in fitted
+    ]
     if _excess(comparison) <= ENOUGH:
         sentences.append("That is the floor: what is left is noise.")
     else:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects import MainsHum
 from ...errors import RecordError
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.roles import CARRYING
@@ -138,7 +139,7 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
         Records, each at its own sample period.
     nuisance : Nuisance, optional
         What is free per record. Default: one constant for the whole experiment, since the zero of a displacement sensor
-        means nothing.
+        means nothing; and in every record the hum of a model that has some, whose phase no model knows in advance.
 
     Returns
     -------
@@ -165,13 +166,19 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
         means = np.array([np.mean(r.displacement - y) for r, y in zip(experiment, free_run, strict=True)])
         known = np.array([_has_known_start(r) for r in experiment])
         zero = float(means[known if known.any() else ~known].mean())
-        predicted = [y + zero for y in free_run]
+        hum = hum_of(model)
+        predicted = [_with_nuisance(r, y + zero, hum) for r, y in zip(experiment, free_run, strict=True)]
     else:
         zero = 0.0
         predicted = [_with_nuisance(r, y, nuisance) for r, y in zip(experiment, free_run, strict=True)]
     residuals = [r.displacement - y for r, y in zip(experiment, predicted, strict=True)]
     rows = [_row(i, r, e, span) for i, (r, e) in enumerate(zip(experiment, residuals, strict=True))]
     return Errors(span, zero, tuple(rows), tuple(predicted), tuple(residuals))
+
+
+def hum_of(model: Model) -> Nuisance:
+    """The mains hum of a model, free in every record: nothing where the model has none."""
+    return Nuisance(hum_frequency=model[MainsHum.name]["f"] if MainsHum.name in model else None)
 
 
 def _with_nuisance(record: Record, y: Array, nuisance: Nuisance) -> Array:

@@ -29,17 +29,9 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
             name, value = f"{effect.name}.{row.name}", effect.values[row.name]
             bounds = f"{row.lower:g} … {row.upper:g}"
             if isinstance(value, tuple):
-                rows.append(
-                    (
-                        name,
-                        row.symbol,
-                        ", ".join(f"{v:.4g}" for v in value) or "none",
-                        "",
-                        row.unit,
-                        bounds,
-                        row.meaning,
-                    )
-                )
+                numbers = ", ".join(f"{v:.4g}" for v in value) or "none"
+                shown = "fitted in each record" if row.per_record else numbers
+                rows.append((name, row.symbol, shown, "", row.unit, bounds, row.meaning))
                 continue
             interval = f"± {sure[name]:.2g}" if name in sure else ""
             message = f"{bounds}: at a bound" if name in hit else bounds
