@@ -12,12 +12,12 @@ import yaml
 ROOT = Path(__file__).parents[1]
 PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
 ROSDEP = {"yaml": "python3-yaml", "rosbags": "python3-rosbags-pip"}
-NO_KEY = {"mcap", "threadpoolctl"}
-"""No rosdep key; the README names them for pip."""
+NO_KEY = {"lz4", "mcap", "threadpoolctl", "zstandard"}
+"""No rosdep key; the README names them for pip, but for what mcap itself needs: lz4 and zstandard."""
 
 
-OPTIONAL = {"grpc", "nidaqmx"}
-"""Only for hardware: the extra of that name in setup.py."""
+OPTIONAL = {"grpc", "nidaqmx", "nptdms"}
+"""Only for hardware, and for files of LabVIEW: the extras `hardware` and `labview` in setup.py."""
 
 
 def modules():

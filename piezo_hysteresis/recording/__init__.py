@@ -43,8 +43,12 @@ from .checks.quality import inspect
 from .formats.csv import Csv
 from .formats.format import Format, WritableFormat
 from .formats.gcs_array import GcsArrayFormat
+from .formats.hdf5_variables import Hdf5Variables
 from .formats.mat import Mat
+from .formats.named_arrays import NamedArrays
+from .formats.npy_variables import NpyVariables
 from .formats.npz import Npz
+from .formats.tdms_variables import TdmsVariables
 from .segmentation.decimation import load_decimation
 from .table.read_options import Column, ReadOptions
 
@@ -57,6 +61,9 @@ FORMATS: Mapping[str, Format] = {
     "npz": Npz(),
     "rosbag2": Rosbag2(),
     "mat": Mat(),
+    "hdf5": NamedArrays((".h5", ".hdf5", ".hdf"), "an HDF5 file", Hdf5Variables),
+    "npy": NamedArrays((".npy",), "a NumPy array", NpyVariables),
+    "tdms": NamedArrays((".tdms",), "a LabVIEW TDMS file", TdmsVariables),
     "gcs_array": GcsArrayFormat(),
     "csv": Csv(),
 }
@@ -194,4 +201,8 @@ def _format(path: Path, name: str | None) -> Format:
     for chosen in FORMATS.values():
         if chosen.recognises(path):
             return chosen
-    raise RecordingError(f"{path}: not a recording this package knows; expected one of {', '.join(FORMATS)}")
+    seen = "a folder" if path.is_dir() else f"a file ending '{path.suffix}'"
+    raise RecordingError(
+        f"{path}: got {seen}, not a recording this package knows; expected one of {', '.join(FORMATS)}; "
+        "choose one by `format`, or export the data as text"
+    )

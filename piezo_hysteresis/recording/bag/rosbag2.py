@@ -58,9 +58,7 @@ class Rosbag2:
                 records, notices = read_topics(bag, layout)
             else:
                 if layout.rows is not None:
-                    raise RecordingError(
-                        f"`rows`: got {layout.rows} of a bag of phases, expected none; import it first"
-                    )
+                    raise RecordingError(f"`rows`: got {layout.rows} of a bag of phases, expected none; import it")
                 records, notices = _read_samples(bag, layout)
             return Experiment(tuple(records), str(path), (*bag.notices, *notices))
 
@@ -146,8 +144,7 @@ def _read_samples(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Not
         except Exception:  # the decoder raises whatever it likes on damaged bytes
             damaged += 1
         if len(streams) > 1:
-            held = ", ".join(sorted(streams))
-            raise RecordingError(f"holds several stages, expected one; choose one by `axis`: {held}")
+            raise RecordingError(f"holds several stages, expected one; give `axis`: {', '.join(sorted(streams))}")
     notices = [Notice("damaged", f"{damaged} messages could not be decoded and were skipped")] if damaged else []
     if not streams:
         where = f" of the axis '{layout.axis}'" if layout.axis else ""

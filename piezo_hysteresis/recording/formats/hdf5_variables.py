@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...errors import RecordingError
 from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
 from ..table.read_options import ReadOptions
-from .mat_variables import MatVariables
+from .variables import Variables
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of a file."""
@@ -33,8 +33,8 @@ def is_hdf5(path: Path) -> bool:
     return _SIGNATURE in (head[:8], head[512:])
 
 
-class Hdf5Variables(MatVariables):
-    """Dotted name to array, oriented as in MATLAB; texts are arrays of one string.
+class Hdf5Variables(Variables):
+    """Dotted name to array, that of MATLAB oriented as there; texts are arrays of one string.
 
     Parameters
     ----------
@@ -52,9 +52,10 @@ class Hdf5Variables(MatVariables):
             import h5py
         except ImportError:
             raise RecordingError(
-                "is a MATLAB 7.3 file, for which h5py is needed: pip install h5py, or save it in MATLAB with -v7"
+                "is an HDF5 file, for which h5py is needed: pip install h5py; or save it in MATLAB with -v7"
             ) from None
         self._file = h5py.File(path, "r")
+        self._rows_last = self._file.userblock_size > 0  # MATLAB stores the transpose behind its own header
         self._names: list[str] = []
         try:
             self._file.visititems(
@@ -72,9 +73,10 @@ class Hdf5Variables(MatVariables):
 
     def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
         dataset = self._numbers(name)
-        shape = tuple(dataset.shape[::-1])  # as in MATLAB
+        shape = tuple(dataset.shape[::-1]) if self._rows_last else tuple(dataset.shape)
         self.check_column(name, shape, column)
-        along = dataset.ndim - 1 if column is not None else int(np.argmax(dataset.shape))
+        last = dataset.ndim - 1 if self._rows_last else 0
+        along = last if column is not None else int(np.argmax(dataset.shape))
         intake = DecimatingBuffer.of(1, layout)
         for first in range(0, dataset.shape[along], PIECE):
             index: list[int | slice] = [column or 0] * dataset.ndim

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -16,7 +16,7 @@ from ...errors import RecordingError
 from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
 from ..table.read_options import ReadOptions
 from .mat5_sizes import COMPRESSED, HEADER, MATRIX, ORDERS, Inflated, check_sizes
-from .mat_variables import MatVariables
+from .variables import Variables
 
 _LONG = 1 << 20
 """Numbers from which a matrix is read in part."""
@@ -40,7 +40,7 @@ class _Matrix:
     kind: np.dtype[Any]
 
 
-class Mat5Variables(MatVariables):
+class Mat5Variables(Variables):
     """Dotted name to array of every variable and field; one variable is in memory at a time.
 
     Parameters
@@ -110,10 +110,34 @@ class Mat5Variables(MatVariables):
 
 def _flatten(prefix: str, content: Mapping[str, Any], flat: dict[str, NDArray[Any]]) -> None:
     for name, value in content.items():
-        if isinstance(value, dict):
+        signals = value if isinstance(value, list) else [value]
+        if signals and all(isinstance(signal, dict) and {"Name", "Data"} <= signal.keys() for signal in signals):
+            _add_signals(f"{prefix}{name}.", signals, flat)
+        elif isinstance(value, dict):
             _flatten(f"{prefix}{name}.", value, flat)
         elif not name.startswith("__"):
             flat[prefix + name] = np.asarray(value)
+
+
+def _add_signals(prefix: str, signals: Sequence[Mapping[str, Any]], flat: dict[str, NDArray[Any]]) -> None:
+    """Signals of a dSPACE capture by their names, with their units; one without a name is the time."""
+    for signal in signals:
+        path = [part.strip('" ') for part in (_text(signal["Name"]) or "time").split("/")]
+        unit = _text(signal.get("Unit", "")).strip("[] ")
+        end = f" ({unit})" if unit and unit.isascii() else ""
+        title, count = path[-1].translate(_BRACKETS), 1
+        while (name := f"{prefix}{title}{f' {count}' if count > 1 else ''}{end}") in flat:
+            count += 1  # signals of different blocks may have one name
+        flat[name] = np.asarray(signal["Data"])
+
+
+def _text(value: Any) -> str:
+    """A text, also where MATLAB has an empty array for none."""
+    return value if isinstance(value, str) else ""
+
+
+_BRACKETS = str.maketrans("[]", "()")
+"""Brackets stand for the column of a matrix."""
 
 
 def _long_matrices(path: Path) -> dict[str, _Matrix]:

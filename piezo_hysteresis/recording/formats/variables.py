@@ -1,4 +1,4 @@
-"""`MatVariables`: what the two readers of MATLAB files have in common."""
+"""`Variables`: what the readers of files that hold arrays under names have in common."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from ..segmentation.decimating_buffer import DecimatingBuffer
 from ..table.read_options import ReadOptions
 
 
-class MatVariables(Mapping[str, NDArray[Any]]):
+class Variables(Mapping[str, NDArray[Any]]):
     """Dotted name to array of every variable and field, as long as this is used as a context manager."""
+
+    kind = "the variables"
+    """What the names are, in messages."""
 
     def __enter__(self) -> Self:
         return self

@@ -1,0 +1,60 @@
+"""`NpyVariables`: the columns of a NumPy array in a file of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordingError
+from ..segmentation.decimating_buffer import DecimatingBuffer
+from ..table.read_options import ReadOptions
+from .variables import Variables
+
+
+class NpyVariables(Variables):
+    """Column to array: fields of a structured array by their names, columns of a matrix by their numbers from 1.
+
+    Parameters
+    ----------
+    path : Path
+        The file; what is not looked at is not read.
+
+    Raises
+    ------
+    RecordingError
+        If it holds pickled objects, or an array that is neither structured nor a matrix of columns.
+    """
+
+    kind = "the columns"
+
+    def __init__(self, path: Path) -> None:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+        if array.dtype.names is not None and array.ndim == 1:
+            self._columns = {name: array[name] for name in array.dtype.names}
+        elif array.dtype.names is None and array.ndim == 2:
+            long = array.T if array.shape[0] < array.shape[1] else array
+            self._columns = {str(at + 1): long[:, at] for at in range(min(long.shape[1], 1000))}
+        else:
+            raise RecordingError(f"got an array of shape {array.shape}, expected one with a column for each channel")
+
+    def close(self) -> None:
+        self._columns = {}
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return np.asarray(self._columns[name])
+
+    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
+        values = self._columns[name]
+        self.check_column(name, values.shape, column)
+        if values.dtype.kind not in "fiub":
+            raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
+        buffer = DecimatingBuffer.of(1, layout)
+        buffer.add_column(values)
+        return buffer

@@ -1,0 +1,88 @@
+"""`TdmsVariables`: the channels of a LabVIEW file, read through npTDMS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordingError
+from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
+from ..table.read_options import ReadOptions
+from .variables import Variables
+
+_BRACKETS = str.maketrans("[]", "()")
+"""Brackets stand for the column of a matrix."""
+
+
+class TdmsVariables(Variables):
+    """``"group.channel (unit)"`` to array, and ``"dt"``, the increment of the waveforms [s].
+
+    Parameters
+    ----------
+    path : Path
+        The file, open while this is used as a context manager.
+
+    Raises
+    ------
+    RecordingError
+        If npTDMS is not installed, or a channel declares more numbers than the file has bytes.
+    """
+
+    kind = "the channels"
+
+    def __init__(self, path: Path) -> None:
+        try:
+            from nptdms import TdmsFile
+        except ImportError:
+            raise RecordingError(
+                "is a LabVIEW TDMS file, for which npTDMS is needed: pip install npTDMS; or export it as text"
+            ) from None
+        self._size = path.stat().st_size
+        self._raw = path.open("rb")
+        try:
+            self._list(TdmsFile.open(self._raw))
+        except BaseException:
+            self.close()
+            raise
+
+    def _list(self, file: Any) -> None:
+        self._channels: dict[str, Any] = {}
+        self._increments: set[float] = set()
+        for group in file.groups():
+            for channel in group.channels():
+                if len(channel) > self._size:
+                    raise RecordingError(f"{channel.name}: declares {len(channel)} numbers, more than the file holds")
+                unit = str(channel.properties.get("unit_string", "")).strip("[] ")
+                name = f"{group.name}.{channel.name}" + (f" ({unit})" if unit else "")
+                self._channels[name.translate(_BRACKETS)] = channel
+                self._increments |= {float(channel.properties.get("wf_increment", 0.0))} - {0.0}
+
+    def close(self) -> None:
+        self._raw.close()
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._channels
+        if len(self._increments) == 1:
+            yield "dt"
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name == "dt":
+            return np.array(list(self._increments))
+        return np.asarray(self._channels[name][:])
+
+    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
+        channel = self._channels[name]
+        self.check_column(name, (len(channel),), column)
+        buffer = DecimatingBuffer.of(1, layout)
+        for first in range(0, len(channel), PIECE):
+            values = np.asarray(channel[first : first + PIECE])
+            if values.dtype.kind not in "fiub":
+                raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
+            buffer.add_column(values)
+            if buffer.is_full:
+                break
+        return buffer
