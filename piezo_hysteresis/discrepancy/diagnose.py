@@ -16,6 +16,7 @@ from ..identification.one_core import on_one_core
 from ..identification.records.roles import CARRYING
 from ..model.model import Model
 from ..record import Experiment, Notice
+from .changes.same_stage import same_stage
 from .diagnosis import Diagnosis, Verdict
 from .excitation_check import missing_excitation
 from .form_uncertainty import with_form_uncertainty
@@ -100,6 +101,10 @@ def _diagnosed(
     if severe := [n for n in experiment.notices if n.severe]:
         return _undecided(experiment, model, severe)
     moving = [i for i in moving if i in usable]
+    if model is not None and known is None:
+        progress("changes of the given model", 0.0)
+        if (changed := same_stage(experiment, model, moving)) is not None:
+            return changed
     if len(moving) < FEWEST:
         return diagnose_few(experiment, model, moving, effects, progress)
 

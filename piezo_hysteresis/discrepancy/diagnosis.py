@@ -9,6 +9,7 @@ from typing import Any
 from ..identification.fit.fit import Fit
 from ..model.model import Model
 from ..record import Experiment
+from .changes.change_kinds import ParameterChange
 from .gap import Gap
 from .next_experiment import NextExperiment
 from .residual.localise import ResidualShare
@@ -53,6 +54,8 @@ class Diagnosis:
     experiment : Experiment
         As it was compared: a voltage that was measured is followed but for its noise. Its notices tell the quality of
         the data, and what they cannot show.
+    change : ParameterChange or None
+        The parameter of a given model that has changed, where that explains the records.
     """
 
     verdict: Verdict
@@ -65,10 +68,13 @@ class Diagnosis:
     gap: Gap | None
     next_experiment: NextExperiment | None
     experiment: Experiment
+    change: ParameterChange | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Identifiers of the effects named, in the order of the search."""
+        if self.change is not None:
+            return (self.change.kind.name,)
         if self.verdict is not Verdict.NAMED or self.selection is None:
             return ()
         return tuple(s.best.effect.public_name() for s in self.selection.accepted)
@@ -94,6 +100,8 @@ class Diagnosis:
 
     def effects(self) -> list[dict[str, Any]]:
         """The named effects, as in ``answer.json``."""
+        if self.change is not None:
+            return [self.change.row()]
         if self.verdict is not Verdict.NAMED or self.selection is None or self.fit is None:
             return []
         rows = []

@@ -100,6 +100,8 @@ def sentence(text: str) -> str:
 
 def _headline(answer: Mapping[str, Any]) -> str:
     names = [effect["name"].replace("_", " ") for effect in answer.get("effects", ())]
+    if any(effect.get("changed_parameter") for effect in answer.get("effects", ())):
+        return f"A parameter of the model has changed: {names[0]}"
     if answer["verdict"] == "named" and names:
         return (
             f"Missing effect: {' and '.join(names)}" if len(names) == 1 else f"Missing effects: {' and '.join(names)}"

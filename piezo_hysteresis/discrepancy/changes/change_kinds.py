@@ -1,0 +1,105 @@
+"""What can have changed in a given model, and the change that was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...effects import Creep, ExtraDelay, ExtraResonance, SensorBandwidth, Softening, ThermalDrift
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeKind:
+    """A change that can be named.
+
+    Parameters
+    ----------
+    name : str
+        Effect of the catalogue that it is, or ``gain``, ``loop_height``.
+    family : str
+        As in the catalogue.
+    parameter : str
+        What changes.
+    unit : str
+        Of the size.
+    rows : tuple of str
+        Linear changes, or none where it acts on the whole prediction.
+    words : str
+        Said of the stage, with the size to be put in.
+    """
+
+    name: str
+    family: str
+    parameter: str
+    unit: str
+    rows: tuple[str, ...]
+    words: str
+
+
+KINDS: dict[str, ChangeKind] = {
+    "delay": ChangeKind(ExtraDelay.name, "lag", "tau", "s", (), "{how} by {size}"),
+    "low_pass": ChangeKind(SensorBandwidth.name, "lag", "tau", "s", (), "behind a low-pass of time constant {size}"),
+    Creep.name: ChangeKind(Creep.name, Creep.family, "relative", "1", (Creep.name,), "with creep changed by {size}"),
+    "resonance": ChangeKind(
+        ExtraResonance.name, "dynamics", "f0", "Hz", ("resonance",), "with a resonance moved by {size}"
+    ),
+    Softening.name: ChangeKind(
+        Softening.name, "dynamics", "k3", "1", (Softening.name,), "with a stiffness that depends on position, {size}"
+    ),
+    "drift": ChangeKind(ThermalDrift.name, "drift", "D", "m", ("drift_0", "drift_1"), "with a drift of {size}"),
+    "gain": ChangeKind("gain", "static", "relative_change", "1", (), "with a gain changed by {size}"),
+    "loop": ChangeKind("loop_height", "hysteresis", "relative_change", "1", (), "with a loop changed by {size}"),
+}
+"""Changes by the key of their signature."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ParameterChange:
+    """A change of one parameter of a model.
+
+    Parameters
+    ----------
+    key : str
+        Of `KINDS`.
+    size : float
+        In the unit of its kind.
+    interval_95 : (float, float)
+        With pieces of the records as units, and rivals where they explain as much.
+    rivals : tuple of str
+        Keys of the changes that explain as much.
+    before, after : float
+        V (mean R²) with gain, loop height and zero at their best, and with the change.
+    session : mapping of str to float
+        Relative change of ``gain`` and ``loop`` beside it.
+    """
+
+    key: str
+    size: float
+    interval_95: tuple[float, float]
+    rivals: tuple[str, ...]
+    before: float
+    after: float
+    session: dict[str, float]
+
+    @property
+    def kind(self) -> ChangeKind:
+        """What it is."""
+        return KINDS[self.key]
+
+    def row(self) -> dict[str, Any]:
+        """The change as an effect of ``answer.json``."""
+        kind, rivals = self.kind, [KINDS[r] for r in self.rivals]
+        low, high = self.interval_95
+        return {
+            "name": kind.name,
+            "law": kind.name,
+            "family": kind.family,
+            "member_certain": all(r.family != kind.family for r in rivals),
+            "explained_fraction": round(float(1.0 - np.sqrt(self.after / self.before)), 4),
+            "parameters": {kind.parameter: {"value": self.size, "interval_95": [low, high], "unit": kind.unit}},
+            "confusable_with": [r.name for r in rivals],
+            "held_out_gain": round(float(np.log(self.before / max(self.after, 1e-12))), 4),
+            "changed_parameter": True,
+        }

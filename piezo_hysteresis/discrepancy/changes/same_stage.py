@@ -1,0 +1,133 @@
+"""`same_stage`: the diagnosis of a stage that is the one of a given model, but for one parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...effects import Arx, ExtraDelay, ExtraResonance, SensorBandwidth, Softening, ThermalDrift
+from ...errors import DivergenceError, ModelError, ParameterError
+from ...identification.fit.normal_equations import Nuisance, residuals
+from ...model.model import Model
+from ...model.provenance import data_hash
+from ...record import Experiment, Record
+from ..diagnosis import Diagnosis, Verdict
+from ..gap import measure_gap
+from ..residual.localise import localise
+from ..residual.noise_floor import floors, noise_floors, stroke
+from .change_kinds import KINDS, ParameterChange
+from .parameter_changes import find_change
+from .signatures import DRIFT_TIMES, creep_numbers, loop_numbers
+
+ERROR, HASH = "free_run_error", "data_hash"
+"""Keys of the provenance."""
+UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
+"""Units of time."""
+
+
+def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Diagnosis | None:
+    """Name the parameter that has changed since `model` was identified; None where none explains the records.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Taken after the change.
+    model : Model
+        Identified before it, from other data.
+    used : sequence of int
+        Indices of the records that count.
+    """
+    records = experiment.records
+    if model.provenance.get(HASH) == data_hash(experiment) or not used:
+        return None
+    least = floors(records, noise_floors(records))
+    known = float(model.provenance.get(ERROR, "0"))
+    try:
+        change = find_change(model, records, used, np.maximum(least, known).tolist())
+        if change is None:
+            return None
+        changed = changed_model(model, change, records)
+        free = Nuisance(offset=True)
+        left = residuals(model, records, free)
+        gap = measure_gap((model, changed), records, list(used), least.tolist(), stroke(records), (free, free), False)
+    except (DivergenceError, ModelError, ParameterError):
+        return None
+    if not gap.after < gap.before:
+        return None
+    where = localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])
+    return Diagnosis(
+        verdict=Verdict.NAMED,
+        reason=sentence_of(change),
+        model=changed,
+        baseline=model,
+        selection=None,
+        fit=None,
+        where=where,
+        gap=gap,
+        next_experiment=None,
+        experiment=experiment,
+        change=change,
+    )
+
+
+def sentence_of(change: ParameterChange) -> str:
+    """The change in one sentence, with its size and interval."""
+    kind = change.kind
+    sure = change.size, *change.interval_95
+    if kind.unit == "s":
+        factor, unit = next((f, u) for f, u in UNITS if abs(change.size) >= f or u == "ns")
+        numbers = [abs(n) / factor if kind.words.startswith("{how}") else n / factor for n in sure]
+    elif kind.unit == "1":
+        factor, unit = 0.01, "%"
+        numbers = [n / factor for n in sure]
+    elif kind.unit == "m":
+        factor, unit = 1e-9, "nm"
+        numbers = [n / factor for n in sure]
+    else:
+        numbers, unit = list(sure), kind.unit
+    low, high = sorted(numbers[1:])
+    size = f"{numbers[0]:.4g} {unit} (95 %: {low:.4g} to {high:.4g} {unit})"
+    words = kind.words.format(how="later" if change.size > 0.0 else "earlier", size=size)
+    rivals = ", ".join(KINDS[r].name for r in change.rivals)
+    alike = f"; {rivals} explains as much" if rivals else ""
+    return f"The stage is the same, but {words}: {kind.name} ({kind.family}){alike}."
+
+
+def changed_model(model: Model, change: ParameterChange, records: Sequence[Record]) -> Model:
+    """The given model with the change, and with gain and loop height of the day."""
+    values = model.values()
+    gain, loop = change.session.get("gain", 0.0), change.session.get("loop", 0.0)
+    numbers = {n: v * (1.0 + loop) for n, v in loop_numbers(model).items()} if loop else {}
+    if change.key == "delay" and Arx.name in model and ExtraDelay.name not in model:
+        name = f"{Arx.name}.delay"
+        numbers[name] = max(0.0, values[name] + change.size / model.sample_period)
+    elif change.key == "delay":
+        present = model[ExtraDelay.name]["tau"] if ExtraDelay.name in model else 0.0
+        model = model.with_effect(ExtraDelay(tau=max(0.0, present + change.size)))
+    elif change.key == "low_pass":
+        present = model[SensorBandwidth.name]["tau"] if SensorBandwidth.name in model else 0.0
+        model = model.with_effect(SensorBandwidth(tau=present + change.size))
+    elif change.kind.name == ExtraResonance.name:
+        name = f"{ExtraResonance.name}.f0"
+        numbers[name] = values[name] + change.size
+    elif change.kind.name == ThermalDrift.name:
+        longest = max(r.duration for r in records)
+        tau = max(1.0, DRIFT_TIMES[-1] * longest)
+        model = model.with_effect(ThermalDrift(D=change.size, tau=tau))
+    elif change.kind.name == Softening.name:
+        # the cube of the displacement, by the cube of the drive
+        span = stroke(records)
+        cubic = next((n for n in model.hysteresis.linear_numbers() if n == "p1"), None)
+        if cubic is not None:
+            top = max(float(np.abs(r.voltage).max()) for r in records) / model.voltage_scale
+            slope = span / model.displacement_scale / top
+            name = f"{model.hysteresis.name}.{cubic}"
+            numbers[name] = values[name] - change.size * slope**3 * (model.displacement_scale / span) ** 2
+    else:
+        numbers |= {
+            n: v * (1.0 + change.size) for n, v in creep_numbers(model).items() if change.key not in ("gain", "loop")
+        }
+    model = model.with_values(numbers)
+    return replace(model, displacement_scale=model.displacement_scale * (1.0 + gain))

@@ -1,0 +1,160 @@
+"""What each change of a given model does to its prediction.
+
+A delay and a filter act on the predicted displacement as a whole; every other change is linear where it is small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter, lfiltic
+
+from ...effects import (
+    BoucWen,
+    Creep,
+    CreepFractional,
+    CreepTwoRates,
+    ExtraResonance,
+    HysteresisMemory,
+    Offset,
+    PublishedBoucWen,
+    Softening,
+)
+from ...model.model import Model
+from ...record import Record
+
+Array = NDArray[np.float64]
+
+DRIFT_TIMES = (0.1, 1.0)
+"""Time constants of a drift, share of the longest record."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ChangeablePrediction:
+    """A model's prediction of one record, and its slopes.
+
+    Parameters
+    ----------
+    record : Record
+        What was measured.
+    y : (n,) ndarray
+        Displacement that the model predicts, without the zero of its sensor [m].
+    before : float
+        The same before the first sample [m].
+    rows : mapping of str to (n,) ndarray
+        Change of y per unit of every linear change [m].
+    """
+
+    record: Record
+    y: Array
+    before: float
+    rows: dict[str, Array]
+
+
+def loop_numbers(model: Model) -> dict[str, float]:
+    """Numbers that together are the height of the loop, with their values."""
+    values = model.values()
+    heights = [f"{name}.A" for name in (BoucWen.name, PublishedBoucWen.name)]
+    return {n: v for n, v in values.items() if (n.startswith(f"{HysteresisMemory.name}.c[") or n in heights) and v}
+
+
+def creep_numbers(model: Model) -> dict[str, float]:
+    """Numbers that together are the rate of the creep, with their values."""
+    values = model.values()
+    names = [f"{e.name}.gamma" for e in (Creep, CreepFractional)]
+    names += [f"{CreepTwoRates.name}.{n}" for n in ("gamma_fast", "gamma_slow")]
+    return {n: values[n] for n in names if values.get(n)}
+
+
+def predictions(model: Model, records: Sequence[Record]) -> list[ChangeablePrediction]:
+    """Free run of every record, with its slopes by the linear changes.
+
+    These are ``gain``, ``loop`` and ``creep``, relative; ``resonance`` in Hz; ``softening`` per cube of the range;
+    ``drift_0`` and ``drift_1`` in m.
+    """
+    bare = model.without(Offset.name) if Offset.name in model else model
+    loop, creep = loop_numbers(bare), creep_numbers(bare)
+    resonance = [f"{ExtraResonance.name}.f0"] if ExtraResonance.name in bare else []
+    wanted = [*loop, *creep, *resonance]
+    span = max(float(np.ptp(r.displacement)) for r in records)
+    longest = max(r.duration for r in records)
+    parts: dict[int, tuple[list[Array], list[Array]]] = {}
+    order: list[str] = []
+    for index, _, y, names, slopes in bare.linearise(records, wanted):
+        order = list(names)
+        outputs, rows = parts.setdefault(index, ([], []))
+        outputs.append(y.copy())
+        rows.append(slopes.copy())
+    found: list[ChangeablePrediction] = []
+    before = 0.0
+    for index, record in enumerate(records):
+        y = np.concatenate(parts[index][0])
+        slopes = np.concatenate(parts[index][1], axis=1)
+        if not record.continues:
+            before = settled(bare, record.settled_voltage)
+        by: dict[str, Array] = {"gain": y}
+        for name, numbers in (("loop", loop), (Creep.name, creep)):
+            if numbers:
+                by[name] = sum((numbers[n] * slopes[order.index(n)] for n in numbers), np.zeros(y.size))
+        if resonance:
+            by["resonance"] = slopes[order.index(resonance[0])]
+        by[Softening.name] = -((y / span) ** 3) * span
+        time = record.start_time + record.sample_period * np.arange(y.size)
+        for k, share in enumerate(DRIFT_TIMES):
+            by[f"drift_{k}"] = -np.expm1(-time / (share * longest))
+        found.append(ChangeablePrediction(record, y, before, by))
+        before = float(y[-1])
+    return found
+
+
+def settled(model: Model, voltage: float) -> float:
+    """Displacement of a stage that has been at `voltage` for long [m]."""
+    chain, x = model.at(model.sample_period), voltage
+    for block in chain.blocks:
+        x = block.static(x)
+    return float(x)
+
+
+def delayed(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
+    """A signal of the record, `tau` later [s]; earlier where negative. It was `before` until the first sample."""
+    samples = np.arange(signal.size)
+    at = samples - tau / prediction.record.sample_period
+    padded = np.concatenate(([before], signal))
+    low = np.clip(np.floor(at).astype(int), -1, signal.size - 2)
+    part = np.clip(at - low, 0.0, 1.0)
+    # cubic inside, so that a fast sine does not lose height between its samples
+    value = padded[low + 1] * (1.0 - part) + padded[low + 2] * part
+    inner = (low >= 1) & (low < signal.size - 2)
+    k, t = low[inner], part[inner]
+    a, b, c, d = signal[k - 1], signal[k], signal[k + 1], signal[k + 2]
+    smooth = (
+        -t * (t - 1.0) * (t - 2.0) / 6.0 * a
+        + (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0 * b
+        - (t + 1.0) * t * (t - 2.0) / 2.0 * c
+        + (t + 1.0) * t * (t - 1.0) / 6.0 * d
+    )
+    value[inner] = smooth
+    return np.asarray(value)
+
+
+def filtered(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
+    """A signal of the record behind one pole of time constant `tau` [s], linear between samples."""
+    if tau <= 0.0:
+        return signal
+    x = prediction.record.sample_period / tau
+    keep = float(np.exp(-x))
+    lead = 1.0 - (1.0 - keep) / x
+    late = (1.0 - keep) - lead
+    num, den = [lead, late], [1.0, -keep]
+    state = lfiltic(num, den, [before], [before])
+    return np.asarray(lfilter(num, den, signal, zi=state)[0])
+
+
+Shaped = Callable[[ChangeablePrediction, Array, float, float], Array]
+"""(prediction, signal, value before, size) → the changed signal."""
+
+SHAPES: dict[str, Shaped] = {"delay": delayed, "low_pass": filtered}
+"""Changes that act on the whole prediction, by name."""

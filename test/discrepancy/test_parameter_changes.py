@@ -1,0 +1,72 @@
+"""The stage of a given model with a filter put into its chain, or on another day: an independent plant."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.discrepancy import Verdict, diagnose
+from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change
+from piezo_hysteresis.discrepancy.residual.noise_floor import floors
+from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.record import Experiment
+
+PERIOD = 5e-4
+STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
+
+
+def played(stage, frequencies=(1.0, 10.0, 60.0)):
+    drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD, (0.4, 0.7, 1.0))) for f in frequencies)
+    return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
+
+
+@pytest.fixture(scope="module")
+def model():
+    return identify(played(STAGE), memory=True).model
+
+
+@pytest.fixture(scope="module")
+def another_day():
+    return STAGE.on_another_day(np.random.default_rng(5))
+
+
+def change_of(model, stage):
+    records = played(stage).records
+    least = np.maximum(floors(records), float(model.provenance["free_run_error"]))
+    return find_change(model, records, range(len(records)), least.tolist())
+
+
+def test_another_day_is_no_change(model, another_day):
+    assert change_of(model, another_day) is None
+
+
+@pytest.mark.parametrize("samples", [0.1, 2.3, 20.0])
+def test_a_delay_is_found_with_its_size(model, another_day, samples):
+    change = change_of(model, replace(another_day, filter_delay=samples * PERIOD))
+    assert change.kind.family == "lag"
+    assert change.size == pytest.approx(samples * PERIOD, rel=0.03 if samples > 1 else 0.15)
+
+
+@pytest.mark.parametrize(
+    ("changed", "key", "size"),
+    [
+        ({"filter_pole": 2e-3}, "low_pass", 2e-3),
+        ({"softening": 0.03}, "softening", 0.03),
+        ({"gain": 1.06}, "gain", 0.06),
+    ],
+)
+def test_what_changed_is_named(model, another_day, changed, key, size):
+    change = change_of(model, replace(another_day, **changed))
+    assert change.key == key
+    assert change.size == pytest.approx(size, rel=0.25)
+
+
+def test_diagnose_names_a_filter_and_its_model_predicts_better(model, another_day):
+    found = diagnose(played(replace(another_day, filter_pole=2e-3)), model)
+    assert found.verdict is Verdict.NAMED
+    (effect,) = found.effects()
+    assert effect["family"] == "lag" and effect["parameters"]["tau"]["value"] == pytest.approx(2e-3, rel=0.05)
+    assert found.reason.startswith("The stage is the same, but behind a low-pass")
+    assert found.gap.after < 0.5 * found.gap.before
+    assert found.answer()["effects"] == [effect]
