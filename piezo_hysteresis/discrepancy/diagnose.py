@@ -200,7 +200,10 @@ def _concluded(
 
 def _quieted(experiment: Experiment, noise: Array) -> Experiment:
     size = f"{noise.max():.2g} V of noise"
-    notice_kinds = f"the voltage was measured with {size}; turns within {NOISE_WIDTH:g} times that are left out"
+    notice_kinds = (
+        f"the voltage was measured with {size}; voltage changes smaller than {NOISE_WIDTH:g} times "
+        "that were treated as noise"
+    )
     records = tuple(quieted(r, n) for r, n in zip(experiment.records, noise.tolist(), strict=True))
     return replace(experiment, records=records).noting(Notice(VOLTAGE_NOISE, notice_kinds))
 
@@ -218,5 +221,5 @@ def _finished(selection: Selection, training_data: TrainingData, null: float) ->
 
 
 def _undecided(experiment: Experiment, model: Model | None, severe: list[Notice]) -> Diagnosis:
-    reason = f"No verdict: {severe[0].message}."
+    reason = f"No verdict is possible, because of the data: {severe[0].message}."
     return Diagnosis(Verdict.UNKNOWN, reason, model, model, None, None, (), None, None, experiment)

@@ -89,9 +89,10 @@ class Diagnosis:
             if self.verdict is Verdict.UNKNOWN and step.accepted:
                 closed = self.selection.explained(step.best.score)
                 kept = self.model is not None and step.best.name in self.model
-                said = f"in the model, not named: up to here {closed:.2f} of the gap is explained"
+                said = f"it is in the model but not named: the effects up to this one explain {closed:.2f} of the gap"
                 rejections[step.best.name] = Rejection(
-                    step.best.name, said if kept else f"closest, but explains {closed:.2f} of the gap only"
+                    step.best.name,
+                    said if kept else f"it is the closest effect, but explains only {closed:.2f} of the gap",
                 )
             for rejection in step.rejected:
                 rejections[rejection.name] = rejection
@@ -187,7 +188,11 @@ class Diagnosis:
                 lines.append(f"    could also be {', '.join(row['confusable_with'])}")
         if self.gap is not None:
             g = self.gap
-            seen = "on records set aside" if g.unseen else "on the fitted records, none could be set aside"
+            seen = (
+                "on records set aside"
+                if g.unseen
+                else "on the training records, because there were too few for test records"
+            )
             lines.append(f"  gap {g.before:.3g} % → {g.after:.3g} % of range, floor {g.floor:.3g} % ({seen})")
         lines += [f"  where: {p.axis.replace('_', ' ')}: {p.detail}" for p in self.where[:3]]
         if self.next_experiment is not None:

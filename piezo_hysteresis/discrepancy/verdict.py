@@ -61,29 +61,34 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
     closed = selection.explained(selection.score)
     if named:
         rest = (
-            "what remains is at the floor"
+            "the remaining error is at the floor"
             if gap.after <= np.sqrt(ADEQUATE) * gap.floor
-            else f"a gap of {gap.after / gap.floor:.1f} floors remains unexplained"
+            else f"an error of {gap.after / gap.floor:.1f} times the floor remains unexplained"
         )
-        said = f"The model misses {names}: {100 * closed:.0f} % of the gap is explained; {rest}."
+        said = f"The model misses {names}, which explains {100 * closed:.0f} % of the gap; {rest}."
         fitted = [s.best.effect.public_name() for s in selection.accepted if not s.best.effect.is_predicted_live()]
         return Verdict.NAMED, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
     many = gap.unseen and len(gap.per_phase) >= FEWEST
     foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
     if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):
         if gap.after > UNFORESEEN * gap.floor:
-            message = f"those set aside, where a gap of {gap.after / gap.floor:.1f} floors remains"
-            return Verdict.UNKNOWN, f"No name: nothing is missing on the records that were fitted, but on {message}."
+            message = f"the error on the test records is {gap.after / gap.floor:.1f} times the floor"
+            return Verdict.UNKNOWN, f"No effect is named: nothing is missing on the training records, but {message}."
         return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
     if is_explained(selection) and is_makeshift(selection):
-        message = f"{names} explains {100 * closed:.0f} %, but what is linear leaves nothing where it is named rightly"
-        return Verdict.UNKNOWN, f"No name: {message}."
+        message = (
+            f"{names} explains only {100 * closed:.0f} % of the gap, and a linear effect that is really "
+            "there explains all of it"
+        )
+        return Verdict.UNKNOWN, f"No effect is named: {message}."
     if selection.accepted and not falls:
-        return Verdict.UNKNOWN, f"No name: {names} helps on the records that chose it, not on those set aside."
+        return Verdict.UNKNOWN, f"No effect is named: {names} improves the training records, but not the test records."
     message = ""
     if selection.steps:
         closest = selection.steps[0].best
         share = 100 * selection.explained(closest.score)
         why = "".join(f" ({r.reason})" for r in selection.steps[0].rejected if r.name == closest.name)
-        message = f"; closest is {closest.effect.public_name()}, which explains {share:.0f} %{why}"
-    return Verdict.UNKNOWN, f"The model misses an effect that the catalogue does not explain{message}."
+        message = (
+            f"; the closest effect is {closest.effect.public_name()}, which explains {share:.0f} % of the gap{why}"
+        )
+    return Verdict.UNKNOWN, f"Something is missing that no effect of the catalogue explains{message}."

@@ -35,10 +35,10 @@ def verdict(comparison: ModelComparison, answer: Mapping[str, Any] | None = None
     cautions = tuple(f"Caution: {message}." for message in severe)
     if comparison.now is None:
         return VerdictText(
-            "The recording, without a model", (*cautions, "No model was given: only the data are shown.")
+            "The recording, without a model", (*cautions, "No model was given. Only the data are shown.")
         )
     if answer is None:
-        more = "What is missing, `piezo diagnose` tries to name."
+        more = "`piezo diagnose` looks for the missing effect."
         advice = (more,) if _excess(comparison) > ENOUGH else ()
         return VerdictText(_fit_headline(comparison), (*cautions, *_fit_sentences(comparison), *advice))
     said = answer_verdict(answer)
@@ -80,11 +80,11 @@ def _fit_sentences(comparison: ModelComparison) -> tuple[str, ...]:
         for name in fitted
     ]
     if _excess(comparison) <= ENOUGH:
-        sentences.append("That is the floor: what is left is noise.")
+        sentences.append("This error is at the floor: only noise remains.")
     else:
         times = worst.rms / comparison.floors[worst.index]
         sentences.append(
-            f"It stands out most in {worst.phase}: {worst.percent:.3g} % of range, {times:.3g} times its floor."
+            f"The error is largest in {worst.phase}: {worst.percent:.3g} % of range, {times:.3g} times its floor."
         )
     return tuple(sentences)
 
@@ -110,7 +110,7 @@ def _headline(answer: Mapping[str, Any]) -> str:
         return "Nothing is missing beyond the noise"
     if str(answer.get("reason", "")).startswith(("No verdict", "No name")):
         return "The data do not allow a verdict"
-    return "Something is missing, but it cannot be named"
+    return "Something is missing, but these data do not determine what it is"
 
 
 def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
@@ -118,19 +118,20 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
     for effect in answer.get("effects", ()):
         name = effect["name"].replace("_", " ")
         if not answer.get("reason"):
-            found.append(
-                f"{name.capitalize()} explains {100 * effect['explained_fraction']:.0f} % of what was missing."
-            )
+            found.append(f"{name.capitalize()} explains {100 * effect['explained_fraction']:.0f} % of the gap.")
         if not effect["member_certain"]:
             twins = ", ".join(t.replace("_", " ") for t in effect["confusable_with"])
-            others = f": {twins} would do as well" if twins else ""
-            found.append(f"The family ({effect['family']}) is certain, the member is not{others}.")
+            others = f": {twins} would explain the data equally well" if twins else ""
+            found.append(
+                f"The family of the effect ({effect['family']}) is certain. Which member of the family it "
+                f"is, is not{others}."
+            )
     places = [place for place in answer.get("where", ()) if place.get("detail")]
     if places and answer["verdict"] != "nothing_missing":
-        found.append(f"The residual sits mostly here: {places[0]['detail'].rstrip('.')}.")
+        found.append(f"Most of the residual is here: {places[0]['detail'].rstrip('.')}.")
     gap = answer.get("gap_percent_of_range") or {}
     if gap.get("after") is not None:
-        seen = "On data used neither for fitting nor for choosing" if gap.get("unseen", True) else "On the fitted data"
+        seen = "On the test records" if gap.get("unseen", True) else "On the fitted data"
         found.append(
             f"{seen} the gap goes from {gap['before']:.3g} % to {gap['after']:.3g} % of range, "
             f"floor {gap['floor']:.3g} %."

@@ -76,7 +76,7 @@ def test_a_word_that_is_lost_is_not_waited_for_without_limit(lab, stage, monkeyp
             link.state = "playing"  # as where a flood of others' refusals has pushed the word out
 
     told = lab.wait(begun(lab, np.zeros(200), unheard), "the end of the campaign")
-    assert "never told to be done" in str(told)
+    assert "did not report its end" in str(told)
     assert {record.phase for record in read(lab.folder / "run")} == {"long"}
 
 

@@ -127,7 +127,7 @@ def test_stop_ramps_a_playing_waveform_down(driven):
         )
     driven.wait(lambda: any("until ~/release" in s.message for a in list(told) for s in a.status), "the diagnostics")
     assert not samples.voltage[-10:].any()
-    assert driven.call(Trigger, "driver_node/release").message == "commands are taken again"
+    assert driven.call(Trigger, "driver_node/release").message == "the driver accepts commands again"
     driven.send(np.zeros(10), "next")
     driven.wait(lambda: "done" in driven.states(statuses, "next"), "a later command")
 

@@ -115,7 +115,7 @@ def test_a_place_that_cannot_be_written_is_told(drawn, saved):
     ("change", "headline"),
     [
         ({"verdict": "nothing_missing", "effects": []}, "Nothing is missing beyond the noise"),
-        ({"verdict": "unknown", "effects": []}, "Something is missing, but it cannot be named"),
+        ({"verdict": "unknown", "effects": []}, "Something is missing, but these data do not determine what it is"),
     ],
 )
 def test_each_verdict_has_its_headline(comparison, answer, change, headline):

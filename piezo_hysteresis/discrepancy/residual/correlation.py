@@ -26,9 +26,10 @@ PREDICTABLE = 1e-9
 """Share of the residual's power below which its innovations are rounding: it is a sum of few sines."""
 
 CAPTION = (
-    "An output-error model is judged by the cross-correlation: beyond its bounds, something that the drive does is not "
-    "in the model. Auto-correlation beyond its bounds tells as well of a sensor whose noise is coloured. For the "
-    "cross-correlation, residual and drive both pass the filter that makes the residual white."
+    "The cross-correlation judges the model. If it exceeds its bounds, the residual depends on "
+    "the drive, and something is missing in the model. If only the auto-correlation exceeds "
+    "its bounds, the noise of the sensor may be coloured. For the cross-correlation, residual "
+    "and drive pass the filter that makes the residual white."
 )
 """How to read the test of whiteness."""
 

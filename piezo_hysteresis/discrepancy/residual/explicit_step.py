@@ -98,7 +98,8 @@ def without_steps(experiment: Experiment, model: Model) -> Experiment:
     records = tuple(at_period(r, model.sample_period) if _is_faster(r, model) else r for r in experiment.records)
     freed = less(records, step_changes(model, records))
     message = (
-        "jumps go by the explicit step of Eq. (7), as in a simulation and in no stage; what it changes is left out"
+        "the data were simulated with the explicit step of Eq. (7), which no real stage takes; its "
+        "contribution was subtracted"
     )
     return replace(experiment, records=freed).noting(Notice(KIND, message))
 

@@ -122,7 +122,7 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
         if lean.score.cost - score.cost < 2.0 * LEAST_GAIN + 0.5:
             lean = settled(lean, steps[0].before)
         if lean.score.cost - score.cost < LEAST_GAIN and lean.fit is not None:
-            rejection = Rejection(name, f"superfluous once {last.name} is there")
+            rejection = Rejection(name, f"it is superfluous after {last.name} was added")
             steps[k] = replace(steps[k], accepted=False, rejected=(rejection, *steps[k].rejected))
             steps[accepted[-1]] = replace(steps[accepted[-1]], best=lean)
             model, score = lean.fit.model, lean.score
@@ -163,7 +163,7 @@ def _turn(
     objection = objection or _untried_twin(type(best.effect), effects)
     accepted, rivals = objection is None, list[Candidate]()
     rejected = [
-        Rejection(name, f"on slow drive one with {twin}, which is in the model") for name, twin in twins.items()
+        Rejection(name, f"on slow drive it equals {twin}, which is in the model") for name, twin in twins.items()
     ]
     rejected += [] if objection is None else [Rejection(best.name, objection)]
     better = alone is not None and before.cost - alone.score.cost > 0.5 * LEAST_GAIN
@@ -176,11 +176,11 @@ def _turn(
         if accepted and close and (lead < 2.0 * error or alikeness(best, candidate, model) > ALIKE):
             rivals.append(candidate)
         else:
-            message = f"{lead:.2f} ± {error:.2f} behind {best.name} on records left out (mean ln R²)"
+            message = f"in cross-validation it is {lead:.2f} ± {error:.2f} behind {best.name} (mean ln R²)"
             rejected.append(Rejection(candidate.name, message))
     for candidate in _others(screened, refits):
         most = max(0.0, before.cost - candidate.score.cost)
-        rejected.append(Rejection(candidate.name, f"improves records left out by {most:.2f} at most (mean ln R²)"))
+        rejected.append(Rejection(candidate.name, f"in cross-validation it gains at most {most:.2f} in mean ln R²"))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
 
 
@@ -200,7 +200,7 @@ def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> st
     """Objection to an effect whose twin is left out of the library: none of the two can be told from the other."""
     twins = {e.public_name() for e in CATALOGUE if effect.twin == e.name or e.twin == effect.name}
     untried = sorted(twins - {e.public_name() for e in effects})
-    return f"on slow drive one with {untried[0]}, which the library lacks" if untried else None
+    return f"on slow drive it equals {untried[0]}, which was not among the candidates" if untried else None
 
 
 def _judged(
@@ -211,8 +211,8 @@ def _judged(
     gain, left = before.cost - best.score.cost, _left(best.score, before, null)
     if gain < LEAST_GAIN or left > keeps:
         message = (
-            f"improves records left out by {gain:.2f} only (mean ln R², {LEAST_GAIN:g} needed), and "
-            f"{100 * left:.0f} % of V beyond noise stays, {100 * keeps:.0f} % at most"
+            f"in cross-validation it gains {gain:.2f} in mean ln R² ({LEAST_GAIN:g} is needed), and "
+            f"{100 * left:.0f} % of the excess error remains ({100 * keeps:.0f} % is allowed)"
         )
         return best, None, message
     alone = without(best, LATER)
@@ -225,15 +225,15 @@ def _objection(best: Candidate, alone: Fitted | None, null: float, keeps: float)
     if alone is not None:
         owed = alone.score.cost - best.score.cost
         if owed < LEAST_GAIN or _left(best.score, alone.score, null) > keeps:
-            return f"gains {owed:.2f} over the model fitted anew without it"
+            return f"it gains only {owed:.2f} over the model that was refitted without it"
     if owed < DECISIVE and may_be_off(best):
-        return "all its numbers could as well be off"
+        return "its parameters do not differ significantly from their off values"
     if not is_seen(best):
-        return "changes no record by as much as half its floor"
+        return "it changes no record by more than half its floor"
     if bends_all_along(best):
-        return "its bend is wider than the drive: a curve, and no limit"
+        return "its bend is wider than the drive range, so that it is a curve and not a limit"
     if best.name == MainsHum.name and not is_steady(best):
-        return "its amplitude follows the drive from record to record"
+        return "its amplitude depends on the drive, which mains hum does not"
     return None
 
 

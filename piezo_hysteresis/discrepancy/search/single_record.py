@@ -108,13 +108,18 @@ def diagnose_few(
     closed = explained(before.excess, selection.score.excess, null)
     missing = missing_excitation([records[i] for i in used])
     if before.excess <= ADEQUATE:
-        message = "the published model describes it down to the floor, so that it speaks for no effect and against none"
+        message = "the published model reaches the floor, so that the data give no information on further effects"
     elif names:
-        message = f"closest is {' with '.join(names)}, which explains {100 * closed:.0f} % and is in the model"
+        message = (
+            f"the closest effect is {' with '.join(names)}, which explains {100 * closed:.0f} % of the "
+            "gap and was added to the model"
+        )
     else:
-        message = "nothing in the catalogue helps on blocks left out"
+        message = "no effect of the catalogue improves the prediction of blocks that were left out"
     count = "one record" if len(used) == 1 else f"{len(used)} records"
-    reason = "; ".join((f"No name: {count} cannot tell effects apart", message, *(n.message for n in missing)))
+    reason = "; ".join(
+        (f"No effect is named, because {count} cannot distinguish effects", message, *(n.message for n in missing))
+    )
     return Diagnosis(
         verdict=Verdict.UNKNOWN,
         reason=f"{reason}.",

@@ -100,7 +100,7 @@ def choose_memory(
     )
     lead = of_plays - of_state
     if lead > np.log(TIE):
-        return joint, (Notice("memory", f"{message}: the state is kept"),)
+        return joint, (Notice("memory", f"{message}; the Bouc-Wen state is used"),)
     clear = lead < -np.log(TIE)
     because = (
         "the stage remembers its turning points"
@@ -110,7 +110,7 @@ def choose_memory(
     kept, kept_floors = select(records, floors, fitted)
     free = [*linear_numbers(plays), *(n for n in joint.names if n.startswith(f"{Arx.name}."))]
     found = fit(plays, kept, free, floors=kept_floors, nuisance=Nuisance(offset=True))
-    return found, (Notice("memory", f"{message}: {because}; hysteresis_memory is taken"),)
+    return found, (Notice("memory", f"{message}; {because}, so hysteresis_memory is used"),)
 
 
 def left_out(blocks: Sequence[Record], floors: Sequence[float], fitted_to: Callable[[list[int]], Model]) -> Array:

@@ -68,7 +68,7 @@ class DriverClaims:
         if not self._claim.has_expired(time.monotonic()) or self._is_playing():
             return
         self._claim.release(owner)
-        self._end(f"{owner} was not heard any more; its claim has ended")
+        self._end(f"{owner} did not renew its claim; the claim has ended")
 
     def _is_playing(self) -> bool:
         try:

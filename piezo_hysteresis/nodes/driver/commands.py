@@ -109,7 +109,7 @@ class DriverCommands:
     def _release(self) -> str:
         was_set = self._latch.release()
         self._tell_latch()
-        return "commands are taken again" if was_set else "the driver was not stopped"
+        return "the driver accepts commands again" if was_set else "the driver was not stopped"
 
     def _go_to_safety(self, latch: bool) -> str:
         try:

@@ -208,7 +208,9 @@ class DriverNode(GuardedNode, LifecycleNode):
         if sends:
             topic = self.resolve_topic_name("samples")
             raise StageError(f"{topic} is published by another driver; stop that one or take another namespace")
-        self.get_logger().warning("a publisher of samples is known but silent; taken for a driver that was killed")
+        self.get_logger().warning(
+            "another publisher of samples exists but is silent; it is taken for a driver that was killed"
+        )
 
     def _refuse_while_configured(self, parameters: list[Parameter]) -> SetParametersResult:
         """Parameters are read at configure; a change that would have no effect is not accepted."""
@@ -218,9 +220,12 @@ class DriverNode(GuardedNode, LifecycleNode):
             if name == _SIMULATED_TIME:
                 reason = f"{name}: {_OWN_CLOCK}"
             elif name.startswith("in_force."):
-                reason = "" if self._telling else f"{name} tells what holds; set {name.removeprefix('in_force.')}"
+                reason = "" if self._telling else f"{name} is read only; set {name.removeprefix('in_force.')} instead"
             elif self._session is not None and (name in ours or name.split(".")[0] in BACK_ENDS):
-                reason = f"{name} is read at configure; deactivate and clean up the driver, set it, configure"
+                reason = (
+                    f"{name} is read when the driver is configured; deactivate and clean up the driver, set it, "
+                    "and configure again"
+                )
             if reason:
                 return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)

@@ -69,7 +69,7 @@ class DriverTopics:
             send(self._phase, String(data=str(event.phase)))
             self._tell(event, delivery.first)
         if not send(self._samples, self._writer.write(delivery.block)):
-            told = f"a block of {delivery.block.size} samples was not taken by the middleware; it is lost"
+            told = f"the middleware did not accept a block of {delivery.block.size} samples; the block is lost"
             self._node.get_logger().warning(told)
         for event in ended:
             self._tell(event, delivery.first)

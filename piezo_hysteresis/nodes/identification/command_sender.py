@@ -80,6 +80,6 @@ class CommandSender:
             cloud.header.stamp = self._node.get_clock().now().to_msg()
             leaving(cloud.header.stamp)
             if not send(self._publisher, cloud):
-                lost("the middleware did not take the waveform")
+                lost("the middleware did not accept the waveform")
         except Exception as error:
             lost(reason_of(error))

@@ -38,8 +38,8 @@ PROTOCOLS: dict[str, Callable[[DriveLimits, int], Protocol]] = {"paper": paper, 
 """Words of the parameter `protocol`."""
 
 IDENTIFICATION: tuple[Row, ...] = (
-    Setting("protocol", "short", "what is played to the stage", tuple(PROTOCOLS)),
-    Setting("seed", 0, "fixes everything random in the protocol", lower=0, upper=2**31 - 1),
+    Setting("protocol", "short", "protocol to play to the stage", tuple(PROTOCOLS)),
+    Setting("seed", 0, "seed of the random waveforms of the protocol", lower=0, upper=2**31 - 1),
     Setting("driver", "driver_node", "name of the driver node in the same namespace; read at start"),
     Setting("experiment", "", "recording for ~/diagnose, inside experiment_root; empty: the last one"),
     Setting(

@@ -132,7 +132,7 @@ def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Generat
     deadline = time.monotonic() + PATIENCE
     while not condition():
         if time.monotonic() > deadline:
-            raise StageError(f"waited {PATIENCE:g} s in vain for {missing()}")
+            raise StageError(f"waited {PATIENCE:g} s, but did not find {missing()}")
         yield Progress("waiting", f"for {missing()}")
 
 
@@ -168,12 +168,17 @@ def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, tol
         if driver.state in ("sending", "sent") and time.monotonic() > deadline:
             raise StageError(f"phase '{phase.name}': no answer on 'command_status' within {PATIENCE:g} s")
         if driver.limits is None:
-            raise StageError(f"phase '{phase.name}': {driver.missing} is gone; /diagnostics and its log tell why")
+            raise StageError(
+                f"phase '{phase.name}': {driver.missing} has gone; see /diagnostics and the log of the driver"
+            )
         _require_claim(driver)
         if recorder.silence > longest_silence:
             raise StageError(f"phase '{phase.name}': no samples for {longest_silence:g} s; is the driver alive?")
         if played is None and driver.state == "playing" and recorder.holds(driver.first_index + phase.voltage.size):
             played = time.monotonic()
         if played is not None and time.monotonic() > played + PATIENCE:
-            raise StageError(f"phase '{phase.name}' was played, but never told to be done; do others flood 'command'?")
+            raise StageError(
+                f"phase '{phase.name}' was played, but the driver did not report its end; check whether "
+                "others send many commands"
+            )
         yield told

@@ -126,21 +126,24 @@ class ModelDiagnostics:
             yield DiagnosticStatus.STALE, "no samples"
             return
         if lost:
-            yield DiagnosticStatus.WARN, f"{lost} samples lost, bridged by holding the voltage"
+            yield DiagnosticStatus.WARN, f"{lost} samples were lost; the voltage was held constant over the gap"
         if repeated:
-            yield DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late, dropped"
+            yield DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late and were dropped"
         if predictor.model is None and self._model is None:
-            yield DiagnosticStatus.WARN, "no model: give model_file, or identify the stage"
+            yield DiagnosticStatus.WARN, "there is no model; give model_file, or identify the stage"
         elif predictor.model is None:
-            yield DiagnosticStatus.ERROR, "the model cannot follow: slower than the samples, or it ran away"
+            yield (
+                DiagnosticStatus.ERROR,
+                "the model cannot predict: its sample period is too long, or its output diverged",
+            )
         if predictor.model is None:
             return
         if predictor.warming_up:
             yield (
                 DiagnosticStatus.WARN,
-                "warming up: what the drive did before, or in a gap, is unknown",
+                "the model is warming up, because the earlier drive voltage is unknown",
             )
         rms = predictor.residual_rms
         if rms is not None and promised is not None and rms > self._warn * promised:
             level = DiagnosticStatus.ERROR if rms > self._error * promised else DiagnosticStatus.WARN
-            yield level, f"residual {rms / promised:.3g} times the model's free-run error"
+            yield level, f"the residual is {rms / promised:.3g} times the free-run error of the model"

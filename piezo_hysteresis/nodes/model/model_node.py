@@ -35,8 +35,26 @@ MODEL: tuple[Row, ...] = (
     Setting("model_file", "", "path of the first model; a model on the topic `model` replaces it"),
     Parameter("live_rate", "f_l", "Hz", 50.0, 0.1, 1000.0, "rate of the live scalars", _SOURCE),
     Parameter("rms_time", "T_r", "s", 1.0, 1e-3, 1e4, "time over which residual_rms is taken", _SOURCE),
-    Parameter("residual_warn", "k_w", "1", 3.0, 0.0, 1e6, "warns above so many free-run errors of the model", _SOURCE),
-    Parameter("residual_error", "k_e", "1", 10.0, 0.0, 1e6, "error above so many free-run errors", _SOURCE),
+    Parameter(
+        "residual_warn",
+        "k_w",
+        "1",
+        3.0,
+        0.0,
+        1e6,
+        "residual that causes a warning, in free-run errors of the model",
+        _SOURCE,
+    ),
+    Parameter(
+        "residual_error",
+        "k_e",
+        "1",
+        10.0,
+        0.0,
+        1e6,
+        "residual that causes an error, in free-run errors of the model",
+        _SOURCE,
+    ),
 )
 """Parameters of the model node."""
 
@@ -123,7 +141,7 @@ class ModelNode(GuardedNode):
     def _on_zero(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success = self._predictor is not None
         if self._predictor is None:
-            response.message = "no samples yet: nothing to take the offset from"
+            response.message = "no samples have arrived yet, so that the offset cannot be taken"
         else:
             self._predictor.zero()
             response.message = "the offset is the mean residual of the next 0.1 s"

@@ -79,10 +79,14 @@ def bode(comparison: ModelComparison) -> Drawing | None:
     return Drawing(
         "bode",
         "Frequency response",
-        "From drive to displacement, hysteresis included, averaged over segments; bars are ± 2σ. Dashed: the answer of "
-        "the model through the same estimator, the fair comparison. Dotted: G alone times the slope of the loop at a "
-        "turning point; larger noise wears the hysteresis off and departs from it at low frequency. Two levels that "
-        "disagree tell of hysteresis, backlash or a gain that depends on amplitude.",
+        (
+            "Frequency response from drive to displacement, hysteresis included, averaged over "
+            "segments. The bars are ± 2σ. Dashed: the model, estimated in the same way. Dotted: G "
+            "alone, times the slope of the loop at a turning point. At low frequency the measured "
+            "response departs from this line, because noise of larger amplitude shows more hysteresis. "
+            "If two amplitudes of noise disagree, the stage has hysteresis, backlash or a gain that "
+            "depends on amplitude."
+        ),
         "Bode diagram. " + "; ".join(descriptions) + ".",
         figure,
         data,

@@ -63,8 +63,11 @@ def creep(comparison: ModelComparison) -> Drawing | None:
     return Drawing(
         "creep",
         "Creep",
-        f"Mean over {len(holds)} holds of at least {SHORTEST_HOLD} s after a change of level, zero at {REFERENCE} s. "
-        "Logarithmic creep is a straight line here; what bends up late is drift, what stays flat is neither.",
+        (
+            f"Mean over {len(holds)} holds of at least {SHORTEST_HOLD} s after a change of level, set "
+            f"to zero at {REFERENCE} s. Logarithmic creep is a straight line here. Drift bends the line "
+            "upwards at long times. A stage without both gives a flat line."
+        ),
         "Creep: " + "; ".join(descriptions) + ".",
         figure,
         data,

@@ -49,8 +49,10 @@ def gap(comparison: ModelComparison) -> Drawing | None:
     return Drawing(
         "gap",
         "Error by phase",
-        "Free-run rms error of every phase. At the floor nothing is left to explain: it is the noise of the sensor or "
-        "0.03 % of the range, whichever is larger.",
+        (
+            "RMS error of every phase in free run. The floor is the noise of the sensor or 0.03 % of "
+            "the range, whichever is larger. An error at the floor needs no further explanation."
+        ),
         f"Error by phase: {message}; worst in {worst}.",
         figure,
         data,

@@ -104,8 +104,11 @@ def loops_by_amplitude(comparison: ModelComparison) -> Drawing | None:
         titles,
         "loops_by_amplitude",
         "Loops by amplitude",
-        "Slow loops, one panel per swing of the drive. The dashed line should cover the solid one; the opening is the "
-        "width of the loop halfway up, in per cent of its height.",
+        (
+            "Slow loops, one panel per amplitude of the drive. The dashed line (model) should cover "
+            "the solid line (measured). The opening is the width of the loop at half its height, in "
+            "per cent of the height."
+        ),
     )
 
 
@@ -128,8 +131,10 @@ def loops_by_frequency(comparison: ModelComparison) -> Drawing | None:
         titles,
         "loops_by_frequency",
         "Loops by frequency",
-        "The last full cycle of every sine. Lag of amplifier, mechanics and sensor opens the loops with frequency, on "
-        "top of the hysteresis that the slowest one shows.",
+        (
+            "The last full cycle of every sine. The slowest loop shows the hysteresis. With frequency, "
+            "the lag of amplifier, mechanics and sensor opens the loops further."
+        ),
     )
 
 

@@ -66,9 +66,12 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
     return Drawing(
         "residual_maps",
         "Residual against drive, displacement and rate",
-        "Grey: how often a residual occurs, all phases with equal weight, logarithmic. A mean away from zero is "
-        "something the model lacks: bent over u or y a static nonlinearity, split between rising and falling a "
-        "hysteresis, growing with du/dt a lag or a rate dependence.",
+        (
+            "Grey: how often a residual occurs, on a logarithmic scale, all phases with equal weight. "
+            "If the mean differs from zero, something is missing in the model. A mean that bends over "
+            "u or y is a static nonlinearity. A mean that differs between rising and falling drive is "
+            "hysteresis. A mean that grows with du/dt is a lag or a rate dependence."
+        ),
         "Maps of the residual: " + "; ".join(descriptions) + ".",
         figure,
         data,

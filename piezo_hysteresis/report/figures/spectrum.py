@@ -52,14 +52,18 @@ def residual_spectrum(comparison: ModelComparison) -> Drawing | None:
         axis.set_title(f"sampled every {duration(period)}")
         axis.set_xlabel("frequency [Hz]")
         worst = f[int(np.argmax(left / floor))] if floor > 0 else f[int(np.argmax(left))]
-        descriptions.append(f"sampled every {duration(period)} the residual stands out most at {worst:.3g} Hz")
+        descriptions.append(
+            f"at a sample period of {duration(period)} the residual exceeds the noise most at {worst:.3g} Hz"
+        )
     axes[0, 0].set_ylabel("amplitude density [nm/√Hz]")
     legend_above(figure, handles_of(axes[0, 0]))
     return Drawing(
         "residual_spectrum",
         "Spectrum of the residual",
-        "Where the residual lies above the white noise of the sensor, something is left to explain at that frequency. "
-        "Phases of one sample period are averaged with equal weight.",
+        (
+            "If the residual lies above the white noise of the sensor, something is missing at that "
+            "frequency. Phases of the same sample period are averaged with equal weight."
+        ),
         "Spectrum of the residual: " + "; ".join(descriptions) + ".",
         figure,
         data,

@@ -60,8 +60,11 @@ def step(comparison: ModelComparison) -> Drawing | None:
     return Drawing(
         "step",
         "Step and delay",
-        f"Mean of {measured.edges} edges, ± 2σ; {delay}. The first sample that stands out of the noise tells it, the "
-        "cost of a fit does not." + (f" Note: {message}." if message else ""),
+        (
+            f"Mean of {measured.edges} edges, ± 2σ; {delay}. The delay is read from the first sample "
+            "that exceeds the noise, not from a fit."
+        )
+        + (f" Note: {message}." if message else ""),
         f"Step response: {delay}; it reaches {1e6 * measured.mean[-1]:.4g} µm/V after {duration(data['time_s'][-1])}.",
         figure,
         data,

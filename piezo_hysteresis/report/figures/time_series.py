@@ -117,8 +117,11 @@ def time_series(comparison: ModelComparison) -> Drawing:
     return Drawing(
         "time_series",
         "Against time",
-        "Displacement and, below it, measured minus predicted. Fast phases are shown around their largest residual; of "
-        "repeated phases the one with the largest error is drawn, of the sines the slowest and the fastest.",
+        (
+            "Displacement, and below it the residual (measured minus predicted). Fast phases are shown "
+            "around their largest residual. Of repeated phases, the one with the largest error is "
+            "shown; of the sines, the slowest and the fastest."
+        ),
         f"Displacement against time for the phases {names}; {words}.",
         figure,
         data,

@@ -36,8 +36,10 @@ def tracking(plan: Plan) -> Drawing:
     return Drawing(
         "tracking",
         "Tracking",
-        "The path that is wanted, the drive voltage that the inverse of the model gives for it, and the error that the "
-        "plan itself leaves. Shaded: parts that the limits of the drive do not allow.",
+        (
+            "The wanted path, the drive voltage that the inverse model computes for it, and the "
+            "planned error. Shaded: parts of the path that the limits of the drive do not allow."
+        ),
         f"Planned error {1e9 * rms:.1f} nm rms over a range of {1e6 * plan.range:.3g} µm; drive "
         f"{plan.voltage.min():.3g} to {plan.voltage.max():.3g} V; {len(plan.reachability.parts)} unreachable parts.",
         figure,

@@ -57,15 +57,17 @@ def whiteness(comparison: ModelComparison) -> Drawing | None:
     white = "white" if found.is_white else "not white"
     free = "depends on the drive" if not found.is_independent else "does not depend on the drive"
     if found.is_independent and found.cross_bound > WIDE:
-        free = f"may depend on the drive by less than the bound of {found.cross_bound:.2g}, which is wide"
+        free = f"may depend on the drive, but by less than the wide bound of {found.cross_bound:.2g}"
     if not found.decides:
-        few = f"a record worth fewer than {FEWEST_INDEPENDENT:.0f} independent samples"
-        free = f"may or may not depend on the drive: {few} decides nothing"
+        few = f"the record has fewer than {FEWEST_INDEPENDENT:.0f} independent samples"
+        free = f"may or may not depend on the drive, because {few}"
     return Drawing(
         "residual_tests",
         "Residual tests",
-        f"In {record.phase} the residual is {white} and {free}. {CAPTION} With this many samples the tests fire at the "
-        "slightest misfit: read the height, not only the crossing.",
+        (
+            f"In {record.phase} the residual is {white} and {free}. {CAPTION} With so many samples even "
+            "a small error exceeds the bounds, so look at the size of the correlation too."
+        ),
         f"Residual tests in {record.phase}: the residual is {white} and {free}; largest cross-correlation "
         f"{np.max(np.abs(found.cross)):.3g} against a bound of {found.cross_bound:.3g}.",
         figure,

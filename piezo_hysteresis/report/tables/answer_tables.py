@@ -34,8 +34,10 @@ def where_table(answer: Mapping[str, Any]) -> Table | None:
         for place in answer.get("where", ())
         if place["detail"]
     )
-    note = "Share of the power of the residual, before anything was added."
-    return Table("Where the residual sits", ("axis", "share", "detail"), rows, note, frozenset({1})) if rows else None
+    note = "Share of the residual power before an effect was added."
+    return (
+        Table("Where the residual is large", ("axis", "share", "detail"), rows, note, frozenset({1})) if rows else None
+    )
 
 
 def gap_table(answer: Mapping[str, Any]) -> Table | None:
@@ -45,7 +47,7 @@ def gap_table(answer: Mapping[str, Any]) -> Table | None:
     rows = [(name, *(_percent(value.get(key)) for key in _GAP)) for name, value in phases.items()]
     if gap.get("before") is not None:
         rows.append(("all phases", *(_percent(gap.get(key)) for key in _GAP)))
-    seen = "data used neither for fitting nor for choosing" if gap.get("unseen", True) else "the fitted data"
+    seen = "the test records" if gap.get("unseen", True) else "the fitted data"
     note = f"Per cent of range, on {seen}."
     return Table("Gap", ("phase", *_GAP), tuple(rows), note, frozenset({1, 2, 3})) if rows else None
 

@@ -49,9 +49,11 @@ def error_table(comparison: ModelComparison) -> Table | None:
         tuple(rows),
         f"Per cent of range; the range is {1e6 * now.range:.4g} µm, peak to peak over the experiment. Every phase "
         "counts the same in the last row"
-        + ("" if whole else ", but for those that begin in an unknown state (conditioning, truncated)")
-        + ". Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase; it means little where "
-        "the stage hardly moves.",
+        + ("" if whole else ", except phases that begin in an unknown state (conditioning, truncated)")
+        + (
+            ". Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase. It has little meaning in phases in "
+            "which the stage hardly moves."
+        ),
         frozenset(range(1, len(header))),
     )
 

@@ -9,7 +9,10 @@ from ...recording.checks.lag import lag_of
 from ..words import duration
 from .table import Table
 
-_NOTE = "Lag: of the displacement at the turning points of the drive (in samples); dynamics, or a late channel."
+_NOTE = (
+    "Lag is the delay of the displacement at the turning points of the drive (in samples). It "
+    "comes from the dynamics or from a delayed channel."
+)
 """How to read the column of lags."""
 
 
