@@ -17,7 +17,7 @@ from piezo_hysteresis.model.model_file import load
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
-from .test_identification_node import Identification
+from .identification.test_identification_node import Identification
 
 pytestmark = pytest.mark.nodes
 

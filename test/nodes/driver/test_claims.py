@@ -11,7 +11,7 @@ from std_msgs.msg import Float64, String
 from piezo_hysteresis.nodes.messages.conversions import values_of
 from piezo_hysteresis.nodes.runtime.qos import LATCHED
 
-from .test_identification_node import Identification
+from ..identification.test_identification_node import Identification
 
 pytestmark = pytest.mark.nodes
 

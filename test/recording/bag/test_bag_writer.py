@@ -17,7 +17,7 @@ from piezo_hysteresis.recording import Bag, BagWriter
 from piezo_hysteresis.recording.bag.bag import REORDERING_HORIZON
 from piezo_hysteresis.recording.bag.phase_topic import STRING, PhaseNames
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def test_metadata_tell_topics_counts_times_and_quality_of_service(tmp_path):

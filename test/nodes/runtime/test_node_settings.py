@@ -13,7 +13,7 @@ from piezo_hysteresis.nodes.model.model_node import MODEL
 from piezo_hysteresis.nodes.runtime.parameters import describe
 from piezo_hysteresis.parameter import Setting
 
-CONFIG = Path(__file__).parents[2] / "config"
+CONFIG = Path(__file__).parents[3] / "config"
 
 ALL = {
     "driver": DRIVER,

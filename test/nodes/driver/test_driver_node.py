@@ -14,7 +14,7 @@ from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import write
 
-from ..acquisition.witness import Witness
+from ...acquisition.witness import Witness
 
 pytestmark = pytest.mark.nodes
 
@@ -47,7 +47,7 @@ def test_a_signal_ramps_to_the_safe_voltage(lab, number):
 
 
 def test_room_for_large_blocks_is_shared_with_nodes_that_have_less(lab):
-    profile = Path(__file__).parents[2] / "config" / "large_blocks.xml"
+    profile = Path(__file__).parents[3] / "config" / "large_blocks.xml"
     driver = lab.driver(sample_period=2e-6, environment={"FASTDDS_DEFAULT_PROFILES_FILE": str(profile)})
     samples = lab.streaming()
     lab.wait(lambda: len(samples.blocks) > 3 and samples.newest.size == 5000, "blocks of 500 kHz")

@@ -13,7 +13,7 @@ from piezo_hysteresis.nodes.identification.driver_client import DriverClient
 from piezo_hysteresis.nodes.identification.protocol_runner import campaign
 from piezo_hysteresis.recording import read
 
-from ..acquisition.witness import Witness
+from ...acquisition.witness import Witness
 
 pytestmark = pytest.mark.nodes
 

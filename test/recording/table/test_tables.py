@@ -240,7 +240,7 @@ def test_variables_of_other_software_are_understood_where_they_leave_no_doubt(tm
 
 
 def measured():
-    for folder in (os.environ.get("PIEZO_DATA", ""), Path(__file__).parents[3] / "shared" / "data"):
+    for folder in (os.environ.get("PIEZO_DATA", ""), Path(__file__).parents[4] / "shared" / "data"):
         if folder and (path := Path(folder) / "picma-p885").is_dir():
             return path
     pytest.skip("no measured data: neither PIEZO_DATA nor ../shared/data holds picma-p885")
