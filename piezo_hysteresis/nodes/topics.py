@@ -98,6 +98,7 @@ TOPICS: dict[str, Topic] = {
         Topic("residual", Float64, COMMAND, "m", "`live_rate`", "model"),
         Topic("residual_rms", Float64, COMMAND, "m", "`live_rate`", "model"),
         Topic("predicted_live", JointState, COMMAND, "V, m", "`live_rate`", "model"),
+        Topic("change", DiagnosticStatus, COMMAND, "", "1 Hz, and at every alarm", "model"),
         Topic("model", String, LATCHED, "", "at every new model", "identification", readers=("model",)),
         Topic("status", DiagnosticStatus, LATCHED, "", "at every step", "identification"),
         Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL),

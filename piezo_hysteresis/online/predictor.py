@@ -50,6 +50,8 @@ class Predictor:
     ----------
     model : Model or None
         Model in force.
+    chain, state : Chain, ChainState or None
+        Its coefficients, and its state after the newest sample.
     continuity : SequenceCheck
         Counts of received, lost and repeated samples.
 
@@ -83,7 +85,7 @@ class Predictor:
         self.sample_period = sample_period
         self.continuity = SequenceCheck(sample_period)
         self.model: Model | None = None
-        self._chain: Chain | None = None
+        self.chain: Chain | None = None
         self._warmup: Warmup | None = None
         self._waiting: Model | None = None
         self._unseen: float | None = None  # travel [V] at which the drive was last unknown
@@ -132,7 +134,7 @@ class Predictor:
         """
         chain = chain_at(model, self.sample_period)
         if self._history.count == 0:
-            self._chain, self.model = chain, model
+            self.chain, self.model = chain, model
         elif self._warmup is not None:
             self._waiting = model
         else:
@@ -206,7 +208,7 @@ class Predictor:
         newest = self._waiting or (self._warmup.model if self._warmup is not None else self.model)
         self._waiting = None
         self._history = VoltageHistory(self.sample_period)
-        self._state: ChainState | None = None
+        self.state: ChainState | None = None
         self._warmup = None
         self._zero_from(0)
         if newest is not None:
@@ -225,14 +227,14 @@ class Predictor:
 
     def _run(self, drive: Array) -> Array | None:
         self._history.append(drive)
-        if self._chain is None:
+        if self.chain is None:
             return None
-        if self._state is None:
-            self._state = self._chain.rest(self._history.rest_voltage)
+        if self.state is None:
+            self.state = self.chain.rest(self._history.rest_voltage)
         try:
-            modelled, self._state = self._chain.run(drive, self._state)
+            modelled, self.state = self.chain.run(drive, self.state)
         except DivergenceError:
-            self.model = self._chain = self._state = None
+            self.model = self.chain = self.state = None
             raise
         return modelled
 
@@ -260,7 +262,7 @@ class Predictor:
         if not warmup.advance(values):
             self._warmup = warmup
             return
-        self.model, self._chain, self._state = warmup.model, warmup.chain, warmup.state
+        self.model, self.chain, self.state = warmup.model, warmup.chain, warmup.state
         if warmup.zero is self._zero and warmup.mean is not None:
             self._zero.remodel(warmup.mean)
             self._rms.clear()

@@ -16,6 +16,7 @@ from ..messages.conversions import diagnostic
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
+from .change_reporter import ChangeReporter
 
 _LONGEST_REASON = 500
 """Characters of a reason that are told again every second."""
@@ -33,10 +34,13 @@ class ModelDiagnostics:
         The model node; its full name stands before every status.
     warn, error : float
         Multiples of the model's free-run error.
+    changes : ChangeReporter
+        Its newest status is published as well.
     """
 
-    def __init__(self, node: GuardedNode, warn: float, error: float) -> None:
+    def __init__(self, node: GuardedNode, warn: float, error: float, changes: ChangeReporter) -> None:
         self._node, self._warn, self._error = node, warn, error
+        self._changes = changes
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: prediction"
         self._publisher = advertise(node, DIAGNOSTICS)
         self._problem = self._refused = ""
@@ -111,7 +115,9 @@ class ModelDiagnostics:
         findings = list(self._findings(received, lost, repeated)) or [(DiagnosticStatus.OK, "predicting")]
         level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
         self._problem, self._latency = "", 0.0
-        array = DiagnosticArray(status=[diagnostic(level, self._name, message, self._stage, **values)])
+        array = DiagnosticArray(
+            status=[diagnostic(level, self._name, message, self._stage, **values), self._changes.status]
+        )
         array.header.stamp = self._node.get_clock().now().to_msg()
         send(self._publisher, array)
 

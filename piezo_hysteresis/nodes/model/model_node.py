@@ -25,6 +25,7 @@ from ..runtime.node_clock import now
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..topics import subscribe
+from .change_reporter import CHANGE, ChangeReporter
 from .diagnostics import ModelDiagnostics
 from .publishers import ModelTopics
 
@@ -55,6 +56,7 @@ MODEL: tuple[Row, ...] = (
         "residual that causes an error, in free-run errors of the model",
         _SOURCE,
     ),
+    *CHANGE,
 )
 """Parameters of the model node."""
 
@@ -72,7 +74,10 @@ class ModelNode(GuardedNode):
         self._before: SampleBlock | None = None
         self._reader = SampleReader()
         self._topics = ModelTopics(self)
-        self._diagnostics = ModelDiagnostics(self, self._values["residual_warn"], self._values["residual_error"])
+        self._changes = ChangeReporter(self, self._values)
+        self._diagnostics = ModelDiagnostics(
+            self, self._values["residual_warn"], self._values["residual_error"], self._changes
+        )
         if self._values["model_file"]:
             self._load(self._values["model_file"])
         self.add_on_set_parameters_callback(self._check)
@@ -100,7 +105,9 @@ class ModelNode(GuardedNode):
             return
         self._diagnostics.saw(block, now(self))
         if answer.model is not None and answer.prediction.size:
-            self._topics.publish(block.after(answer.first), answer, predictor)
+            counted = block.after(answer.first)
+            self._topics.publish(counted, answer, predictor)
+            self._changes.add(counted, answer, predictor)
 
     def _predictor_for(self, block: SampleBlock) -> Predictor | None:
         """The predictor of the stream, made anew for another sample period; None before that is known."""
@@ -144,6 +151,7 @@ class ModelNode(GuardedNode):
             response.message = "no samples have arrived yet, so that the offset cannot be taken"
         else:
             self._predictor.zero()
+            self._changes.restart()
             response.message = "the offset is the mean residual of the next 0.1 s"
         return response
 

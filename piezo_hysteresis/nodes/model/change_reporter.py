@@ -1,0 +1,164 @@
+"""`ChangeReporter`: the change watch of a model node: `~/baseline`, the topic `change`, its line on /diagnostics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from ...acquisition.sample_block import SampleBlock
+from ...errors import PiezoError
+from ...model.model import Model
+from ...online.change.baseline import Baseline
+from ...online.change.score import GROUPS, UNITS
+from ...online.change.watch import ChangeWatch, baseline_path
+from ...online.prediction import Prediction
+from ...online.predictor import Predictor
+from ...parameter import Parameter, Row, Setting
+from ..messages.conversions import diagnostic
+from ..runtime.sending import send
+from ..topics import advertise
+
+_SOURCE = "change watch"
+"""Source of the parameters of the change watch."""
+
+CHANGE: tuple[Row, ...] = (
+    Parameter(
+        "false_alarm_interval",
+        "T_fa",
+        "s",
+        86400.0,
+        60.0,
+        1e8,
+        "mean time between false alarms of the change watch",
+        _SOURCE,
+    ),
+    Parameter("baseline_time", "T_bl", "s", 60.0, 10.0, 1e5, "time over which ~/baseline is taken", _SOURCE),
+    Setting("baseline_folder", "", "folder of the baselines; empty: ~/.ros/piezo_hysteresis/<namespace>"),
+)
+"""Parameters of the change watch."""
+
+STRONG = 4.0
+"""Statistic over its threshold from which a change is an ERROR."""
+
+
+class ChangeReporter:
+    """Follows the predictor of a model node.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The model node.
+    values : mapping
+        Of the rows of `CHANGE`, by name.
+    """
+
+    def __init__(self, node: Node, values: Mapping[str, Any]) -> None:
+        self._node, self._interval = node, float(values["false_alarm_interval"])
+        self._duration = float(values["baseline_time"])
+        given = values["baseline_folder"] or Path("~/.ros/piezo_hysteresis") / node.get_namespace().strip("/")
+        self._folder = Path(given).expanduser()
+        self._watch = ChangeWatch(self._interval)
+        self._model: Model | None = None
+        self._stage = self._problem = ""
+        self._alarms = 0
+        self._publisher = advertise(node, "change")
+        self.status = DiagnosticStatus(level=DiagnosticStatus.STALE)
+        node.create_service(Trigger, "~/baseline", self._on_baseline)
+        node.create_timer(1.0, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def add(self, block: SampleBlock, answer: Prediction, predictor: Predictor) -> None:
+        """Follow the samples of a block that `answer` predicts."""
+        if answer.model is not None and answer.model is not self._model:
+            self._follow(answer.model)
+        self._stage = block.stage
+        stamp = block.stamp + round(float(block.time[-1]) * 1e9)
+        try:
+            completed = self._watch.add(np.ascontiguousarray(block.voltage), answer, predictor, stamp)
+        except PiezoError as error:
+            self._tell(f"the change watch has stopped: {error}")
+            return
+        if completed:
+            self._save()
+        if self._watch.alarms > self._alarms:
+            self._alarms = self._watch.alarms
+            self._publish()
+
+    def restart(self) -> None:
+        """Learn the offset of the sensor anew."""
+        self._watch.restart()
+
+    def _follow(self, model: Model) -> None:
+        self._model, self._problem = model, ""
+        path = baseline_path(self._folder, model)
+        baseline = None
+        try:
+            baseline = Baseline.load(path) if path.is_file() else None
+        except PiezoError as error:
+            self._tell(str(error))
+        self._watch, self._alarms = ChangeWatch(self._interval, baseline), 0
+
+    def _save(self) -> None:
+        assert self._watch.baseline is not None
+        assert self._model is not None
+        path = baseline_path(self._folder, self._model)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            self._watch.baseline.save(path)
+        except OSError as error:
+            self._tell(f"{path}: the baseline cannot be written ({error.strerror}); it holds until the node ends")
+        else:
+            self._problem = ""
+            self._node.get_logger().info(f"baseline of the change watch taken and kept in {path}")
+
+    def _tell(self, problem: str) -> None:
+        self._problem = problem
+        self._node.get_logger().warning(problem, throttle_duration_sec=1.0)
+
+    def _on_baseline(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = self._model is not None
+        if response.success:
+            self._watch.take_baseline(self._duration)
+            response.message = (
+                f"taking the baseline over the next {self._duration:g} s; drive the stage as in normal use"
+            )
+        else:
+            response.message = "no prediction yet: start the driver and give a model first"
+        return response
+
+    def _publish(self) -> None:
+        watch, change = self._watch, self._watch.change
+        values: dict[str, object] = {"alarms": watch.alarms, "statistic": change.statistic}
+        level, message = DiagnosticStatus.STALE, "no baseline; call ~/baseline while the stage is known to be good"
+        if self._problem:
+            level, message = DiagnosticStatus.WARN, self._problem
+        elif watch.is_taking:
+            message = "taking the baseline"
+        elif watch.baseline is not None and not change.watched:
+            message = "the present drive was not part of the baseline"
+        elif watch.baseline is not None and not watch.since:
+            level, message = DiagnosticStatus.OK, "no change since the baseline"
+        elif watch.since:
+            level = DiagnosticStatus.ERROR if change.statistic > STRONG else DiagnosticStatus.WARN
+            message = f"the stage has changed: {' or '.join(change.groups) or 'group unknown'}"
+        if change.groups:
+            unit = UNITS[GROUPS.index(change.groups[0])]
+            reach = 2.0 * change.deviation
+            values |= {
+                "group": ",".join(change.groups),
+                "change": change.estimate,
+                "change_low": change.estimate - reach,
+                "change_high": change.estimate + reach,
+                "unit": unit,
+            }
+        if watch.since:
+            values["onset"] = f"{watch.since // 10**9}.{watch.since % 10**9:09d}"
+        name = f"{self._node.get_fully_qualified_name().lstrip('/')}: change"
+        self.status = diagnostic(level, name, message, self._stage, **values)
+        send(self._publisher, self.status)

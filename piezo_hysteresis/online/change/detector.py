@@ -1,0 +1,141 @@
+"""`ChangeDetector`: windowed generalised likelihood ratio over the groups of parameters.
+
+For scores x_i of known scatter Σ and slopes M_i, a change θ of one group since score j gives the statistic
+(Σ_i m_iᵀ Σ⁻¹ x_i)² / Σ_i m_iᵀ Σ⁻¹ m_i, summed from j to now, with m_i the column of M_i of that group
+(Basseville, Nikiforov: Detection of Abrupt Changes, 1993, Sec. 7.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .baseline import Baseline, DriveClass, Scatter, drive_class
+from .score import BLOCK_TIME, GROUPS, ChangeScore
+from .threshold import WINDOW, threshold
+
+Array = NDArray[np.float64]
+
+ALIKE = 0.97
+"""Cosine of two groups' directions from which the present drive cannot tell them apart."""
+
+
+RECENTRED = 50
+"""Scores over which the offset of a new stream is learnt: a sensor's zero is taken anew whenever a stream begins."""
+
+_OFFSET = GROUPS.index("offset")
+"""Row of the offset."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What the change watch says after a score.
+
+    Parameters
+    ----------
+    statistic : float
+        Largest statistic over its threshold; above 1 the stage has changed.
+    groups : tuple of str
+        Group that explains it best, and those that the present drive cannot tell from it; empty where nothing can be
+        said.
+    estimate, deviation : float
+        Change of the first group and its standard deviation, in the unit of `UNITS`.
+    onset : int
+        Stamp at which the change began [ns].
+    watched : bool
+        False where the present drive is of no class of the baseline, or excites nothing.
+    """
+
+    statistic: float = 0.0
+    groups: tuple[str, ...] = ()
+    estimate: float = 0.0
+    deviation: float = 0.0
+    onset: int = 0
+    watched: bool = False
+
+
+class ChangeDetector:
+    """Compares scores with a baseline.
+
+    Parameters
+    ----------
+    baseline : Baseline
+        Of the running model.
+    false_alarm_interval : float
+        Wanted mean time between false alarms [s].
+    same_offset : bool
+        True where the sensor offset is still the one that the baseline was taken with.
+    """
+
+    def __init__(self, baseline: Baseline, false_alarm_interval: float, *, same_offset: bool) -> None:
+        self._baseline = baseline
+        self._unlearnt = 0 if same_offset else RECENTRED
+        self._same_offset = same_offset
+        self._offset, self._offset_weight = 0.0, 0.0
+        self._interval = false_alarm_interval / BLOCK_TIME
+        self._thresholds: dict[DriveClass, float] = {}
+        self._window: list[tuple[Array, Array, int, int]] = []
+
+    def add(self, score: ChangeScore) -> Change:
+        """What is known after the next score."""
+        key = drive_class(score)
+        scatter = self._baseline.scatter.get(key)
+        if scatter is None or not scatter.excited.any():
+            return Change()
+        whitened = score.slope @ scatter.whitening
+        pull = whitened @ (score.value - scatter.mean)
+        if self._unlearnt:
+            self._unlearnt -= 1
+            self._offset += pull[_OFFSET]
+            self._offset_weight += whitened[_OFFSET] @ score.slope[:, _OFFSET]
+            return Change(watched=True)
+        if self._offset_weight:
+            pull = pull - whitened @ score.slope[:, _OFFSET] * (self._offset / self._offset_weight)
+        self._window.append((pull, np.einsum("ij,ji->i", whitened, score.slope), score.stamp, scatter.count))
+        del self._window[:-WINDOW]
+        pulls, weights = (np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1))
+        length = np.arange(1, len(pulls) + 1)[:, None]
+        certain = 1.0 + length / min(row[3] for row in self._window)  # the mean of the baseline is itself uncertain
+        if not self._same_offset:
+            certain = certain + _like_offset(scatter) * length / RECENTRED
+        known = certain * scatter.inflation(len(pulls))
+        seen = scatter.excited & (weights > 0.0)
+        statistic = np.where(seen, pulls**2 / np.where(seen, weights, 1.0) / known, 0.0)
+        at, group = np.unravel_index(int(statistic.argmax()), statistic.shape)
+        return Change(
+            float(statistic[at, group]) / self._threshold(key, scatter),
+            self._alike(int(group), scatter),
+            float(pulls[at, group] / weights[at, group]),
+            float(np.sqrt(known[at, group] / weights[at, group])),
+            self._window[-1 - int(at)][2] - round(BLOCK_TIME * 1e9),
+            True,
+        )
+
+    def _threshold(self, key: DriveClass, scatter: Scatter) -> float:
+        if key not in self._thresholds:
+            self._thresholds[key] = threshold(_directions(scatter), self._interval)
+        return self._thresholds[key]
+
+    def _alike(self, group: int, scatter: Scatter) -> tuple[str, ...]:
+        directions = _directions(scatter)
+        size = np.linalg.norm(directions, axis=1)
+        cosine = np.abs(directions @ directions[group]) / np.where(size > 0, size, np.inf) / size[group]
+        others = [k for k in np.argsort(-cosine) if k != group and cosine[k] > ALIKE]
+        return (GROUPS[group], *(GROUPS[k] for k in others))
+
+
+def _like_offset(scatter: Scatter) -> Array:
+    """Squared cosine between the direction of every group and that of the offset, shape (5,)."""
+    directions = _directions(scatter)
+    size = np.linalg.norm(directions, axis=1)
+    cosine = directions @ directions[_OFFSET] / np.where(size > 0.0, size, 1.0) / size[_OFFSET]
+    return cosine**2
+
+
+def _directions(scatter: Scatter) -> Array:
+    """Direction in which a whitened score moves for a change of each group, shape (5, 5)."""
+    values, vectors = np.linalg.eigh(scatter.whitening)
+    root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+    return np.where(scatter.excited[:, None], scatter.slope @ root, 0.0)

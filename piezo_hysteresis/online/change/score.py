@@ -1,0 +1,129 @@
+"""`Scores`: residual against the sensitivities of the running model, summed up block by block.
+
+A change θ of the parameters moves the residual e by Sᵀ θ, where the rows of S are the sensitivities of the predicted
+displacement. The score z = S e / √B of a block of B samples is then M θ on average, with M = S Sᵀ / √B (the local
+approach: Benveniste, Basseville, Moustakides, IEEE Trans. Autom. Control 32 (1987) 583).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from ...model.chain import Chain, ChainState
+
+Array = NDArray[np.float64]
+
+GROUPS = ("gain", "loop", "dynamics", "slow", "offset")
+"""Groups of parameters, in the order of the rows of S.
+
+gain: all of the displacement [1]. loop: height of the hysteresis loop [1]. dynamics: lag of the displacement [s].
+slow: displacement that follows with a time constant of `SLOW_TIME` [1]. offset: zero of the sensor [m].
+"""
+
+UNITS = ("1", "1", "s", "1", "m")
+"""Units of a change of each group."""
+
+BLOCK_TIME = 0.1
+"""Time that one score covers [s]."""
+
+FEWEST_SAMPLES = 16
+"""Samples that one score covers at least."""
+
+SLOW_TIME = 3.0
+"""Time constant of the slow group [s]."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ChangeScore:
+    """One block of the stream, as the change watch sees it.
+
+    Parameters
+    ----------
+    value : (5,) ndarray
+        z = S e / √B, in the units of the rows times metres.
+    slope : (5, 5) ndarray
+        M = S Sᵀ / √B: what z moves by where the parameters move.
+    span, speed : float
+        Peak-to-peak of the drive voltage [V], and rms of its rate of change [V/s].
+    stamp : int
+        Time of the last sample [ns].
+    """
+
+    value: Array
+    slope: Array
+    span: float
+    speed: float
+    stamp: int
+
+
+class Scores:
+    """Sums up the stream of a predictor into scores.
+
+    Parameters
+    ----------
+    chain : Chain
+        Of the running model, at the period of the stream.
+    state : ChainState
+        Its state before the next sample.
+    loop : tuple of str
+        Numbers of the model that scale the height of its hysteresis loop, e.g. ``("bouc_wen.A",)``; empty for none.
+    weights : tuple of float
+        Their values.
+    rest : float
+        Voltage at which the sensitivities begin [V].
+    """
+
+    def __init__(
+        self, chain: Chain, state: ChainState, loop: tuple[str, ...], weights: tuple[float, ...], rest: float
+    ) -> None:
+        self._chain, self._state, self._loop = chain, state, loop
+        self._weights = np.array(weights)
+        self._tangent = chain.rest_tangent(rest, loop)
+        self._period = chain.setting.sample_period
+        self.block_size = max(FEWEST_SAMPLES, round(BLOCK_TIME / self._period))
+        self._decay = float(np.exp(-self._period / SLOW_TIME))
+        self._rows: list[Array] = []
+        self._held = 0
+        self._last: tuple[float, float, float] | None = None  # prediction, slow, voltage
+
+    def add(self, voltage: Array, residual: Array, stamp: int) -> list[ChangeScore]:
+        """Scores that are complete with the next samples.
+
+        Parameters
+        ----------
+        voltage : (n,) ndarray
+            Drive voltage [V].
+        residual : (n,) ndarray
+            Measured minus predicted displacement [m].
+        stamp : int
+            Time of the last of these samples [ns].
+        """
+        y, names, rows, self._state, self._tangent = self._chain.linearise(
+            voltage, self._state, self._tangent, self._loop
+        )
+        order = [self._loop.index(n) for n in names]
+        loop = self._weights[order] @ rows if names else np.zeros(y.size)
+        first, slow, before = self._last or (float(y[0]), float(y[0]), float(voltage[0]))
+        lag = -np.diff(y, prepend=first) / self._period
+        follows, _ = lfilter([1.0 - self._decay], [1.0, -self._decay], y, zi=[self._decay * slow])
+        self._last = (float(y[-1]), float(follows[-1]), float(voltage[-1]))
+        speed = np.diff(voltage, prepend=before) / self._period
+        self._rows.append(np.vstack((y, loop, lag, follows, np.ones(y.size), residual, voltage, speed)))
+        self._held += y.size
+        done: list[ChangeScore] = []
+        while self._held >= self.block_size:
+            rows = np.hstack(self._rows)
+            done.append(_score(rows[:, : self.block_size], stamp))
+            rest = rows[:, self.block_size :].copy()
+            self._rows, self._held = [rest], rest.shape[1]
+        return done
+
+
+def _score(rows: Array, stamp: int) -> ChangeScore:
+    s, e, voltage, speed = rows[:5], rows[5], rows[6], rows[7]
+    root = np.sqrt(s.shape[1])
+    return ChangeScore(s @ e / root, s @ s.T / root, float(np.ptp(voltage)), float(np.sqrt(np.mean(speed**2))), stamp)

@@ -1,0 +1,146 @@
+"""`ChangeWatch`: follows a predictor and says whether the stage still is what its model and its baseline say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.model import Model
+from ...model.model_parameters import model_hash
+from ..prediction import Prediction
+from ..predictor import Predictor
+from .baseline import Baseline
+from .detector import Change, ChangeDetector
+from .score import BLOCK_TIME, ChangeScore, Scores
+
+Array = NDArray[np.float64]
+
+
+class ChangeWatch:
+    """Scores, baseline and detector of one stream.
+
+    Parameters
+    ----------
+    false_alarm_interval : float
+        Wanted mean time between false alarms [s].
+    baseline : Baseline, optional
+        Of an earlier session; it counts while the model runs that it was taken with.
+
+    Attributes
+    ----------
+    change : Change
+        What the newest score says.
+    since : int
+        Stamp at which the change began that is still seen [ns]; 0 while there is none.
+    alarms : int
+        Times at which a change was first seen.
+
+    Raises
+    ------
+    ModelError
+        From `add`, where a baseline that was asked for cannot be taken.
+
+    Notes
+    -----
+    Everything begins anew with another model or after a gap; the baseline stays.
+    """
+
+    def __init__(self, false_alarm_interval: float, baseline: Baseline | None = None) -> None:
+        self._interval = false_alarm_interval
+        self.baseline = baseline
+        self.change, self.since, self.alarms = Change(), 0, 0
+        self._model: Model | None = None
+        self._scores: Scores | None = None
+        self._detector: ChangeDetector | None = None
+        self._wanted = 0
+        self._taken: list[ChangeScore] = []
+
+    @property
+    def is_taking(self) -> bool:
+        """True while a baseline is being taken."""
+        return self._wanted > 0
+
+    def take_baseline(self, duration: float) -> None:
+        """Take a baseline over the next `duration` of the stream [s]; the old one counts until it is complete."""
+        self._wanted, self._taken = max(1, round(duration / BLOCK_TIME)), []
+
+    def restart(self) -> None:
+        """Forget the scores so far: the sensor offset was taken anew, or samples were lost."""
+        self._scores = None
+
+    def add(self, voltage: Array, answer: Prediction, predictor: Predictor, stamp: int) -> bool:
+        """Follow one block of the stream.
+
+        Parameters
+        ----------
+        voltage : (n,) ndarray
+            Drive voltage of the samples that `answer` predicts [V].
+        answer : Prediction
+            Of the predictor.
+        predictor : Predictor
+            After it has seen the block.
+        stamp : int
+            Time of the last sample [ns].
+
+        Returns
+        -------
+        bool
+            True where a baseline was completed by the block.
+        """
+        if answer.model is None or answer.warming_up or answer.residual.size == 0:
+            self.restart()
+            return False
+        if self._scores is None or answer.model is not self._model:
+            self._follow(answer.model, predictor, float(voltage[-1]))
+            return False
+        completed = False
+        for score in self._scores.add(voltage, answer.residual, stamp):
+            completed |= self._score(score)
+        return completed
+
+    def _follow(self, model: Model, predictor: Predictor, voltage: float) -> None:
+        chain, state = predictor.chain, predictor.state
+        if chain is None or state is None:
+            return
+        if model is not self._model:
+            self.since, self._wanted = 0, 0
+        self._model = model
+        values = model.values()
+        names: tuple[str, ...] = ()
+        if model.has_hysteresis:
+            loop = model.hysteresis
+            heights = [n for n in loop.gain_numbers() if n not in loop.linear_numbers()]
+            names = tuple(f"{loop.name}.{n}" for n in heights)
+        self._scores = Scores(chain, state, names, tuple(values[n] for n in names), voltage)
+        self._watch(self.baseline, same_offset=False)
+
+    def _watch(self, baseline: Baseline | None, *, same_offset: bool) -> None:
+        self.change, self._detector = Change(), None
+        if baseline is not None and self._model is not None and baseline.model == model_hash(self._model):
+            self._detector = ChangeDetector(baseline, self._interval, same_offset=same_offset)
+
+    def _score(self, score: ChangeScore) -> bool:
+        if self._wanted:
+            self._taken.append(score)
+            if len(self._taken) < self._wanted:
+                return False
+            assert self._model is not None
+            taken, self._wanted, self._taken = self._taken, 0, []
+            self.baseline = Baseline.of(taken, model_hash(self._model))
+            self.since = 0
+            self._watch(self.baseline, same_offset=True)
+            return True
+        if self._detector is not None:
+            self.change = self._detector.add(score)
+            if self.change.statistic > 1.0 and not self.since:
+                self.since, self.alarms = self.change.onset, self.alarms + 1
+            elif self.change.watched and self.change.statistic < 0.5:
+                self.since = 0
+        return False
+
+
+def baseline_path(folder: Path, model: Model) -> Path:
+    """File of the baseline of a model in a folder."""
+    return folder / f"baseline_{model_hash(model).partition(':')[2]}.npz"

@@ -1,0 +1,151 @@
+"""The change watch on simulated streams: what it finds, what it leaves alone, and what it says it cannot see."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.effects import Arx, BoucWen, Creep
+from piezo_hysteresis.errors import ModelError
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.online.change.baseline import Baseline, Scatter
+from piezo_hysteresis.online.change.score import GROUPS
+from piezo_hysteresis.online.change.threshold import threshold
+from piezo_hysteresis.online.change.watch import ChangeWatch, baseline_path
+from piezo_hysteresis.online.predictor import Predictor
+
+PERIOD = 2e-3
+BLOCK = 50
+MODEL = Model((BoucWen(), Arx(a=(-0.6,), b=(0.2,))), PERIOD, displacement_scale=1e-5)
+SPAN = 4.2e-6
+TRAINED, WATCHED = 60.0, 30.0
+
+
+def sine(seconds, frequency=11.0, amplitude=2.5):
+    time = PERIOD * np.arange(round(seconds / PERIOD))
+    return 3.5 + amplitude * np.sin(2 * np.pi * frequency * time) * (time > 0.2)
+
+
+def follow(drive, displacement, seed=0, baseline=None, noise=5e-4):
+    """The watch after a stream, and the largest statistic after the baseline."""
+    rng = np.random.default_rng(seed)
+    measured = displacement + noise * SPAN * rng.standard_normal(displacement.size)
+    predictor, watch = Predictor(PERIOD, MODEL), ChangeWatch(3600.0, baseline)
+    largest = 0.0
+    for first in range(0, drive.size - BLOCK + 1, BLOCK):
+        part = slice(first, first + BLOCK)
+        if first == round(2.0 / PERIOD) and baseline is None:
+            watch.take_baseline(TRAINED)
+        answer = predictor.predict(first, round(first * PERIOD * 1e9), drive[part], measured[part])
+        watch.add(drive[part], answer, predictor, round((first + BLOCK) * PERIOD * 1e9))
+        largest = max(largest, watch.change.statistic)
+    return watch, largest
+
+
+def run(model, drive):
+    return model.run(drive, model.rest(drive[0]))[0]
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return sine(TRAINED + WATCHED + 4.0)
+
+
+def with_change(drive, group):
+    y, late = run(MODEL, drive), drive.size - round(WATCHED / 2 / PERIOD)
+    other = y.copy()
+    if group == "gain":
+        other = 1.002 * y
+    elif group == "offset":
+        other = y + 1e-3 * SPAN
+    elif group == "loop":
+        other = run(MODEL.with_values({"bouc_wen.A": 1.03 * MODEL.values()["bouc_wen.A"]}), drive)
+    elif group == "dynamics":
+        other = np.interp(PERIOD * np.arange(y.size) - 3e-5, PERIOD * np.arange(y.size), y)
+    return np.where(np.arange(y.size) < late, y, other), late
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_an_unchanged_stage_raises_no_alarm(drive, seed):
+    watch, largest = follow(drive, run(MODEL, drive), seed)
+    assert watch.alarms == 0
+    assert 0.05 < largest < 1.0
+
+
+@pytest.mark.parametrize("group", ["gain", "loop", "dynamics", "offset"])
+def test_a_change_is_found_with_its_group_and_its_onset(drive, group):
+    displacement, late = with_change(drive, group)
+    watch, _ = follow(drive, displacement)
+    assert watch.alarms == 1
+    assert watch.change.statistic > 1.0
+    assert group in watch.change.groups
+    assert abs(watch.since * 1e-9 - late * PERIOD) < 1.0
+
+
+def test_the_estimate_of_a_gain_lies_within_its_interval(drive):
+    displacement, _ = with_change(drive, "gain")
+    watch, _ = follow(drive, displacement)
+    assert watch.change.groups[0] == "gain"
+    assert abs(watch.change.estimate - 2e-3) < 4 * watch.change.deviation
+
+
+def test_what_the_model_never_had_is_no_change(drive):
+    creeping = MODEL.with_effect(Creep(gamma=0.02))
+    watch, _ = follow(drive, run(creeping, drive))
+    assert watch.alarms == 0
+
+
+def test_another_drive_than_those_of_the_baseline_is_not_watched(drive):
+    watch, _ = follow(drive, run(MODEL, drive))
+    other = sine(8.0, frequency=40.0, amplitude=0.1)
+    watch, largest = follow(other, run(MODEL, other), baseline=watch.baseline)
+    assert not watch.change.watched
+    assert largest == 0.0
+
+
+def test_a_held_stage_is_watched_for_its_offset_only():
+    held = np.full(round((TRAINED + WATCHED) / PERIOD), 3.5)
+    watch, _ = follow(held, run(MODEL, held))
+    (scatter,) = watch.baseline.scatter.values()
+    assert [g for g, seen in zip(GROUPS, scatter.excited, strict=True) if seen] == ["offset"]
+
+
+def test_a_baseline_outlives_the_process_and_belongs_to_its_model(drive, tmp_path):
+    watch, _ = follow(drive, run(MODEL, drive))
+    path = baseline_path(tmp_path, MODEL)
+    watch.baseline.save(path)
+    loaded = Baseline.load(path)
+    displacement, _ = with_change(drive, "gain")
+    assert follow(drive, displacement, baseline=loaded)[0].alarms == 1
+    foreign = Baseline(loaded.scatter, "sha256:0")
+    assert follow(drive, displacement, baseline=foreign)[1] == 0.0
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"no archive at all"])
+def test_a_file_that_is_no_baseline_is_refused(tmp_path, content):
+    path = tmp_path / "baseline.npz"
+    path.write_bytes(content)
+    with pytest.raises(ModelError, match="take a new one"):
+        Baseline.load(path)
+
+
+def test_too_short_a_baseline_is_refused():
+    with pytest.raises(ModelError, match="expected at least"):
+        Baseline.of([])
+
+
+def test_sums_of_correlated_scores_vary_as_an_autoregressive_series_does():
+    phi = 0.7
+    scatter = Scatter(100, np.zeros(5), np.eye(5), np.eye(5), np.array([[phi] * 5, [phi] * 5]))
+    k = 40
+    correlation = phi ** np.abs(np.subtract.outer(np.arange(k), np.arange(k)))
+    assert scatter.inflation(k)[-1, 0] == pytest.approx(correlation.sum() / k)
+    assert scatter.inflation(k)[0, 0] == 1.0
+
+
+def test_the_threshold_keeps_the_rate_of_false_alarms():
+    level = threshold(np.eye(2), 2000.0, seed=1)
+    total = np.cumsum(np.random.default_rng(2).standard_normal((400_000, 2)), axis=0)
+    above = np.zeros(len(total), bool)
+    for k in range(1, 61):
+        above[k:] |= ((total[k:] - total[:-k]) ** 2 / k).max(axis=1) > level
+    alarms = 1 + np.count_nonzero(np.diff(np.flatnonzero(above)) > 60)
+    assert 100 < alarms < 400  # 200 wanted
