@@ -8,7 +8,9 @@ import pytest
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import Verdict, diagnose
 from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change
+from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy.residual.noise_floor import floors
+from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.record import Experiment
 
@@ -70,3 +72,21 @@ def test_diagnose_names_a_filter_and_its_model_predicts_better(model, another_da
     assert found.reason.startswith("The stage is the same, but behind a low-pass")
     assert found.gap.after < 0.5 * found.gap.before
     assert found.answer()["effects"] == [effect]
+
+
+def test_one_new_record_takes_a_model_to_another_day(model):
+    rng = np.random.default_rng(11)
+    later = replace(STAGE.on_another_day(rng), gain=1.008, loop=0.26, zero=3e-6, filter_delay=3e-4)
+    found = recalibrate(model, played(later, (10.0,)))
+    assert found.lag == pytest.approx(3e-4, rel=0.05)
+    assert found.after < 0.15 < found.before
+    unseen = played(later, (1.0, 60.0))
+    assert errors(found.model, unseen).percent < 0.2
+    assert errors(found.model, unseen).percent < 0.3 * errors(model, unseen).percent
+    assert [e.name for e in found.model.effects] == [e.name for e in model.effects]
+
+
+def test_a_model_that_fits_stays(model):
+    found = recalibrate(model, played(STAGE, (10.0,)))
+    assert abs(found.gain) < 2e-3 and abs(found.lag) < 1e-5
+    assert found.after <= found.before

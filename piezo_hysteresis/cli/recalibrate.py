@@ -1,0 +1,49 @@
+"""``piezo recalibrate``: fit gain, offset, loop height and lag of an old model to new records of the same stage."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..discrepancy.changes.recalibration import recalibrate
+from ..model import model_file
+from ..report.json_file import write_json
+from . import reading
+from .terminal import console, show_notices
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("recalibrate", description=__doc__)
+    parser.add_argument("model", metavar="MODEL", help="model file of the same stage")
+    reading.add_arguments(parser)
+    parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
+    parser.add_argument("--json", metavar="FILE", help="result for machines")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fit the four numbers, print and save; returns 0.
+
+    Raises
+    ------
+    PiezoError
+        On bad input, or records in which nothing moves.
+    """
+    model = model_file.load(args.model)
+    experiment = reading.read(args)
+    found = recalibrate(model, experiment)
+    path = model_file.save(found.model, args.output)
+    if args.json is not None:
+        numbers = ("gain", "loop_height", "lag", "offset", "before", "after")
+        units = ("relative", "relative", "s", "m", "percent_of_range", "percent_of_range")
+        rows = {f"{n}_{u}": getattr(found, n) for n, u in zip(numbers, units, strict=True)}
+        write_json(args.json, {"schema": 1, "model": str(path), **rows})
+    out = console()
+    out.print(f"gain         {100.0 * found.gain:+.3f} %")
+    out.print(f"loop height  {100.0 * found.loop_height:+.3f} %")
+    out.print(f"lag          {1e6 * found.lag:+.4g} µs")
+    out.print(f"offset       {1e9 * found.offset:.4g} nm")
+    out.print(f"free-run error {found.before:.3f} % of range before, {found.after:.3f} % after")
+    show_notices(experiment.notices)
+    out.print(f"wrote {path}")
+    return 0

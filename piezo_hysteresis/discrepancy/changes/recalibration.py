@@ -1,0 +1,108 @@
+"""`recalibrate`: an old model of the same stage made to fit a new record, by gain, offset, loop height and lag only.
+
+Records of one stage differ by half a per cent from one day to another. A model of many records, taken over with these
+four numbers, predicts more than a new model of the one new record would.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...effects import Offset
+from ...errors import IdentificationError
+from ...identification.fit.normal_equations import Nuisance, residuals
+from ...model.model import Model
+from ...model.provenance import provenance
+from ...record import Experiment
+from ..residual.noise_floor import floors, stroke
+from .change_kinds import ParameterChange
+from .parameter_changes import ChangeSearch
+from .same_stage import changed_model
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Recalibration:
+    """An old model with the numbers of a new day.
+
+    Parameters
+    ----------
+    model : Model
+        The new one; the old one where nothing is gained.
+    gain, loop_height : float
+        Relative changes [1]; 0 where the model has no loop.
+    lag : float
+        Change of the lag [s].
+    offset : float
+        Reading at zero displacement [m].
+    before, after : float
+        Free-run error, one zero for each record [% of range].
+    """
+
+    model: Model
+    gain: float
+    loop_height: float
+    lag: float
+    offset: float
+    before: float
+    after: float
+
+
+def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
+    """Fit gain, offset, loop height and lag of a model to new records.
+
+    Parameters
+    ----------
+    model : Model
+        Identified earlier from the same stage.
+    experiment : Experiment
+        New records.
+
+    Returns
+    -------
+    Recalibration
+        New model and the four numbers.
+
+    Raises
+    ------
+    IdentificationError
+        If the drive does not move in any record.
+    ModelError
+        If the records are faster than the model.
+    """
+    records = experiment.records
+    used = [i for i, r in enumerate(records) if np.ptp(np.append(r.voltage, r.settled_voltage)) > 0.0]
+    used = [i for i in used if not records[i].truncated] or used
+    if not used:
+        raise IdentificationError("recalibrate: the drive does not move in any record; expected at least one loop")
+    search = ChangeSearch(model, records, used, floors(records).tolist())
+    best = min((search.best("delay"), search.account("none")), key=lambda account: account.cost)
+    numbers = dict(zip(best.names, best.theta.tolist(), strict=False))
+    session = {n: numbers.get(n, 0.0) for n in search.sides}
+    change = ParameterChange("delay", best.size, (best.size, best.size), (), best.cost, best.cost, session)
+    fitted = changed_model(model, change, records)
+
+    def error(candidate: Model) -> float:
+        left = residuals(candidate, [records[i] for i in range(len(records))], Nuisance(offset=True))
+        return float(np.sqrt(np.mean([np.mean(left[i] ** 2) for i in used])))
+
+    before, after = error(model), error(fitted)
+    new = fitted if after < before else model
+    bare = new.without(Offset.name) if Offset.name in new else new
+    zero = float(np.mean([np.mean(residuals(bare, records)[i]) for i in used]))
+    old = new[Offset.name] if Offset.name in new else Offset()
+    span = stroke(records)
+    rms = min(before, after)
+    origin = provenance(experiment, rms, 100.0 * rms / span)
+    new = replace(bare.with_effect(old.with_values(y0=zero)), provenance=origin)
+    kept = after < before
+    return Recalibration(
+        new,
+        session.get("gain", 0.0) if kept else 0.0,
+        session.get("loop", 0.0) if kept else 0.0,
+        best.size if kept else 0.0,
+        zero,
+        100.0 * before / span,
+        100.0 * rms / span,
+    )
