@@ -214,7 +214,7 @@ def _finished(selection: Selection, training_data: TrainingData, null: float) ->
     last = selection.accepted[-1].best
     while final.cost > NOISY * null:
         anew = restart(replace(last, effect=final.model[last.name], training_data=training_data, fit=final), LAST).fit
-        if anew is None or anew.cost > WORTHWHILE * final.cost:
+        if anew.cost > WORTHWHILE * final.cost:
             break
         final = anew
     return final

@@ -127,7 +127,7 @@ def decide(selection: Selection, training_data: TrainingData) -> NextExperiment 
     for step in selection.accepted:
         mine = step.best
         others = [r for r in step.rivals if r.effect.public_name() != mine.effect.public_name()]
-        if others and mine.fit is not None and others[0].fit is not None:
+        if others:
             pair = (mine.effect.public_name(), others[0].effect.public_name())
             return propose(mine.fit.model, others[0].fit.model, pair, training_data)
     return None

@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.search.candidates import Candidate
+from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
 from piezo_hysteresis.discrepancy.verdict import is_explained
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
+from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -25,7 +26,8 @@ def selection(explained, leaves):
     before, after = (
         Score(np.full(10, np.sqrt(v)), np.zeros(1)) for v in (1.0 + (leaves - 1.0) / (1.0 - explained) ** 2, leaves)
     )
-    step = Step(before, Candidate(Creep(), EVIDENCE, after), True, (), ())
+    fitted = Fit(STAGE.with_effect(Creep()), (), np.empty((0, 0)), leaves, (), (), (), True, 1)
+    step = Step(before, FittedCandidate(Creep(), EVIDENCE, after, fitted), True, (), ())
     return Selection(STAGE, STAGE, after, (step,), 1.0)
 
 

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.stats import chi2
 
 from ...effects import AmplifierSaturation, MainsHum
-from .candidates import Candidate
+from .candidate_refits import LEAST_GAIN
+from .candidates import FittedCandidate
+from .cross_validation import Score
+from .refit import Fitted
+from .selection_result import Rejection, typical
 
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Periods of the mains in a record that tells its amplitude, sample period in periods, and records."""
@@ -16,12 +23,111 @@ SEEN = 0.5
 """Change in units of the floor."""
 
 
-def is_seen(candidate: Candidate) -> bool:
+DECISIVE = 0.5
+"""Gain over the model fitted anew without an effect from which it needs no other proof that it is not off."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Trial:
+    """A fitted candidate before the acceptance tests.
+
+    Parameters
+    ----------
+    best : FittedCandidate
+        The refit with the effect.
+    alone : Fitted or None
+        The model fitted anew without it; None where that diverges.
+    null : float
+        V of a perfect model.
+    keeps : float
+        Share of V beyond noise that the effect may leave.
+    """
+
+    best: FittedCandidate
+    alone: Fitted | None
+    null: float
+    keeps: float
+
+    @property
+    def owed(self) -> float:
+        """Gain that the effect alone is owed; 0 where the model without it is not known."""
+        return 0.0 if self.alone is None else self.alone.score.cost - self.best.score.cost
+
+    def rejection(self, reason: str) -> Rejection:
+        """Of the candidate, for a reason."""
+        return Rejection(self.best.name, reason)
+
+
+AcceptanceTest = Callable[[Trial], Rejection | None]
+"""What speaks against an effect that gains; None where nothing does."""
+
+
+def share_left(after: Score, before: Score, null: float) -> float:
+    """Share of V beyond noise that is left; the worst record does not decide."""
+    first, second = typical(before, after)
+    return max(0.0, second - null) / max(first - null, 1e-12)
+
+
+def gains_by_itself(trial: Trial) -> Rejection | None:
+    """Rejects what the model fitted anew gains without the effect as well."""
+    alone = trial.alone
+    if alone is None:
+        return None
+    is_owed = trial.owed >= LEAST_GAIN
+    if is_owed and share_left(trial.best.score, alone.score, trial.null) <= trial.keeps:
+        return None
+    return trial.rejection(f"it gains only {trial.owed:.2f} over the model that was refitted without it")
+
+
+def is_not_off(trial: Trial) -> Rejection | None:
+    """Rejects an effect of little gain whose numbers may all have their off value."""
+    if trial.owed >= DECISIVE or not may_be_off(trial.best):
+        return None
+    return trial.rejection("its parameters do not differ significantly from their off values")
+
+
+def can_be_seen(trial: Trial) -> Rejection | None:
+    """Rejects an effect that no record shows."""
+    return None if is_seen(trial.best) else trial.rejection("it changes no record by more than half its floor")
+
+
+def limits_the_drive(trial: Trial) -> Rejection | None:
+    """Rejects a limit that is a curve over the whole drive."""
+    bends = bends_all_along(trial.best)
+    return (
+        trial.rejection("its bend is wider than the drive range, so that it is a curve and not a limit")
+        if bends
+        else None
+    )
+
+
+def ignores_the_drive(trial: Trial) -> Rejection | None:
+    """Rejects a hum that follows the drive."""
+    if trial.best.name != MainsHum.name or is_steady(trial.best):
+        return None
+    return trial.rejection("its amplitude depends on the drive, which mains hum does not")
+
+
+ACCEPTANCE_TESTS: tuple[AcceptanceTest, ...] = (
+    gains_by_itself,
+    is_not_off,
+    can_be_seen,
+    limits_the_drive,
+    ignores_the_drive,
+)
+"""In the order in which they are asked; the first rejection is the reason that is reported."""
+
+
+def first_rejection(trial: Trial) -> Rejection | None:
+    """What the acceptance tests say of a fitted candidate; None where it passes all."""
+    return next((found for test in ACCEPTANCE_TESTS if (found := test(trial)) is not None), None)
+
+
+def is_seen(candidate: FittedCandidate) -> bool:
     """Whether the effect changes any record by so much as could be seen; hum, free per record, has its own rule.
 
     A change that is the same in all records is the sensor's zero.
     """
-    assert candidate.fit is not None
     training_data, model = candidate.training_data, candidate.fit.model
     with_it, without_it = (
         model.simulate(training_data.records),
@@ -36,7 +142,7 @@ def is_seen(candidate: Candidate) -> bool:
     )
 
 
-def may_be_off(candidate: Candidate) -> bool:
+def may_be_off(candidate: FittedCandidate) -> bool:
     """Whether the numbers of the effect could as well all have their off value: Wald's test, the others held.
 
     A time constant or an exponent has no off value; while it is held, its correlation with a size blurs nothing.
@@ -55,15 +161,14 @@ def may_be_off(candidate: Candidate) -> bool:
     return bool(off @ np.linalg.pinv(spread, rcond=1e-9, hermitian=True) @ off < chi2.ppf(0.95, max(1, k)))
 
 
-def bends_all_along(candidate: Candidate) -> bool:
+def bends_all_along(candidate: FittedCandidate) -> bool:
     """Whether a limit bends over more than the whole drive: that is a curve, and no end of a range."""
     saturates = candidate.name == AmplifierSaturation.name
     return saturates and candidate.effect["corner"] > candidate.training_data.extent.span
 
 
-def is_steady(candidate: Candidate) -> bool:
+def is_steady(candidate: FittedCandidate) -> bool:
     """Whether a hum has about one amplitude in all records: mains does not care what the drive does."""
-    assert candidate.fit is not None
     training_data, lines = candidate.training_data, 2 * candidate.training_data.nuisance.harmonics
     frequency = training_data.nuisance.hum_frequency or 0.0
     amplitudes = np.array(

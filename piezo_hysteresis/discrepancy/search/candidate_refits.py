@@ -8,7 +8,7 @@ from dataclasses import replace
 from ...effects.effect import ChainPosition
 from ...identification.fit.fit import Progress
 from ...model.model import Model
-from .candidates import Candidate
+from .candidates import Candidate, FittedCandidate
 from .cross_validation import ADEQUATE, Score
 from .refit import better, from_all_starts, proceed, refit, restart
 
@@ -34,9 +34,9 @@ FINER = 0.05
 
 def refit_candidates(
     model: Model, candidates: Sequence[Candidate], before: Score, progress: Progress
-) -> list[Candidate]:
+) -> list[FittedCandidate]:
     """Joint refits, best first: a few linearisations of all, dynamics anew for the leaders, the best to the end."""
-    refits: list[Candidate] = []
+    refits: list[FittedCandidate] = []
     for k, candidate in enumerate(candidates):
         if refits and _is_far_behind(candidate, refits[0], before):
             continue
@@ -60,39 +60,39 @@ def refit_candidates(
     return sorted([best, *rest], key=lambda c: c.score.cost)
 
 
-def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
+def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
     """Refits of effects of the drive: dynamics have taken them up, so that no score test sees them."""
     return _settled_from_all_starts(model, [c for c in candidates if c.effect.place is ChainPosition.DRIVE], before)
 
 
-def refits_of_twins(model: Model, candidates: Sequence[Candidate], best: Candidate, before: Score) -> list[Candidate]:
+def refits_of_twins(
+    model: Model, candidates: Sequence[Candidate], best: FittedCandidate, before: Score
+) -> list[FittedCandidate]:
     """Refits of what slow drive cannot tell from the best: only other dynamics let it show."""
     twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
     return _settled_from_all_starts(model, twins, before)
 
 
-def _settled_from_all_starts(model: Model, candidates: Sequence[Candidate], before: Score) -> list[Candidate]:
+def _settled_from_all_starts(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
     anew = (from_all_starts(model, c, FIRST) for c in candidates)
     return [settled(c, before) for c in anew if c is not None]
 
 
-def _anew(candidate: Candidate) -> Candidate:
+def _anew(candidate: FittedCandidate) -> FittedCandidate:
     """The refit behind dynamics found anew; an effect of the drive, behind which all else stands, from every start."""
     if candidate.score.cost <= LEAST_GAIN:  # less is left than counts as a gain
         return candidate
     anew = restart(candidate, FIRST)
     if anew.effect.place is not ChainPosition.DRIVE or anew.score.excess <= ADEQUATE:
         return anew
-    assert anew.fit is not None
     return better(from_all_starts(anew.fit.model.without(anew.name), anew, FIRST), anew)
 
 
-def _from_elsewhere(best: Candidate, before: Score) -> Candidate:
+def _from_elsewhere(best: FittedCandidate, before: Score) -> FittedCandidate:
     """The best, begun once more at every start of its effect where it has come to no floor.
 
     An effect of the drive has had all of its starts, and one with few has no valleys to choose from.
     """
-    assert best.fit is not None
     starts = type(best.effect).starts(best.training_data.extent)
     gains_nothing = before.cost - best.score.cost < LEAST_GAIN
     if (
@@ -106,32 +106,30 @@ def _from_elsewhere(best: Candidate, before: Score) -> Candidate:
     return best if anew is None else better(settled(anew, before), best)
 
 
-def _is_far_behind(candidate: Candidate, best: Candidate, before: Score) -> bool:
+def _is_far_behind(candidate: Candidate, best: FittedCandidate, before: Score) -> bool:
     """Whether the best is at the floor and the other by so much short of it that it is no rival."""
     most = 2.0 * LEAST_GAIN if best.score.cost <= LEAST_GAIN else HOPELESS_BESIDE * (before.cost - best.score.cost)
     return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > most
 
 
-def settled(candidate: Candidate, before: Score) -> Candidate:
+def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     """The refit to its end, and begun anew while that closes much of what is left."""
     for _ in range(RESTARTS):
-        assert candidate.fit is not None
         cost = candidate.fit.cost
         candidate = proceed(candidate, LATER)
         if candidate.score.excess <= ADEQUATE or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:
             break
         candidate = restart(candidate, LATER)
-        assert candidate.fit is not None
         if candidate.fit.cost > WORTHWHILE * cost:
             break
     return candidate
 
 
-def finest(candidate: Candidate, before: Score) -> Candidate:
+def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     """The candidate in its finer form where that is asked for, and better."""
     finer = candidate.effect.refined()
     gain = before.cost - candidate.score.cost
-    if finer is None or candidate.fit is None or candidate.score.excess <= ADEQUATE or gain < LEAST_GAIN:
+    if finer is None or candidate.score.excess <= ADEQUATE or gain < LEAST_GAIN:
         return candidate
     refined = refit(candidate.fit.model, replace(candidate, effect=finer), LATER)
     if refined is None or refined.score.cost > candidate.score.cost - FINER:
@@ -139,9 +137,8 @@ def finest(candidate: Candidate, before: Score) -> Candidate:
     return settled(refined, before)
 
 
-def simplest(refits: list[Candidate]) -> Candidate:
+def simplest(refits: list[FittedCandidate]) -> FittedCandidate:
     """The refit with the fewest numbers among those that are as good as the best."""
     best = refits[0]
-    assert best.fit is not None
     ties = [c for c in refits if c is best or c.score.cost - best.score.cost < 0.02]
-    return min(ties, key=lambda c: (len(c.fit.names) if c.fit else 0, c.score.cost))
+    return min(ties, key=lambda c: (len(c.fit.names), c.score.cost))

@@ -26,27 +26,39 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Candidate:
-    """An effect, where the search for it begins, and how well it does on records left out.
+    """An effect that was screened: where the search for it begins, and how well it does on records left out.
 
     Parameters
     ----------
     effect : Effect
         At the start of the search; in the model at its end.
+    training_data : TrainingData
+        Records, and what is free in each of them with this effect.
     score : Score
         Linearised at the start, or after the refit.
-    fit : Fit or None
-        The joint refit.
     """
 
     effect: Effect
     training_data: TrainingData
     score: Score
-    fit: Fit | None = None
 
     @property
     def name(self) -> str:
         """Identifier of the effect."""
         return self.effect.name
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FittedCandidate(Candidate):
+    """A candidate that was fitted jointly with the whole model.
+
+    Parameters
+    ----------
+    fit : Fit
+        The joint refit.
+    """
+
+    fit: Fit
 
 
 def free_numbers(model: Model, training_data: TrainingData) -> list[str]:
@@ -184,7 +196,7 @@ def _screen_moves(model: Model, training_data: TrainingData, base: list[str], mo
     return found
 
 
-def alikeness(first: Candidate, second: Candidate, model: Model) -> float:
+def alikeness(first: FittedCandidate, second: FittedCandidate, model: Model) -> float:
     """|cos| between the signatures of two effects after projection off the model; 1 is indistinguishable.
 
     For effects of several numbers the signature is the direction of the linearised step.
@@ -194,7 +206,6 @@ def alikeness(first: Candidate, second: Candidate, model: Model) -> float:
     now = model.simulate(training_data.records)
     changes = []
     for candidate in (first, second):
-        assert candidate.fit is not None
         part = candidate.fit.model
         changes.append([a - b for a, b in zip(part.simulate(training_data.records), now, strict=True)])
     extra = [np.array([c[i] for c in changes]) for i in range(len(training_data.records))]

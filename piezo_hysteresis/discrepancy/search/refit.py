@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ...effects import Arx
 from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
@@ -17,7 +17,7 @@ from ...identification.steps.dynamics import Dynamics, identify_arx
 from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, form_of, hysteresis_signals, with_dynamics
 from ...identification.steps.modes import identify_modes
 from ...model.model import Model
-from .candidates import Candidate, free_numbers, score_model
+from .candidates import Candidate, FittedCandidate, free_numbers, score_model
 from .cross_validation import Score
 from .training_data import TrainingData
 
@@ -103,39 +103,37 @@ def renewed(found: Fit, score: Score, training_data: TrainingData) -> tuple[Fit,
     return found, score
 
 
-def refit(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
+def refit(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
     """Fit the model with the candidate jointly, from its start; None where that diverges."""
     return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
 
 
-def proceed(candidate: Candidate, max_iterations: int) -> Candidate:
+def proceed(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
     """The refit carried on from where it stopped; itself where it had converged."""
-    assert candidate.fit is not None
     if candidate.fit.converged:
         return candidate
     return _refitted(candidate.fit.model, candidate, max_iterations) or candidate
 
 
-def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
+def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
     try:
         result = joint(model, candidate.training_data, max_iterations)
         score = score_model(result.model, candidate.training_data)
     except FAILURES:
         return None
-    return replace(candidate, effect=result.model[candidate.name], score=score, fit=result)
+    return FittedCandidate(result.model[candidate.name], candidate.training_data, score, result)
 
 
-def restart(candidate: Candidate, max_iterations: int) -> Candidate:
+def restart(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
     """The refit once more behind dynamics found anew; itself where that is no better.
 
     The dynamics of the model before were bent by the effect it lacked; from there a joint fit has a long way to go.
     """
-    assert candidate.fit is not None
     anew = _behind_anew(candidate.fit.model, candidate.training_data)
     return candidate if anew is None else better(_refitted(anew.model, candidate, max_iterations), candidate)
 
 
-def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> Candidate | None:
+def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
     """Refit of the model with the candidate begun at the best start of its effect; None where all diverge.
 
     Every start is judged behind dynamics found anew, by few iterations: noise that a limit cuts to pieces bends the
@@ -180,18 +178,16 @@ def _behind_anew(
     return best
 
 
-def better(anew: Candidate | None, candidate: Candidate) -> Candidate:
+def better(anew: FittedCandidate | None, candidate: FittedCandidate) -> FittedCandidate:
     """The refit that fits better; the first may have failed."""
-    assert candidate.fit is not None
-    return candidate if anew is None or anew.fit is None or anew.fit.cost >= candidate.fit.cost else anew
+    return candidate if anew is None or anew.fit.cost >= candidate.fit.cost else anew
 
 
-def without(candidate: Candidate, max_iterations: int) -> Fitted | None:
+def without(candidate: FittedCandidate, max_iterations: int) -> Fitted | None:
     """The candidate's model without its effect, all else fitted on; None where that diverges.
 
     What this has gained over the model before belongs to dynamics and hysteresis, and to no effect.
     """
-    assert candidate.fit is not None
     model = candidate.fit.model.without(candidate.name)
     training_data = candidate.training_data.without(candidate.name)
     starts = [model]

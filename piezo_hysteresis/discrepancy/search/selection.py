@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...effects import CATALOGUE, Effect, MainsHum
+from ...effects import CATALOGUE, Effect
 from ...identification.fit.fit import Progress
 from ...identification.fit.normal_equations import residuals
 from ...model.model import Model
-from .acceptance_tests import bends_all_along, is_seen, is_steady, may_be_off
+from .acceptance_tests import Trial, bends_all_along, first_rejection, share_left
 from .candidate_refits import (
     CLOSE,
     FIRST,
@@ -27,16 +27,14 @@ from .candidate_refits import (
     settled,
     simplest,
 )
-from .candidates import Candidate, alikeness, screen
+from .candidates import Candidate, FittedCandidate, alikeness, screen
 from .cross_validation import ADEQUATE, Score
 from .refit import Fitted, refit, restart, without
-from .selection_result import MANY, Rejection, Selection, Step, typical
+from .selection_result import MANY, Rejection, Selection, Step
 from .training_data import TrainingData
 
 ALONE = 4.0
 """Residual in floors up to which one record alone asks for no further effect."""
-DECISIVE = 0.5
-"""Gain over the model fitted anew without an effect from which it needs no other proof that it is not off."""
 KEEPS = (0.8, 0.5)
 """Share of V beyond noise that may remain after the first accepted effect, and after further ones."""
 REFITS = 6
@@ -87,7 +85,6 @@ def select(
             break
         steps.append(step)
         if step.accepted:
-            assert step.best.fit is not None
             model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
             accepted += 1
             if score.excess > ADEQUATE and gains_nothing(model, training_data):
@@ -121,7 +118,7 @@ def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score
         lean = min(lean, restart(lean, FIRST), key=lambda c: c.score.cost)
         if lean.score.cost - score.cost < 2.0 * LEAST_GAIN + 0.5:
             lean = settled(lean, steps[0].before)
-        if lean.score.cost - score.cost < LEAST_GAIN and lean.fit is not None:
+        if lean.score.cost - score.cost < LEAST_GAIN:
             rejection = Rejection(name, f"it is superfluous after {last.name} was added")
             steps[k] = replace(steps[k], accepted=False, rejected=(rejection, *steps[k].rejected))
             steps[accepted[-1]] = replace(steps[accepted[-1]], best=lean)
@@ -156,16 +153,16 @@ def _turn(
         return None
     if refits[0].score.excess > ADEQUATE and (others := refits_of_twins(model, screened, refits[0], before)):
         refits = _best_of_each([*refits, *others])
-    best, alone, objection = _judged(refits, before, null, keeps)
-    if objection is not None and (late := refits_of_the_drive(model, screened, before)):
+    best, alone, rejection = _judged(refits, before, null, keeps)
+    if rejection is not None and (late := refits_of_the_drive(model, screened, before)):
         refits = _best_of_each([*refits, *late])
-        best, alone, objection = _judged(refits, before, null, keeps)
-    objection = objection or _untried_twin(type(best.effect), effects)
-    accepted, rivals = objection is None, list[Candidate]()
+        best, alone, rejection = _judged(refits, before, null, keeps)
+    rejection = rejection or _untried_twin(type(best.effect), effects)
+    accepted, rivals = rejection is None, list[FittedCandidate]()
     rejected = [
         Rejection(name, f"on slow drive it equals {twin}, which is in the model") for name, twin in twins.items()
     ]
-    rejected += [] if objection is None else [Rejection(best.name, objection)]
+    rejected += [] if rejection is None else [rejection]
     better = alone is not None and before.cost - alone.score.cost > 0.5 * LEAST_GAIN
     renewed = alone if better and not accepted else None
     for candidate in refits:
@@ -178,66 +175,44 @@ def _turn(
         else:
             message = f"in cross-validation it is {lead:.2f} ± {error:.2f} behind {best.name} (mean ln R²)"
             rejected.append(Rejection(candidate.name, message))
-    for candidate in _others(screened, refits):
-        most = max(0.0, before.cost - candidate.score.cost)
-        rejected.append(Rejection(candidate.name, f"in cross-validation it gains at most {most:.2f} in mean ln R²"))
+    for other in _others(screened, refits):
+        most = max(0.0, before.cost - other.score.cost)
+        rejected.append(Rejection(other.name, f"in cross-validation it gains at most {most:.2f} in mean ln R²"))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
 
 
-def _best_of_each(refits: list[Candidate]) -> list[Candidate]:
+def _best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
     """Of the refits of every effect the best one, best first."""
     worst_first = sorted(refits, key=lambda c: -c.score.cost)
     return sorted({c.name: c for c in worst_first}.values(), key=lambda c: c.score.cost)
 
 
-def _others(screened: list[Candidate], refits: list[Candidate]) -> list[Candidate]:
+def _others(screened: list[Candidate], refits: list[FittedCandidate]) -> list[Candidate]:
     """Those that were not refitted."""
     names = {r.name for r in refits}
     return [c for c in screened if c.name not in names]
 
 
-def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> str | None:
+def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Rejection | None:
     """Objection to an effect whose twin is left out of the library: none of the two can be told from the other."""
     twins = {e.public_name() for e in CATALOGUE if effect.twin == e.name or e.twin == effect.name}
     untried = sorted(twins - {e.public_name() for e in effects})
-    return f"on slow drive it equals {untried[0]}, which was not among the candidates" if untried else None
+    if not untried:
+        return None
+    return Rejection(effect.name, f"on slow drive it equals {untried[0]}, which was not among the candidates")
 
 
 def _judged(
-    refits: list[Candidate], before: Score, null: float, keeps: float
-) -> tuple[Candidate, Fitted | None, str | None]:
+    refits: list[FittedCandidate], before: Score, null: float, keeps: float
+) -> tuple[FittedCandidate, Fitted | None, Rejection | None]:
     """The best refit, the model fitted anew without it where it comes to that, and what speaks against the effect."""
     best = finest(simplest([c for c in refits if not bends_all_along(c)] or refits), before)
-    gain, left = before.cost - best.score.cost, _left(best.score, before, null)
+    gain, left = before.cost - best.score.cost, share_left(best.score, before, null)
     if gain < LEAST_GAIN or left > keeps:
         message = (
             f"in cross-validation it gains {gain:.2f} in mean ln R² ({LEAST_GAIN:g} is needed), and "
             f"{100 * left:.0f} % of the excess error remains ({100 * keeps:.0f} % is allowed)"
         )
-        return best, None, message
+        return best, None, Rejection(best.name, message)
     alone = without(best, LATER)
-    return best, alone, _objection(best, alone, null, keeps)
-
-
-def _objection(best: Candidate, alone: Fitted | None, null: float, keeps: float) -> str | None:
-    """Why a refit that gains enough is no effect, beside the model fitted anew without it; None where it is one."""
-    owed = 0.0
-    if alone is not None:
-        owed = alone.score.cost - best.score.cost
-        if owed < LEAST_GAIN or _left(best.score, alone.score, null) > keeps:
-            return f"it gains only {owed:.2f} over the model that was refitted without it"
-    if owed < DECISIVE and may_be_off(best):
-        return "its parameters do not differ significantly from their off values"
-    if not is_seen(best):
-        return "it changes no record by more than half its floor"
-    if bends_all_along(best):
-        return "its bend is wider than the drive range, so that it is a curve and not a limit"
-    if best.name == MainsHum.name and not is_steady(best):
-        return "its amplitude depends on the drive, which mains hum does not"
-    return None
-
-
-def _left(after: Score, before: Score, null: float) -> float:
-    """Share of V beyond noise that is left; the worst record does not decide."""
-    first, second = typical(before, after)
-    return max(0.0, second - null) / max(first - null, 1e-12)
+    return best, alone, first_rejection(Trial(best, alone, null, keeps))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model.model import Model
-from .candidates import Candidate
+from .candidates import FittedCandidate
 from .cross_validation import Score
 from .refit import Fitted
 
@@ -31,11 +31,11 @@ class Step:
     ----------
     before : Score
         Of the model without the effect.
-    best : Candidate
+    best : FittedCandidate
         The best refit.
     accepted : bool
         Whether it was added.
-    rivals : tuple of Candidate
+    rivals : tuple of FittedCandidate
         Refits that records left out cannot tell from the best.
     rejected : tuple of Rejection
         All others.
@@ -44,9 +44,9 @@ class Step:
     """
 
     before: Score
-    best: Candidate
+    best: FittedCandidate
     accepted: bool
-    rivals: tuple[Candidate, ...]
+    rivals: tuple[FittedCandidate, ...]
     rejected: tuple[Rejection, ...]
     renewed: Fitted | None = None
 

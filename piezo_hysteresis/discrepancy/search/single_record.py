@@ -25,7 +25,7 @@ from ..next_experiment import decide
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
 from .baseline import with_zero
-from .candidates import Candidate, loop_is_off, score_model
+from .candidates import FittedCandidate, loop_is_off, score_model
 from .cross_validation import ADEQUATE
 from .refit import joint
 from .selection import select
@@ -83,7 +83,7 @@ def diagnose_few(
     if HysteresisMemory.name in start and HysteresisMemory.name not in state:
         now = joint(with_zero(start), training_data, LAST, PRECISE)
         score = score_model(now.model, training_data)
-        memory = Candidate(now.model[HysteresisMemory.name], training_data, score, now)
+        memory = FittedCandidate(now.model[HysteresisMemory.name], training_data, score, now)
         steps.append(Step(before, memory, True, (), ()))
     progress("where", 0.45)
     left = residuals(baseline.model, records, Nuisance(offset=True))

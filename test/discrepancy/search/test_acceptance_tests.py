@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.search.acceptance_tests import bends_all_along, may_be_off
-from piezo_hysteresis.discrepancy.search.candidates import Candidate
+from piezo_hysteresis.discrepancy.search.acceptance_tests import Trial, bends_all_along, first_rejection, may_be_off
+from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
+from piezo_hysteresis.discrepancy.search.refit import Fitted
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, GainDrift, HysteresisMemory
 from piezo_hysteresis.effects.extent import Extent
@@ -20,7 +21,7 @@ def fitted(effect, names, covariance):
     model = Model((BoucWen(A=0.5, beta=3.0, gamma=0.5, p1=0.0, p2=1.0), effect), 2e-5, 10.0, 1e-5)
     result = Fit(model, names, np.asarray(covariance), 1.0, (), (), (), True, 3)
     training_data = TrainingData((), np.array([]), Nuisance(), EXTENT)
-    return Candidate(effect, training_data, Score(np.ones(3), np.zeros(len(names))), result)
+    return FittedCandidate(effect, training_data, Score(np.ones(3), np.zeros(len(names))), result)
 
 
 def gain_drift(size, along, across):
@@ -54,3 +55,13 @@ def test_a_play_that_nothing_moves_decides_nothing(blind):
     names = tuple(f"hysteresis_memory.c[{j}]" for j in range(3))
     assert not may_be_off(fitted(memory, names, np.diag([1e-3, 1e-3, blind]) ** 2))
     assert may_be_off(fitted(memory, names, np.diag([0.1, 0.1, blind]) ** 2))
+
+
+def test_the_first_acceptance_test_that_rejects_gives_the_reason():
+    """Both the model without the effect and Wald's test object here: the first is the one that is reported."""
+    weak = gain_drift(0.05, along=1.0, across=0.1)
+    alone = Fitted(weak.fit.model, weak.score)
+    rejection = first_rejection(Trial(weak, alone, 1.0, 0.8))
+    assert rejection.name == "gain_drift"
+    assert "refitted without it" in rejection.reason
+    assert first_rejection(Trial(weak, None, 1.0, 0.8)).reason.startswith("its parameters do not differ")
