@@ -46,9 +46,9 @@ setup(
     zip_safe=True,
     entry_points={
         "console_scripts": [
-            f"driver_node = {NAME}.nodes.driver.driver_node:main",
-            f"model_node = {NAME}.nodes.model.model_node:main",
-            f"identification_node = {NAME}.nodes.identification.identification_node:main",
+            f"driver_node = {NAME}.nodes.start:driver_node",
+            f"model_node = {NAME}.nodes.start:model_node",
+            f"identification_node = {NAME}.nodes.start:identification_node",
             f"piezo = {NAME}.cli.main:main",
         ]
     },

@@ -17,7 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
 
-from .runtime.qos import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES
+from .runtime.qos import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES, STATUS
 
 ANYONE = "anyone"
 """Publisher of the topics by which a stage is moved: every program that holds the right."""
@@ -100,7 +100,7 @@ TOPICS: dict[str, Topic] = {
         Topic("predicted_live", JointState, COMMAND, "V, m", "`live_rate`", "model"),
         Topic("change", DiagnosticStatus, COMMAND, "", "1 Hz, and at every alarm", "model"),
         Topic("model", String, LATCHED, "", "at every new model", "identification", readers=("model",)),
-        Topic("status", DiagnosticStatus, LATCHED, "", "at every step", "identification"),
+        Topic("status", DiagnosticStatus, STATUS, "", "at every step", "identification"),
         Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL),
     )
 }  # fmt: skip

@@ -54,6 +54,14 @@ class NodeProcess:
     def is_running(self) -> bool:
         return self._process.poll() is None
 
+    @property
+    def is_importing(self) -> bool:
+        """True once the entry point of the package is at work: what comes before is Python's own."""
+        try:
+            return "rclpy" in Path(f"/proc/{self.pid}/maps").read_text()
+        except OSError:
+            return False
+
     def signal(self, number: signal.Signals) -> None:
         self._process.send_signal(number)
 

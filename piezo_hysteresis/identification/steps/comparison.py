@@ -106,7 +106,8 @@ def compare_inputs(
         notices.append(
             Notice(
                 "inputs_disagree",
-                f"the frequency response G differs between the inputs v and w, which is a sign of hysteresis; {worst}",
+                "the frequency response from the drive voltage v differs from the one behind the hysteresis w; "
+                f"every stage with hysteresis shows this, and nothing has to be done; {worst}",
                 "noise",
             )
         )

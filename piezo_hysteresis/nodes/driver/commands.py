@@ -26,6 +26,9 @@ _LONGEST_NAME = 64
 _LOG_INTERVAL = 0.1
 """Shortest time between two lines of one kind in the log [s]: a flood of commands fills no disk."""
 
+_SET_POINT_INTERVAL = 1.0
+"""The same for set-points, which a program may send without end [s]."""
+
 
 class DriverCommands:
     """Passes commands to the attached stage, or refuses them whole; every refusal is told with its reason.
@@ -126,6 +129,10 @@ class DriverCommands:
 
     def _refuse(self, name: str, stamp: int, reason: PiezoError) -> None:
         self._diagnostics.refused += 1
-        self._node.get_logger().warning(f"refused '{name}': {reason}", throttle_duration_sec=_LOG_INTERVAL)
+        told = f"refused '{name}': {reason}"
+        if name == "set_voltage":  # each line of code has an interval of its own
+            self._node.get_logger().warning(told, throttle_duration_sec=_SET_POINT_INTERVAL)
+        else:
+            self._node.get_logger().warning(told, throttle_duration_sec=_LOG_INTERVAL)
         if self._attached is not None:
             self._attached[1].refused(name, stamp, str(reason))

@@ -116,6 +116,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         acquisition = session.start(lambda: now(self), topics.deliver, self._fail, lambda: topics.subscribers)
         self._diagnostics.watch(acquisition, session.settings.real_time_factor / session.sample_period)
         self._diagnostics.state(DiagnosticStatus.OK, "streaming", session.limits.name)
+        self.get_logger().info("active: samples flow")
         return done
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -124,6 +125,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         done = super().on_deactivate(state)
         if self._failure is not None:
             return TransitionCallbackReturn.ERROR
+        self.get_logger().info("not active any more: the stage is at its safe voltage")
         self._diagnostics.state(DiagnosticStatus.OK, "configured, not active")
         return done
 
@@ -137,6 +139,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         """Make safe and release the stage."""
         self._make_safe()
         self._release()
+        self.get_logger().info("shut down")
         self._diagnostics.state(DiagnosticStatus.STALE, "shut down")
         return super().on_shutdown(state)
 

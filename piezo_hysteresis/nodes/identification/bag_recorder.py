@@ -72,7 +72,8 @@ class BagRecorder:
 
     def _subscribe(self, name: str) -> object:
         described = TOPICS[name]
-        topic, quality = self._node.resolve_topic_name(name), described.quality
+        # whatever a topic is remapped to, readers look for it under its own name
+        topic, quality = self._node.resolve_topic_name(name, only_expand=True), described.quality
         self._bag.add_topic(
             topic,
             described.type_name,

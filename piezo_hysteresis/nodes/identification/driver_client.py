@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import time
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -27,6 +29,9 @@ _NAMES = ("sample_period", "voltage_min", "voltage_max", "safe_voltage", "max_sl
 
 _POLL_INTERVAL = 0.5
 """Time between two questions to the driver [s]."""
+
+_FRESH = 3.0
+"""Age of an answer of the driver that still tells what it is [s]."""
 
 _CLAIM_INTERVAL = 0.5
 """Time between repetitions of a claim [s]."""
@@ -77,6 +82,7 @@ class DriverClient:
         self._sent: tuple[str, str] | None = None
         self._newest: float | None = None
         self._pending: Future | None = None
+        self._answered = -math.inf
         self._parameters = AsyncParameterClient(node, driver)
         self._stop = node.create_client(Trigger, f"{driver}/cancel")  # another one's stop stays as it is
         self._command = CommandSender(node)
@@ -85,6 +91,11 @@ class DriverClient:
         subscribe(node, "claimed_by", self._on_holder)
         node.create_timer(_CLAIM_INTERVAL, self._repeat_claim, clock=Clock(clock_type=ClockType.STEADY_TIME))
         node.create_timer(_POLL_INTERVAL, self._poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def is_fresh(self) -> bool:
+        """True where the driver has answered within the last seconds: one that was killed is known for a while."""
+        return time.monotonic() - self._answered < _FRESH
 
     @property
     def missing(self) -> str:
@@ -176,7 +187,7 @@ class DriverClient:
         values = [parameter_value_to_python(value) for value in answer.result().values]
         stopped = values.pop() if len(values) > len(_NAMES) else False
         self.stopped = f"the driver was stopped, nothing moves; call {self._driver}/release first" if stopped else ""
-        self.limits = None
+        self.limits, self._answered = None, time.monotonic()
         if len(values) == len(_NAMES) and values[0]:
             try:
                 self.limits = DriveLimits(**dict(zip(_NAMES, values, strict=True)))

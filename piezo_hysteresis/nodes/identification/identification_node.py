@@ -68,6 +68,7 @@ class IdentificationNode(GuardedNode):
         self._driver = DriverClient(self, self._value("driver"))
         self._models = advertise(self, "model")
         self._job: Generator[Progress] | None = None
+        self._moves = False
         self._last: Path | None = None
         self._served = ServedModel(self, START)
         try:
@@ -96,8 +97,8 @@ class IdentificationNode(GuardedNode):
                 self.executor.spin_until_future_complete(asked, timeout_sec=2.0)
 
     def _on_plan(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self._driver.limits is None:
-            response.message = f"no limits yet: waiting for {self._driver.missing}"
+        if self._driver.limits is None or not self._driver.is_fresh:
+            response.message = f"no limits: {self._driver.missing or 'the driver does not answer any more'}"
             return response
         try:
             protocol = self._protocol(self._driver.limits)
@@ -112,6 +113,12 @@ class IdentificationNode(GuardedNode):
             response.message = self._driver.stopped
             return response
         path = self._root() / datetime.now(UTC).strftime("%Y%m%dT%H%M%S%fZ")
+        if self._driver.is_fresh and self._driver.limits is not None:
+            try:
+                self._protocol(self._driver.limits)
+            except PiezoError as error:
+                response.message = str(error)
+                return response
         return self._begin(response, self._identify(path), f"recording to {path}")
 
     def _on_diagnose(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -135,6 +142,7 @@ class IdentificationNode(GuardedNode):
             response.message = "busy; wait, or abort first"
             return response
         self._job = job
+        self.get_logger().info(message)
         response.success, response.message = True, message
         return response
 
@@ -154,13 +162,12 @@ class IdentificationNode(GuardedNode):
     def _end_job(self) -> str:
         """Give up what is under way, whatever comes of it; what has become of stage and recording."""
         job, self._job = self._job, None
-        moves = self._status.state != "fitting"
         try:
             if job is not None:
                 job.close()
         except Exception as error:
             return f"on request; {reason_of(error)}"
-        if moves:
+        if self._moves:
             return "on request; the stage goes to its safe voltage, the recording is readable"
         return "on request; the fit was ended, the stage was left as it is"
 
@@ -171,6 +178,7 @@ class IdentificationNode(GuardedNode):
             planned.append(self._protocol(limits))
             return planned[0]
 
+        self._moves = True
         self._status.experiment = str(path)
         self._status.owner = self._driver.owner
         yield from campaign(self, self._driver, plan, path)
@@ -179,6 +187,7 @@ class IdentificationNode(GuardedNode):
         yield from self._fit(identification, path)
 
     def _fit(self, job: Job, path: Path) -> Generator[Progress]:
+        self._moves = False
         self._status.experiment, self._status.owner = str(path), ""
         model = self._served.model
         process = FitProcess(job, path, "" if model is None else dumps(model))

@@ -35,6 +35,7 @@ class IdentificationStatus:
         self._diagnostics = advertise(node, DIAGNOSTICS)
         self.experiment = self.owner = ""
         self._shown: DiagnosticStatus | None = None
+        self._logged = ("", "")
         self._show(DiagnosticStatus.OK, "idle", "nothing is under way")
         node.create_timer(1.0, self._repeat, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -44,7 +45,10 @@ class IdentificationStatus:
         return "" if self._shown is None else values_of(self._shown)["state"]
 
     def progress(self, progress: Progress) -> None:
-        """Tell where the job under way stands."""
+        """Tell where the job under way stands; every new state and phase in the log, too."""
+        if (stage := (progress.state, progress.phase)) != self._logged:
+            self._logged = stage
+            self._node.get_logger().info(f"{progress.state}: {progress.phase or progress.reason}")
         self._show(DiagnosticStatus.OK, progress.state, progress.reason, progress.phase, progress.fraction)
 
     def done(self, verdict: str) -> None:

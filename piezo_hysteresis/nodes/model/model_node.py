@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -28,6 +29,9 @@ from ..topics import subscribe
 from .change_reporter import CHANGE, ChangeReporter
 from .diagnostics import ModelDiagnostics
 from .publishers import ModelTopics
+
+_COLD = 3.0
+"""Time after which kernels are being compiled, and not only loaded [s]."""
 
 _SOURCE = "model node"
 """Source of the parameters of the model node."""
@@ -68,7 +72,10 @@ class ModelNode(GuardedNode):
         super().__init__("model_node")
         declare(self, MODEL)
         self._values = read(self, MODEL)
+        slow = threading.Timer(_COLD, lambda: self.get_logger().info("compiling kernels, once; this takes about 30 s"))
+        slow.start()
         compile_kernels()
+        slow.cancel()
         self._model: Model | None = None
         self._predictor: Predictor | None = None
         self._before: SampleBlock | None = None

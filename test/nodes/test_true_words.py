@@ -1,0 +1,94 @@
+"""What the nodes answer and log is what is so."""
+
+import signal
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Float64
+
+from benchmarks.naming_cases import Case
+from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.recording import read, write
+
+from .test_identification_node import Identification
+
+pytestmark = pytest.mark.nodes
+
+PERIOD = 1e-4
+EVERY = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def test_abort_of_a_diagnosis_says_that_the_stage_was_left_where_it_is(lab):
+    driver = lab.driver(sample_period=PERIOD)
+    samples, ask = lab.streaming(), lab.publisher(Float64, "set_voltage")
+    identification = Identification(lab)
+    recording = identification.runs / "0_given"
+    write(Case("poor", ("creep",), 0, 5e-4).experiment(), recording)
+    ask.publish(Float64(data=4.0))
+    lab.wait(lambda: samples.newest.voltage[-1] > 3.99, "the set-point")
+    request = SetParameters.Request(parameters=[Parameter("experiment", value=str(recording)).to_parameter_msg()])
+    assert lab.call(SetParameters, "identification_node/set_parameters", request).results[0].successful
+    assert identification.ask("diagnose").success
+    assert identification.ask("abort").success
+    assert "left as it is" in identification.await_state("aborted").message
+    assert samples.newest.voltage[-1] > 3.99
+    assert "diagnosing" in identification.process.output
+    for _ in range(200):
+        ask.publish(Float64(data=99.0))
+        lab.pause(0.005)
+    assert driver.output.count("refused 'set_voltage'") <= 5
+
+
+def test_plan_of_a_driver_that_was_killed_has_no_limits(lab):
+    driver = lab.driver(sample_period=PERIOD)
+    identification = Identification(lab)
+    lab.wait(lambda: identification.ask("plan").success, "the driver's limits")
+    driver.signal(signal.SIGKILL)
+    driver.wait()
+    lab.pause(3.5)
+    answer = identification.ask("plan")
+    assert not answer.success
+    assert answer.message.startswith("no limits")
+
+
+def test_every_phase_is_told_to_who_comes_later_and_logged(lab):
+    driver = lab.driver(sample_period=PERIOD, real_time_factor=4.0)
+    identification = Identification(lab)
+    identification.begin()
+    lab.wait(lambda: values_of(identification.statuses[-1])["phase"].startswith("4 of"), "the fourth phase", 90.0)
+    late = lab.listen(DiagnosticStatus, "status", EVERY)
+    lab.wait(lambda: len(late) > 3, "the statuses before")
+    phases = [values_of(status)["phase"] for status in late]
+    assert {"1 of 16 conditioning", "2 of 16 rest"} <= set(phases)
+    assert identification.ask("abort").success
+    identification.await_state("aborted")
+    for line in ("recording to", "running: 1 of 16 conditioning", "running: 2 of 16 rest", "aborted"):
+        assert line in identification.process.output
+    driver.signal(signal.SIGINT)
+    assert driver.wait() == 0
+    for line in ("active: samples flow", "not active any more", "shut down"):
+        assert line in driver.output
+
+
+def test_a_remapped_topic_is_recorded_under_its_own_name(lab):
+    lab.driver("-r", "samples:=raw", sample_period=PERIOD, real_time_factor=4.0)
+    identification = Identification(lab, "-r", "samples:=raw")
+    path = identification.begin()
+    lab.wait(lambda: values_of(identification.statuses[-1])["phase"].startswith("2 of"), "the second phase", 90.0)
+    assert identification.ask("abort").success
+    identification.await_state("aborted")
+    assert "conditioning" in {record.phase for record in read(path)}
+
+
+@pytest.mark.parametrize("after", [0.1, 0.4, 0.8])
+@pytest.mark.parametrize("executable", ["driver_node", "model_node", "identification_node"])
+def test_an_interrupt_while_a_node_starts_shows_no_traceback(lab, executable, after):
+    process = lab.start(executable)
+    lab.wait(lambda: process.is_importing or not process.is_running, "the start of Python")
+    lab.pause(after)
+    process.signal(signal.SIGINT)
+    process.wait()
+    assert "Traceback" not in process.output
