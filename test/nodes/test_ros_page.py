@@ -1,5 +1,6 @@
 """docs/ros.md says what the nodes really publish, subscribe and serve, no more and no less."""
 
+import fnmatch
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -122,7 +123,9 @@ def test_the_security_policy_allows_what_a_node_uses_and_nothing_more(nodes, nod
         own.add("/samples")  # before it begins, to find another driver
     clock = set() if node == "driver_node_stop" else {"/clock"}  # a stop asks no clock
     assert policy.get("subscribe", set()) == own | clock
-    assert policy["reply"] == of("service")
+    assert {n for pattern in policy["reply"] for n in fnmatch.filter(of("service"), pattern)} == of("service")
+    assert all(n.startswith(f"/{node}/") or "*" not in n for n in policy["reply"])  # its own names
+    assert all(fnmatch.filter(of("service"), pattern) for pattern in policy["reply"])
     assert policy.get("request", set()) == of("client")
 
 
