@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from .. import recording
 from ..discrepancy.residual.noise_floor import noise_floors
+from ..errors import RecordingError
+from ..record import Experiment
 from ..report.json_file import write_json
-from ..report.tables.quality_table import notice_table, record_table
+from ..report.tables.quality_table import notice_table, record_table, understood_table
 from . import reading
 from .destination import require_new_experiment, require_new_file
 from .terminal import console, show
@@ -18,7 +21,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser("import", description=__doc__)
     reading.add_arguments(parser)
     parser.add_argument(
-        "-o", "--output", metavar="FOLDER", required=True, help="folder, or file ending .csv .mat .mcap"
+        "-o", "--output", metavar="FOLDER", help="new folder, or file ending .csv .mat .mcap; needed without --preview"
+    )
+    parser.add_argument(
+        "--preview", metavar="PICTURE", help="show what was understood: a table, and a new file ending .png .svg .pdf"
     )
     parser.add_argument("--json", metavar="FILE", help="write phases and findings as JSON")
     parser.set_defaults(run=run)
@@ -32,12 +38,19 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         If the recording cannot be read or the experiment not be written.
     """
-    require_new_experiment("-o", args.output)
+    if args.output is None and args.preview is None:
+        raise RecordingError("-o: got no output, expected one; give -o FOLDER, or --preview PICTURE to look only")
+    if args.output is not None:
+        require_new_experiment("-o", args.output)
+    require_new_file("--preview", args.preview)
     require_new_file("--json", args.json)
     experiment = reading.read(args)
     show(record_table(experiment, noise_floors(experiment.records)), notice_table(experiment))
-    recording.write(experiment, args.output)
-    console().print(f"wrote {len(experiment)} phases to {args.output}")
+    if args.preview is not None:
+        _show_preview(experiment, Path(args.preview).expanduser())
+    if args.output is not None:
+        recording.write(experiment, args.output)
+        console().print(f"wrote {len(experiment)} phases to {args.output}")
     if args.json is not None:
         write_json(
             args.json,
@@ -62,3 +75,11 @@ def run(args: argparse.Namespace) -> int:
             },
         )
     return 0
+
+
+def _show_preview(experiment: Experiment, picture: Path) -> None:
+    from ..report.figures.preview import preview  # matplotlib is slow to import
+
+    show(understood_table(experiment))
+    preview(experiment).save_picture(picture)
+    console().print(f"wrote the picture {picture}")

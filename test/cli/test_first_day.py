@@ -139,3 +139,28 @@ def test_an_empty_folder_is_a_place_to_write_to_and_other_files_are_kept_too(tmp
     assert "--json: " in refused("import", plain, "-o", tmp_path / "two", "--json", tmp_path / "answer.json")
     assert "--truth: " in refused("simulate", "-o", tmp_path / "three", "--truth", tmp_path / "answer.json")
     assert (tmp_path / "answer.json").read_text() == "mine"
+
+
+def test_preview_shows_what_was_understood_and_writes_no_experiment(tmp_path, plain):
+    picture = tmp_path / "look.png"
+    done = piezo("import", plain, "--preview", picture)
+    assert done.returncode == 0, done.stderr
+    assert "What was understood" in done.stdout
+    rows = {line.split()[0]: line for line in done.stdout.splitlines() if line.startswith(("voltage", "displacement"))}
+    assert "0 … 3.6 V" in rows["voltage"]
+    assert "0 … 43.2 µm" in rows["displacement"]
+    assert "sine_1hz" in done.stdout
+    assert f"wrote the picture {picture}" in done.stdout
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["look.png", "plain.csv"]
+
+
+def test_preview_replaces_nothing_and_without_it_an_output_is_needed(tmp_path, plain):
+    (tmp_path / "look.png").write_text("mine")
+    assert "--preview: " in refused("import", plain, "--preview", tmp_path / "look.png")
+    assert (tmp_path / "look.png").read_text() == "mine"
+    assert "-o" in refused("import", plain)
+    done = piezo("import", plain, "--preview", tmp_path / "other.svg", "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "other.svg").read_text().lstrip().startswith("<?xml")
+    assert len(recording.read(tmp_path / "out")) == 1

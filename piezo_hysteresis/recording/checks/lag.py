@@ -117,7 +117,7 @@ def lag_notices(records: Sequence[Record]) -> list[Notice]:
         peers = [o for o in lags if o is not None and _SLOWER * lag.time < o.swing <= _ALIKE * lag.swing]
         shared = min((max(o.time, 0.0) + _SURE * o.error for o in peers), default=lag.time)
         if lag.time < -max(least, 0.5 * record.sample_period) and lag.swing > _SLOW:
-            text = f"the displacement leads the voltage by {samples}; one channel is shifted in time"
+            text = f"the displacement leads the voltage by {samples}; one channel is shifted, or both are swapped"
             notices.append(Notice("leads", text, record.phase, severe=True))
         elif lag.time > max(LATE, least) and lag.time - doubt < _SHARED * shared:
             cause = "check for a slow sensor filter, a delayed channel or a wrong time base"

@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ...errors import RecordingError
 from .style import SETTINGS
 
 
@@ -65,6 +66,22 @@ class Drawing:
         for i in range(max((c.size for c in columns), default=0)):
             writer.writerow(_cell(c[i]) if i < c.size else "" for c in columns)
         return stream.getvalue()
+
+    def save_picture(self, path: Path) -> None:
+        """Write the figure alone, in the format that the ending of the path names.
+
+        Raises
+        ------
+        RecordingError
+            If the ending names none, or the file cannot be written.
+        """
+        if path.suffix.lower() not in (".png", ".svg", ".pdf"):
+            raise RecordingError(f"{path}: got the ending '{path.suffix}', expected .png, .svg or .pdf")
+        try:
+            with mpl.rc_context(SETTINGS):
+                self.figure.savefig(path)
+        except OSError as error:
+            raise RecordingError(f"{path}: {error.strerror or error}, expected a file that can be written") from None
 
     def save(self, folder: Path) -> None:
         """Write ``name.svg``, ``name.png`` and ``name.csv`` into a folder."""

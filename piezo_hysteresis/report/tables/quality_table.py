@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...channels import QUANTITIES, quantity_of
 from ...record import Experiment, Record
 from ...recording.checks.lag import lag_of
 from ..words import duration
@@ -44,6 +45,23 @@ def record_table(experiment: Experiment, noise: np.ndarray) -> Table:
         )
     header = ("phase", "samples", "period", "length", "drive [V]", "displacement [µm]", "noise [nm]", "lag", "start")
     return Table("What was recorded", header, tuple(rows), _NOTE, frozenset(range(1, 8)))
+
+
+def understood_table(experiment: Experiment) -> Table:
+    """Every channel with its range over all phases, in the units of labels, and how many phases have it."""
+    channels: dict[str, list[np.ndarray]] = {}
+    for record in experiment:
+        held = {"voltage": record.voltage, "displacement": record.displacement, **record.channels}
+        for name, values in held.items():
+            channels.setdefault(name, []).append(values)
+    rows = []
+    for name, parts in channels.items():
+        quantity = quantity_of(name) or name
+        factor, unit = (1e6, "µm") if quantity == "displacement" else (1.0, QUANTITIES[quantity])
+        low, high = factor * min(p.min() for p in parts), factor * max(p.max() for p in parts)
+        rows.append((name, f"{low:.4g} … {high:.4g} {unit}", f"{len(parts)} of {len(experiment)}"))
+    note = "Wrong ranges mean a wrong column or unit: give --column and --unit."
+    return Table("What was understood", ("channel", "range", "phases"), tuple(rows), note)
 
 
 def _lag(record: Record) -> str:

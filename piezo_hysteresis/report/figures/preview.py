@@ -1,0 +1,50 @@
+"""What a reader understood of a recording: drive and displacement against time, and one against the other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...record import Experiment
+from .drawing import Drawing
+from .style import MEASURED, canvas, styled
+from .thinning import thinned
+
+POINTS = 1500
+"""Points drawn of a record."""
+
+
+@styled
+def preview(experiment: Experiment) -> Drawing:
+    """Two panels against time with the names of the phases, and the loops beside them.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As it was read.
+    """
+    figure, axes = canvas(2, 2, 4.2, gridspec_kw={"width_ratios": [2.2, 1.0]})
+    (drive, loop), (motion, rest) = axes
+    rest.remove()
+    data: dict[str, np.ndarray] = {}
+    for number, record in enumerate(experiment, 1):
+        at = thinned(record.displacement, POINTS)
+        time, u, y = record.time[at], record.voltage[at], 1e6 * record.displacement[at]
+        drive.plot(time, u, **MEASURED)
+        motion.plot(time, y, **MEASURED)
+        loop.plot(u, y, **MEASURED)
+        drive.annotate(record.phase, (time[0], 1.02), xycoords=("data", "axes fraction"), fontsize=7, rotation=30)
+        data |= {f"time_s_{number}": time, f"voltage_V_{number}": u, f"displacement_um_{number}": y}
+    drive.set_ylabel("drive voltage [V]")
+    motion.set_ylabel("displacement [µm]")
+    motion.set_xlabel("time since the first sample [s]")
+    loop.set_xlabel("drive voltage [V]")
+    loop.set_ylabel("displacement [µm]")
+    return Drawing(
+        "preview",
+        "What was understood",
+        "Drive voltage and displacement against time, named by phase, and the displacement against the drive voltage. "
+        "A displacement that does not follow the voltage points to a wrong column.",
+        f"{len(experiment)} phases over {experiment[-1].start_time + experiment[-1].duration:.3g} s.",
+        figure,
+        data,
+    )
