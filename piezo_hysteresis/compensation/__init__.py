@@ -1,7 +1,7 @@
-"""Compensation: a model turned round drives the stage where it should go.
+"""Compensation: the inverse of a model computes the drive voltage for a wanted displacement.
 
-`Inverse` is the model turned round; `reachable` and `plan` say what can be had and how well, before anything moves;
-`learn` corrects a drive by what was measured.
+`Inverse` is the inverse model. `reachable` and `plan` compute, before anything moves, which part of a path can be reached
+and the expected error. `learn` corrects a drive with the measured error.
 """
 
 from .band import Band

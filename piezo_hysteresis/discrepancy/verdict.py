@@ -11,16 +11,16 @@ from .search.cross_validation import ADEQUATE
 from .search.selection_result import Selection
 
 FEWEST = 4
-"""Records below which none can be held out and no name is given."""
+"""Fewest records from which test records can be taken and an effect can be named."""
 FORESEEN, UNFORESEEN = 1.1, 1.5
-"""Gap on records set aside, in floors: up to the first nothing is missing, though some that were fitted are not quite
-foretold by the others; from the second something is, though those lack nothing."""
+"""Error on the test records in units of the floor. Up to the first value nothing is missing, although V of the training
+records may be a little high. From the second value something is missing, although V of the training records is low."""
 NAMED, NAMED_FAR = 0.6, 0.75
-"""Explained fraction of the gap from which a family is named; and where what is left is large."""
+"""Explained fraction of the gap from which an effect is named, and the one if the remaining error is large."""
 FAR = 10.0
-"""V from which what is left is large: an effect of another family of much the same shape explains that much, too."""
+"""V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""
 LINEAR_LEAVES = 2.0 * ADEQUATE
-"""V that an effect of linear dynamics may leave: they are fitted with it, and hold what is linear."""
+"""Largest V that a linear effect may leave. The dynamics are fitted together with it and explain the rest."""
 
 
 def is_explained(selection: Selection) -> bool:
@@ -38,8 +38,8 @@ def is_makeshift(selection: Selection) -> bool:
 def not_predicted_live(name: str, live: float) -> str:
     """What a user must know of an effect that has numbers of its own in every recording; `live` in % of range."""
     return (
-        f"{name.replace('_', ' ').capitalize()} is explained in the recordings, where it has been fitted to each; "
-        f"it is not predicted live, where an error of {live:.2g} % of range stays."
+        f"{name.replace('_', ' ').capitalize()} was fitted to each recording separately. It cannot "
+        f"be predicted live, where an error of {live:.2g} % of range remains."
     )
 
 
