@@ -9,6 +9,7 @@ from typing import Any
 from ..discrepancy.residual.correlation import CAPTION, correlate
 from ..errors import RecordError
 from ..identification.fit.normal_equations import Nuisance
+from ..identification.records.conditioning_split import known_from_within
 from ..model import model_file
 from ..report.figures.comparison import ModelComparison, compare
 from ..report.json_file import write_json
@@ -40,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
         On a model or an experiment that cannot be read, or that do not fit each other.
     """
     model = model_file.load(args.model)
-    experiment = reading.read(args)
+    experiment, conditioned = known_from_within(reading.read(args))
     nuisances = {"error": Nuisance(offset=True)} if args.zero_per_phase else None
     comparison = compare(experiment, {"error": model}, nuisances)
     tests = _tests(comparison)
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     if args.figures is not None:
         _draw(comparison, Path(args.figures).expanduser())
     show(error_table(comparison), frequency_table(comparison), _test_table(tests))
-    show_notices(experiment.notices)
+    show_notices((*experiment.notices, *conditioned))
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
     return 0
@@ -76,7 +77,7 @@ def answer(comparison: ModelComparison, tests: list[dict[str, Any]]) -> dict[str
                 "fit_percent": row.fit,
                 "floor_m": float(comparison.floors[row.index]),
             }
-            for row in now.rows
+            for row in now.judged  # not the way into the first full loop
         ],
         "percent_of_range_by_frequency": {f"{f:g}": percent for f, percent in now.by_frequency.items()},
         "residual_tests": tests,

@@ -22,7 +22,7 @@ _HEADER = """\
 """First lines of a model file."""
 
 _PROVENANCE = {
-    "free_run_error": "m; rms on data that were not fitted",
+    "free_run_error": "m; rms in free run, on data left out where there were any",
     "free_run_error_percent": "% of the displacement range",
     "data_hash": "of the samples that were fitted",
     "date": "UTC",
