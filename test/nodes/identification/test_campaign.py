@@ -63,7 +63,7 @@ def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, stage):
         return carry_on()
 
     told = lab.wait(ended, "the end of the campaign")
-    assert "phase 'long': a configured 'driver_node' in / is gone" in str(told)
+    assert "phase 'long': a configured 'driver_node' in / has gone" in str(told)
     assert stage.made_safe == 1
     assert {record.phase for record in read(lab.folder / "run")} == {"long"}
 

@@ -121,9 +121,9 @@ def test_predictions_are_those_of_the_core_bit_for_bit(lab, tmp_path):
         np.testing.assert_array_equal(got["residual"], block.displacement - got["prediction"])
         assert (got["model"] == hash_number(MODEL)).all()
     assert [cloud.header.stamp.nanosec for cloud in bench.clouds[:2]] == [0, 10_000_000]
-    bench.report("samples lost")
+    bench.report("samples were lost")
     # 10 nm of noise and a bridged gap against the 1 nm that the model file promises
-    bench.report("times the model's free-run error")
+    bench.report("times the free-run error of the model")
     told = bench.figures(received=7800)
     assert (told["lost"], told["repeated"]) == ("200", "200")
     assert float(told["residual_rms"]) == pytest.approx(predictor.residual_rms, rel=1e-5)
@@ -193,6 +193,6 @@ def test_bad_blocks_and_bad_parameters_are_told_and_the_node_runs_on(lab, tmp_pa
     bench.report("expected finite")
     bench.send(blocks[13:])
     predicted = bench.predicted(27)
-    assert bench.report("samples lost")["lost"] == "300"
+    assert bench.report("samples were lost")["lost"] == "300"
     assert lab.call(Trigger, "model_node/zero").success
     np.testing.assert_array_equal(predicted[-1]["index"], blocks[-1].index)
