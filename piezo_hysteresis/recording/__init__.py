@@ -112,14 +112,14 @@ def read(
     """
     if not paths:
         raise RecordingError("read: got no path, expected a recording")
-    layout = ReadOptions(
+    options = ReadOptions(
         axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include, average
     )
     records: list[Record] = []
     notices: list[Notice] = []
     for path in paths:
         place = Path(path).expanduser()
-        found = _one(place, _format(place, format), layout)
+        found = _one(place, _format(place, format), options)
         factors = load_decimation(place) if decimate is None else decimate
         by_record = [(r, factors.get(r.phase, factors.get(r.phase.split("_")[0]))) for r in found]
         records += [r if factor is None else r.decimate(factor) for r, factor in by_record]
@@ -132,25 +132,25 @@ def read(
     return experiment.noting(*notices, *inspect(experiment))
 
 
-def _one(place: Path, chosen: Format, layout: ReadOptions) -> Experiment:
+def _one(place: Path, chosen: Format, options: ReadOptions) -> Experiment:
     """The experiment of one path, what its records claim about their beginning checked."""
-    experiment = chosen.read(place, layout)
+    experiment = chosen.read(place, options)
     records = experiment.records
     if records[0].continues:  # what it continues is not here
         records = (replace(records[0], continues=False, truncated=True), *records[1:])
-    if layout.initial_voltage is not None:
-        settled = layout.initial_voltage
+    if options.initial_voltage is not None:
+        settled = options.initial_voltage
         records = tuple(r if r.continues or r.truncated else replace(r, initial_voltage=settled) for r in records)
     midway = {i for i, r in enumerate(records) if is_within_its_loop(r)}
-    told = [Notice("truncated", _WITHIN, records[i].phase) for i in sorted(midway)]
+    more_notices = [Notice("truncated", _WITHIN, records[i].phase) for i in sorted(midway)]
     records = tuple(replace(r, truncated=True) if i in midway else r for i, r in enumerate(records))
     came_from = departures(replace(experiment, records=records))
     records = tuple(replace(r, initial_voltage=came_from.get(i, r.initial_voltage)) for i, r in enumerate(records))
     if came_from:
         phases = ", ".join(dict.fromkeys(records[i].phase for i in came_from))
         levels = " or ".join(f"{v:.4g} V" for v in sorted(set(came_from.values())))
-        told.append(Notice("in_motion", _IN_MOTION.format(phases=phases, levels=levels)))
-    return replace(experiment, records=records).noting(*told)
+        more_notices.append(Notice("in_motion", _IN_MOTION.format(phases=phases, levels=levels)))
+    return replace(experiment, records=records).noting(*more_notices)
 
 
 def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str | None = None) -> None:

@@ -291,9 +291,9 @@ def test_numbers_of_hdf5_that_lie_in_other_files_are_refused(tmp_path):
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["voltage"] = np.arange(400.0)
     with h5py.File(tmp_path / "virtual.mat", "w") as file:
-        layout = h5py.VirtualLayout((400,), "f8")
-        layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "voltage", (400,))
-        file.create_virtual_dataset("voltage", layout)
+        options = h5py.VirtualLayout((400,), "f8")
+        options[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "voltage", (400,))
+        file.create_virtual_dataset("voltage", options)
         file["displacement"], file["sample_period"] = np.arange(400.0), 1e-3
     with pytest.raises(PiezoError, match="in other files"):
         read(tmp_path / "virtual.mat")

@@ -11,7 +11,7 @@ from scipy import io
 
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.recording import read
-from piezo_hysteresis.recording.segmentation import decimating_buffer as intake
+from piezo_hysteresis.recording.segmentation import decimating_buffer
 from piezo_hysteresis.recording.segmentation.decimating_buffer import DecimatingBuffer, shared_averages
 from piezo_hysteresis.recording.table import column
 from test.recording import long_recordings
@@ -42,9 +42,9 @@ def source(request, tmp_path_factory):
 
 
 def test_averaging_while_reading_is_decimation(source):
-    path, layout = source
-    (averaged,) = read(path, average=7, **layout, **OPTIONS)
-    (whole,) = read(path, **layout, **OPTIONS)
+    path, options = source
+    (averaged,) = read(path, average=7, **options, **OPTIONS)
+    (whole,) = read(path, **options, **OPTIONS)
     decimated = whole.decimate(7)
     np.testing.assert_allclose(averaged.voltage, decimated.voltage, rtol=1e-12)
     np.testing.assert_allclose(averaged.displacement, decimated.displacement, rtol=1e-12)
@@ -52,32 +52,32 @@ def test_averaging_while_reading_is_decimation(source):
 
 
 def test_a_part_is_the_same_as_that_part_of_the_whole(source):
-    path, layout = source
-    (part,) = read(path, rows=(31_234, 50_001), **layout, **OPTIONS)
+    path, options = source
+    (part,) = read(path, rows=(31_234, 50_001), **options, **OPTIONS)
     np.testing.assert_array_equal(part.voltage, VOLTAGE[31_234:50_001])
     assert part.truncated
-    (last,) = read(path, rows=(-500, None), **layout, **OPTIONS)
+    (last,) = read(path, rows=(-500, None), **options, **OPTIONS)
     np.testing.assert_array_equal(last.voltage, VOLTAGE[-500:])
-    (third,) = read(path, rows=(3_000, 9_000), average=3, initial_voltage=0.0, **layout, **OPTIONS)
+    (third,) = read(path, rows=(3_000, 9_000), average=3, initial_voltage=0.0, **options, **OPTIONS)
     np.testing.assert_allclose(third.voltage, VOLTAGE[3_000:9_000].reshape(-1, 3).mean(axis=1), rtol=1e-12)
     assert not third.truncated
     with pytest.raises(RecordingError, match="60000 rows that is not empty"):
-        read(path, rows=(70_000, 80_000), **layout, **OPTIONS)
+        read(path, rows=(70_000, 80_000), **options, **OPTIONS)
 
 
 def test_every_sample_of_more_than_the_memory_is_meant_to_hold_is_refused_with_the_way_out(source, monkeypatch):
-    path, layout = source
-    monkeypatch.setattr(intake, "MOST", 50_000)
-    with pytest.raises(RecordingError, match=r"more than 50000 samples.*rows, or a larger average"):
-        read(path, average=1, **layout, **OPTIONS)
-    assert read(path, average=2, **layout, **OPTIONS).size == ROWS // 2
+    path, options = source
+    monkeypatch.setattr(decimating_buffer, "MOST", 50_000)
+    with pytest.raises(RecordingError, match=r"more than 50000 samples.*`rows`, or a larger `average`"):
+        read(path, average=1, **options, **OPTIONS)
+    assert read(path, average=2, **options, **OPTIONS).size == ROWS // 2
 
 
 def test_a_long_recording_is_averaged_by_as_little_as_it_takes_and_this_is_told(source, monkeypatch):
-    path, layout = source
-    (whole,) = read(path, average=4, **layout, **OPTIONS)
-    monkeypatch.setattr(intake, "ENOUGH", 20_000)
-    experiment = read(path, **layout, **OPTIONS)
+    path, options = source
+    (whole,) = read(path, average=4, **options, **OPTIONS)
+    monkeypatch.setattr(decimating_buffer, "ENOUGH", 20_000)
+    experiment = read(path, **options, **OPTIONS)
     assert [n.kind for n in experiment.notices if n.kind == "averaged"] == ["averaged"]
     (record,) = experiment
     assert record.sample_period == pytest.approx(4 * PERIOD)
@@ -95,7 +95,7 @@ def test_pieces_of_any_size_come_to_the_same_as_all_at_once(sizes, average, star
     values = np.random.default_rng(1).normal(size=(sum(sizes), 2))
     stop = None if length is None else start + length
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(intake, "ENOUGH", 16)
+        patch.setattr(decimating_buffer, "ENOUGH", 16)
         taken = DecimatingBuffer(2, start, stop, average)
         for part in np.split(values, np.cumsum(sizes)[:-1] if sizes else []):
             taken.add(part)
@@ -112,7 +112,7 @@ def test_pieces_of_any_size_come_to_the_same_as_all_at_once(sizes, average, star
 @given(sizes=st.lists(st.integers(1, 10_000), min_size=1, max_size=12), enough=st.integers(100, 30_000))
 def test_the_longest_phases_give_way_first(sizes, enough):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(intake, "ENOUGH", enough)
+        patch.setattr(decimating_buffer, "ENOUGH", enough)
         averages = shared_averages(sizes, None)
     assert sum(n // a for n, a in zip(sizes, averages, strict=True)) <= enough
     most = max(n // a for n, a in zip(sizes, averages, strict=True))

@@ -68,7 +68,7 @@ class _Series:
         return self.times.array(), self.values.array()
 
 
-def read_topics(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Notice]]:
+def read_topics(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[Notice]]:
     """The record that `ReadOptions.columns` describes.
 
     Samples are those of the displacement's topic. A channel of another topic has, at each of them, its newest value: a
@@ -82,30 +82,30 @@ def read_topics(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Notic
     """
     places = {
         name: TopicField.parse(str(text))
-        for name, text in layout.columns.items()
+        for name, text in options.columns.items()
         if is_channel(name) and name != "time"
     }
     if not {"voltage", "displacement"} <= places.keys():
-        raise RecordingError(f"`columns`: got {', '.join(layout.columns)}, expected voltage and displacement")
-    series, stamped = _series(bag, places, layout.sample_period or 0.0)
-    intake = _paired(series, places, layout)
-    channels = {name: layout.in_si(name, intake.column(at)) for at, name in enumerate(series, 1)}
+        raise RecordingError(f"`columns`: got {', '.join(options.columns)}, expected voltage and displacement")
+    series, stamped = _series(bag, places, options.sample_period or 0.0)
+    buffer = _paired(series, places, options)
+    channels = {name: options.in_si(name, buffer.column(at)) for at, name in enumerate(series, 1)}
     held = len({p.topic for p in places.values()}) > 1
-    truncated = bool(layout.rows and layout.rows[0]) and layout.initial_voltage is None
+    truncated = bool(options.rows and options.rows[0]) and options.initial_voltage is None
     records, notices = _records(
-        channels, intake.column(0), held, stamped, layout.after_reading(intake.factor), truncated
+        channels, buffer.column(0), held, stamped, options.after_reading(buffer.factor), truncated
     )
-    if layout.average is None and intake.factor > 1:
-        notices.append(averaged_notice(intake.factor, records[0].sample_period))
+    if options.average is None and buffer.factor > 1:
+        notices.append(averaged_notice(buffer.factor, records[0].sample_period))
     return records, notices
 
 
-def _paired(series: dict[str, _Series], places: dict[str, TopicField], layout: ReadOptions) -> DecimatingBuffer:
+def _paired(series: dict[str, _Series], places: dict[str, TopicField], options: ReadOptions) -> DecimatingBuffer:
     """The times of the displacement, and the newest value of every channel then, in columns."""
     arrays = {name: own.arrays() for name, own in series.items()}
     time = arrays["displacement"][0]
     begun = max(float(times[0]) for times, _ in arrays.values())
-    intake = DecimatingBuffer.of(1 + len(arrays), layout)
+    buffer = DecimatingBuffer.of(1 + len(arrays), options)
     for first in range(0, time.size, PIECE):
         part = np.arange(first, min(first + PIECE, time.size))
         part = part[time[part] >= begun]
@@ -113,8 +113,8 @@ def _paired(series: dict[str, _Series], places: dict[str, TopicField], layout: R
         for name, (times, values) in arrays.items():
             same = places[name].topic == places["displacement"].topic and values.size == time.size
             columns.append(values[part if same else np.searchsorted(times, time[part], "right") - 1])
-        intake.add(np.stack(columns, axis=1))
-    return intake
+        buffer.add(np.stack(columns, axis=1))
+    return buffer
 
 
 def _series(bag: Bag, places: dict[str, TopicField], period: float) -> tuple[dict[str, _Series], bool]:
@@ -150,11 +150,11 @@ def _series(bag: Bag, places: dict[str, TopicField], period: float) -> tuple[dic
 
 
 def _records(
-    channels: dict[str, Samples], time: Samples, held: bool, stamped: bool, layout: ReadOptions, truncated: bool
+    channels: dict[str, Samples], time: Samples, held: bool, stamped: bool, options: ReadOptions, truncated: bool
 ) -> tuple[list[Record], list[Notice]]:
     if time.size < 2:
         raise RecordingError(f"got {time.size} samples after the first value of every channel, expected two or more")
-    part = layout.part(time.size)
+    part = options.part(time.size)
     channels = {name: values[part] for name, values in channels.items()}
     base = TimeColumn.of(time[part])
     notices = base.notices()
@@ -167,6 +167,6 @@ def _records(
     if not stamped:
         notices.append(Notice("time_base", "the messages have no time stamps; their times of reception are used"))
     breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
-    parts, told = split_at_gaps(channels, layout.sample_period or base.period, breaks, truncated=truncated)
-    records, proposed = labelled(parts, layout.phases)
-    return records, [*notices, *told, *proposed]
+    parts, more_notices = split_at_gaps(channels, options.sample_period or base.period, breaks, truncated=truncated)
+    records, proposed = labelled(parts, options.phases)
+    return records, [*notices, *more_notices, *proposed]

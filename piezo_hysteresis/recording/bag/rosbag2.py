@@ -50,16 +50,16 @@ class Rosbag2:
         files = [path] if path.is_file() else path.iterdir()
         return any(f.suffix in (*STORAGES, ".zstd") or f.name == "metadata.yaml" for f in files)
 
-    def read(self, path: Path, layout: ReadOptions) -> Experiment:
+    def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The phases of one stage in the order in which they were recorded."""
         with naming(path, "a rosbag2 bag"):
             bag = Bag(path)
-            if any(str(place).startswith("/") for place in layout.columns.values()):
-                records, notices = read_topics(bag, layout)
+            if any(str(place).startswith("/") for place in options.columns.values()):
+                records, notices = read_topics(bag, options)
             else:
-                if layout.rows is not None:
-                    raise RecordingError(f"`rows`: got {layout.rows} of a bag of phases, expected none; import it")
-                records, notices = _read_samples(bag, layout)
+                if options.rows is not None:
+                    raise RecordingError(f"`rows`: got {options.rows} of a bag of phases, expected none; import it")
+                records, notices = _read_samples(bag, options)
             return Experiment(tuple(records), str(path), (*bag.notices, *notices))
 
     def write(self, experiment: Experiment, path: Path) -> None:
@@ -127,18 +127,18 @@ def _space(topic: str, name: str) -> str | None:
     return _absolute(space) if last == name else None
 
 
-def _read_samples(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Notice]]:
+def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[Notice]]:
     streams: dict[str, SampleStream] = {}
     names: dict[str, PhaseNames] = {}
     damaged = 0
     for message in bag.messages():
         space = _space(message.topic, "samples" if message.type == TYPE else "phase")
-        if space is None or (layout.axis is not None and space != _absolute(layout.axis)):
+        if space is None or (options.axis is not None and space != _absolute(options.axis)):
             continue
         try:
             if message.type == TYPE:
                 block = BlockMessage.from_cdr(message.raw)
-                streams.setdefault(space, SampleStream(layout.sample_period)).add(block, message.time_ns)
+                streams.setdefault(space, SampleStream(options.sample_period)).add(block, message.time_ns)
             elif message.type == STRING:
                 names.setdefault(space, PhaseNames()).add(message.raw, message.time_ns)
         except Exception:  # the decoder raises whatever it likes on damaged bytes
@@ -147,67 +147,67 @@ def _read_samples(bag: Bag, layout: ReadOptions) -> tuple[list[Record], list[Not
             raise RecordingError(f"holds several stages, expected one; give `axis`: {', '.join(sorted(streams))}")
     notices = [Notice("damaged", f"{damaged} messages could not be decoded and were skipped")] if damaged else []
     if not streams:
-        where = f" of the axis '{layout.axis}'" if layout.axis else ""
+        where = f" of the axis '{options.axis}'" if options.axis else ""
         raise RecordingError(
             f"got no readable samples{where} (topic 'samples', {TYPE}); map foreign topics by `columns`, e.g. "
             "voltage=/ao.data displacement=/sensor.data"
         )
     (space, stream), *_ = streams.items()
-    stretches, told = stream.stretches(split_phases=layout.phases is None)
-    averages = shared_averages([s.size for s in stretches], layout.average)
-    records, more = _records(stretches, averages, names.get(space, PhaseNames()), layout)
-    return records, [*notices, *told, *more]
+    segments, more_notices = stream.segments(split_phases=options.phases is None)
+    averages = shared_averages([s.size for s in segments], options.average)
+    records, more = _records(segments, averages, names.get(space, PhaseNames()), options)
+    return records, [*notices, *more_notices, *more]
 
 
 def _records(
-    stretches: list[Segment], averages: list[int], names: PhaseNames, layout: ReadOptions
+    segments: list[Segment], averages: list[int], names: PhaseNames, options: ReadOptions
 ) -> tuple[list[Record], list[Notice]]:
-    unlabelled = layout.phases is not None or (not names and all(s.phase == 0 for s in stretches))
+    unlabelled = options.phases is not None or (not names and all(s.phase == 0 for s in segments))
     records: list[Record] = []
     notices: list[Notice] = []
-    moving = _MOVED * max(_travel(stretch) for stretch in stretches)
+    moving = _MOVED * max(_travel(segment) for segment in segments)
     before: Segment | None = None
     kept = excited = False
-    for stretch, average in zip(stretches, averages, strict=True):
-        if stretch.first:
+    for segment, average in zip(segments, averages, strict=True):
+        if segment.first:
             before, kept, excited = None, False, False
-        slow = stretch.averaged(average)
-        name = "record" if unlabelled else _name(slow if slow.size else stretch, names, notices)
-        moves = _travel(stretch) > moving
-        left_out = name in (IDLE, HOLD) and name not in layout.include and not (name == HOLD and moves and kept)
-        if missing := stretch.lost + sum(stretch.breaks.values()):
-            lost = f"{missing} samples ({missing * stretch.sample_period:.3g} s) were lost"
-            places = len(stretch.breaks) + (stretch.lost > 0)
-            severe = not left_out and missing > _SEVERE_SHARE * (stretch.size + missing)
+        slow = segment.averaged(average)
+        name = "record" if unlabelled else _name(slow if slow.size else segment, names, notices)
+        moves = _travel(segment) > moving
+        left_out = name in (IDLE, HOLD) and name not in options.include and not (name == HOLD and moves and kept)
+        if missing := segment.lost + sum(segment.breaks.values()):
+            lost = f"{missing} samples ({missing * segment.sample_period:.3g} s) were lost"
+            places = len(segment.breaks) + (segment.lost > 0)
+            severe = not left_out and missing > _SEVERE_SHARE * (segment.size + missing)
             notices.append(Notice("gap", f"{lost} in {places} places", name, severe))
-        if paused := sum(n for at, n in stretch.pauses.items() if at):
-            held = f"{paused} samples ({paused * stretch.sample_period:.3g} s) were not measured"
+        if paused := sum(n for at, n in segment.pauses.items() if at):
+            held = f"{paused} samples ({paused * segment.sample_period:.3g} s) were not measured"
             notices.append(Notice("pause", f"{held} while the device held its voltage and its memory was read", name))
         if left_out and moves:
             text = (
-                f"the drive moved by {_travel(stretch):.3g} V before the first phase; the stage is "
+                f"the drive moved by {_travel(segment):.3g} V before the first phase; the stage is "
                 "assumed to have settled afterwards"
             )
             notices.append(Notice("moved", text, name))
         if not left_out:
-            begins = stretch.phase == 0 if stretch.first else stretch.lost == 0
+            begins = segment.phase == 0 if segment.first else segment.lost == 0
             if excited and not kept:
                 notices.append(
                     Notice("history", "earlier phases were not recorded; the stage is assumed to have settled", name)
                 )
             if not slow.size:
-                text = f"its {stretch.size} samples are fewer than the {average} to be averaged; the phase was left out"
+                text = f"its {segment.size} samples are fewer than the {average} to be averaged; the phase was left out"
                 notices.append(Notice("averaged", text, name))
                 continue
-            if layout.average is None and average > 1:
+            if options.average is None and average > 1:
                 notices.append(averaged_notice(average, slow.sample_period, name))
-            parts, told = split_at_gaps(
+            parts, more_notices = split_at_gaps(
                 slow.channels,
                 slow.sample_period,
                 slow.breaks,
                 slow.pauses,
                 phase=name,
-                start_time=stretch.start_time,
+                start_time=segment.start_time,
                 continues=kept,
                 truncated=not begins,
                 initial_voltage=float(before.channels["voltage"][-1]) if before and begins and not kept else None,
@@ -217,33 +217,33 @@ def _records(
                     Notice("truncated", "its beginning was not recorded; the initial state is unknown", name)
                 )
             records += parts
-            notices += told
+            notices += more_notices
             kept = True
         excited |= name != IDLE
-        before = stretch
+        before = segment
     if not records:
         raise RecordingError(f"holds only {IDLE} and {HOLD}, expected phases; `include` keeps those")
     origin = records[0].start_time
     records = [replace(r, start_time=r.start_time - origin) for r in records]
     if unlabelled:
-        records, told = labelled(records, layout.phases)
-        notices += told
+        records, more_notices = labelled(records, options.phases)
+        notices += more_notices
     return records, notices
 
 
-def _travel(stretch: Segment) -> float:
+def _travel(segment: Segment) -> float:
     """Range of the drive [V]."""
-    voltage = stretch.channels["voltage"]
+    voltage = segment.channels["voltage"]
     return float(np.ptp(voltage)) if np.isfinite(voltage).all() else 0.0
 
 
-def _name(stretch: Segment, names: PhaseNames, notices: list[Notice]) -> str:
+def _name(segment: Segment, names: PhaseNames, notices: list[Notice]) -> str:
     """Recorded name of a stretch, or a proposed one."""
-    name = names.at(stretch.phase, stretch.received_ns) or (IDLE if stretch.phase == 0 else "")
+    name = names.at(segment.phase, segment.received_ns) or (IDLE if segment.phase == 0 else "")
     if not name:
-        name = phase_name(stretch.channels["voltage"], stretch.sample_period)
+        name = phase_name(segment.channels["voltage"], segment.sample_period)
         notices.append(
-            Notice("proposed", f"phase number {stretch.phase} has no recorded name; '{name}' is assumed", name)
+            Notice("proposed", f"phase number {segment.phase} has no recorded name; '{name}' is assumed", name)
         )
     return name
 

@@ -93,7 +93,7 @@ class SampleStream:
         self._periods.append(period if period > 0 else np.nan)
         self._received_ns.append(received_ns)
 
-    def stretches(self, split_phases: bool = True) -> tuple[list[Segment], list[Notice]]:
+    def segments(self, split_phases: bool = True) -> tuple[list[Segment], list[Notice]]:
         """Everything received, in order of the index.
 
         Parameters
@@ -103,29 +103,29 @@ class SampleStream:
 
         Returns
         -------
-        stretches : list of Stretch
+        segments : list of Stretch
         notices : list of Notice
-            Repeated and reordered samples, and new starts of the driver; losses are told by the stretches.
+            Repeated and reordered samples, and new starts of the driver; losses are told by the segments.
 
         Raises
         ------
         RecordError
             If nothing tells the sample period.
         """
-        stretches: list[Segment] = []
+        segments: list[Segment] = []
         notices: list[Notice] = []
         if self._uneven:
             text = f"times within {self._uneven} of {len(self._starts)} blocks are uneven; uniform times are assumed"
             notices.append(Notice("time_base", text))
         end = 0.0
         for run in self._runs():
-            if run.first and stretches:
+            if run.first and segments:
                 seconds = (self._time_ns(run.pieces[0][1], run.period) - self._times_ns[0]) * 1e-9
                 end = max(end, seconds)
                 notices.append(Notice("restart", f"the driver was started again {end:.6g} s after the first sample"))
-            stretches += self._cut(run, end, split_phases, notices)
-            end = stretches[-1].start_time + stretches[-1].size * run.period
-        return stretches, notices
+            segments += self._cut(run, end, split_phases, notices)
+            end = segments[-1].start_time + segments[-1].size * run.period
+        return segments, notices
 
     def _block_periods(self) -> NDArray[np.float64]:
         periods = np.array(self._periods)
@@ -213,8 +213,8 @@ class SampleStream:
     def _tells_pauses(self, pieces: list[tuple[int, int, int]]) -> bool:
         """False where blocks are said to follow a pause though nothing is missing: that mark means something else."""
         begin, end = pieces[0][1], max(b for _, _, b in pieces)
-        told = {start for start in self._after_pause if begin < start < end}
-        return told <= {a for _, a, _ in pieces}
+        announced = {start for start in self._after_pause if begin < start < end}
+        return announced <= {a for _, a, _ in pieces}
 
 
 def _signed(step: int) -> int:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Notice, Record, Samples
-from .split_at_gaps import stretches
+from .split_at_gaps import segments
 
 FEWEST_LEVELS = 1000
 """Quantisation is told where a channel uses fewer levels than this; below a sixteenth of it nothing rests on it."""
@@ -41,7 +41,7 @@ def channel_defects(record: Record) -> list[Notice]:
 def _runs_of_equal(values: Samples, shortest: int) -> NDArray[np.int64]:
     """Start and stop of every run of at least `shortest` equal samples, shape (k, 2)."""
     same = np.diff(values) == 0.0
-    runs = np.array(stretches(same), np.int64).reshape(-1, 2)
+    runs = np.array(segments(same), np.int64).reshape(-1, 2)
     runs[:, 1] += 1
     return np.asarray(runs[runs[:, 1] - runs[:, 0] >= shortest])
 
@@ -72,8 +72,8 @@ def _stuck(record: Record) -> list[Notice]:
     ):
         if len(part):
             samples = int((part[:, 1] - part[:, 0]).sum())
-            told = text.format(float(y[part[0, 0]])) + f" for {samples} samples while the drive moves"
-            notices.append(Notice(kind, told, record.phase, severe=samples > _SEVERE_SHARE * record.size))
+            message = text.format(float(y[part[0, 0]])) + f" for {samples} samples while the drive moves"
+            notices.append(Notice(kind, message, record.phase, severe=samples > _SEVERE_SHARE * record.size))
     return notices
 
 

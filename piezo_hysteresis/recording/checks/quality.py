@@ -55,7 +55,7 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
         notices += channel_defects(record)
     late = lag_notices(moving)
     notices += late
-    notices += [n for n in _polarity_and_lead(moving) if n.kind not in {told.kind for told in late}]
+    notices += [n for n in _polarity_and_lead(moving) if n.kind not in {notice.kind for notice in late}]
     for record in experiment:
         notices += onset(record)
     return (*notices, *origins(experiment))

@@ -22,10 +22,10 @@ PERIODS = (1e-9, 1e6)
 """Sample periods that a recording can have [s]."""
 
 
-def stretches(good: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def segments(good: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Start and stop of every run of True.
 
-    >>> stretches(np.array([True, False, True, True]))
+    >>> segments(np.array([True, False, True, True]))
     [(0, 1), (2, 4)]
     """
     edges = np.flatnonzero(np.diff(good.astype(np.int8), prepend=0, append=0))
@@ -84,7 +84,7 @@ def split_at_gaps(
     good = (np.abs(voltage) < LARGEST) & (np.abs(displacement) < LARGEST)
     gaps = {**(breaks or {}), **(pauses or {})}
     edges = sorted(gaps.keys() - {0})
-    pieces = [(a + i, a + j) for a, b in _between(edges, good.size) for i, j in stretches(good[a:b])]
+    pieces = [(a + i, a + j) for a, b in _between(edges, good.size) for i, j in segments(good[a:b])]
     if not pieces:
         raise RecordError(f"phase '{phase}': got no finite sample among {good.size}")
     shortest = min(SHORTEST_SHARE * good.size, max(b - a for a, b in pieces))

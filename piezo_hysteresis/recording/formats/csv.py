@@ -39,22 +39,22 @@ class Csv:
         """True for the endings of text tables, and for any text with rows of numbers."""
         return path.is_file() and (path.suffix.lower() in _ENDINGS or _is_table(path))
 
-    def read(self, path: Path, layout: ReadOptions) -> Experiment:
+    def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The table as phases: labelled ones, or else what the drive looks like."""
         with naming(path, "a text table"):
             dialect = Dialect.sniff(path)
-            found = resolve(dialect.header, dialect.width, layout)
+            found = resolve(dialect.header, dialect.width, options)
             places = found.columns
             numbers = {name: at for name, (at, _) in places.items() if is_channel(name)}
             words = {name: at for name, (at, _) in places.items() if name in LABELS}
-            cells = read_cells(path, dialect, numbers, words, layout)
-            channels = {name: layout.in_si(name, values, places[name][1]) for name, values in cells.columns.items()}
+            cells = read_cells(path, dialect, numbers, words, options)
+            channels = {name: options.in_si(name, values, places[name][1]) for name, values in cells.columns.items()}
             if "time" in channels and abs(channels["time"][0]) > _EPOCH:
                 channels["time"] = channels["time"] - channels["time"][0]
-            rest = layout.after_reading(cells.average)
-            records, notices = table_records(channels, cells.marks, rest, truncated=layout.passes_over)
+            rest = options.after_reading(cells.average)
+            records, notices = table_records(channels, cells.marks, rest, truncated=options.passes_over)
             notices += found.notices
-            if layout.average is None and cells.average > 1:
+            if options.average is None and cells.average > 1:
                 notices.append(averaged_notice(cells.average, records[0].sample_period))
             if cells.bad:
                 notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number"))

@@ -15,7 +15,7 @@ class Format(Protocol):
     def recognises(self, path: Path) -> bool:
         """True if the file or folder looks like this format."""
 
-    def read(self, path: Path, layout: ReadOptions) -> Experiment:
+    def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The experiment at `path`, in SI units, with notices about what was found."""
 
 

@@ -32,7 +32,7 @@ class GcsArrayFormat:
         with path.open("rb") as file:
             return _END.encode() in file.read(BLOCK_BYTES // 16)
 
-    def read(self, path: Path, layout: ReadOptions) -> Experiment:
+    def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The array as phases named by what the drive looks like, unless `ReadOptions.phases` says otherwise."""
         with naming(path, "a GCS array"):
             header, skipped = _header(path)
@@ -41,30 +41,30 @@ class GcsArrayFormat:
             if width < 2 or width > 1000:
                 raise RecordingError(f"got DIM = {width}, expected two to 1000 columns")
             inferred = {"voltage": _first(titles, "volt"), "displacement": _first(titles, "position|displacement")}
-            columns = {c: at for c, at in inferred.items() if at} | dict(layout.columns)
+            columns = {c: at for c, at in inferred.items() if at} | dict(options.columns)
             places = resolve(titles, width, ReadOptions(columns=columns, sample_period=1.0)).columns
             separator = int(header.get("SEPARATOR", "32"))
             dialect = Dialect(None if separator in (9, 32) else chr(separator), False, skipped, (), width)
             numbers = {name: at for name, (at, _) in places.items() if is_channel(name)}
-            cells = read_cells(path, dialect, numbers, {}, layout)
+            cells = read_cells(path, dialect, numbers, {}, options)
             channels = {
-                name: layout.in_si(name, column, "um" if quantity_of(name) == "displacement" else None)
+                name: options.in_si(name, column, "um" if quantity_of(name) == "displacement" else None)
                 for name, column in cells.columns.items()
             }
-            period = layout.sample_period or float(header.get("SAMPLE_TIME", "nan"))
-            rest = layout.with_period(period if period > 0 else None).after_reading(cells.average)
-            records, notices = table_records(channels, [], rest, truncated=layout.passes_over)
+            period = options.sample_period or float(header.get("SAMPLE_TIME", "nan"))
+            rest = options.with_period(period if period > 0 else None).after_reading(cells.average)
+            records, notices = table_records(channels, [], rest, truncated=options.passes_over)
             said = ", ".join(f"{name} = '{titles[at]}'" for name, at in numbers.items())
             notices.append(Notice("columns", f"columns used: {said}; positions without a unit are taken in µm"))
             declared = int(header.get("NDATA", "-1"))
-            if declared >= 0 and layout.rows is None and cells.average == 1 and channels["voltage"].size != declared:
+            if declared >= 0 and options.rows is None and cells.average == 1 and channels["voltage"].size != declared:
                 notices.append(
                     Notice(
                         "cut",
                         f"the file has {channels['voltage'].size} of the {declared} rows that its header declares",
                     )
                 )
-            if layout.average is None and cells.average > 1:
+            if options.average is None and cells.average > 1:
                 notices.append(averaged_notice(cells.average, records[0].sample_period))
             if cells.bad:
                 notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number"))

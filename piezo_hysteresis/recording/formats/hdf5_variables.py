@@ -71,21 +71,21 @@ class Hdf5Variables(Variables):
     def __iter__(self) -> Iterator[str]:
         return (name.replace("/", ".") for name in self._names if not name.startswith("#"))
 
-    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
+    def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         dataset = self._numbers(name)
         shape = tuple(dataset.shape[::-1]) if self._rows_last else tuple(dataset.shape)
         self.check_column(name, shape, column)
         last = dataset.ndim - 1 if self._rows_last else 0
         along = last if column is not None else int(np.argmax(dataset.shape))
-        intake = DecimatingBuffer.of(1, layout)
+        buffer = DecimatingBuffer.of(1, options)
         for first in range(0, dataset.shape[along], PIECE):
             index: list[int | slice] = [column or 0] * dataset.ndim
             index[along] = slice(first, first + PIECE)
-            skipped = first + PIECE <= intake.start
-            intake.add(np.empty((PIECE, 1)) if skipped else np.asarray(dataset[tuple(index)], np.float64)[:, None])
-            if intake.is_full:
+            skipped = first + PIECE <= buffer.start
+            buffer.add(np.empty((PIECE, 1)) if skipped else np.asarray(dataset[tuple(index)], np.float64)[:, None])
+            if buffer.is_full:
                 break
-        return intake
+        return buffer
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         dataset = self._numbers(name)

@@ -31,16 +31,16 @@ class Mat:
         """True for the ending .mat."""
         return path.is_file() and path.suffix.lower() == ".mat"
 
-    def read(self, path: Path, layout: ReadOptions) -> Experiment:
+    def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The structs in order of their numbers, or the variables as one record."""
         with naming(path, "a MAT file"), (Hdf5Variables if is_hdf5(path) else Mat5Variables)(path) as variables:
             structs = sorted({name.partition(".")[0] for name in variables if re.match(_STRUCT + r"\d+\.", name)})
             records: list[Record] = []
             notices: list[Notice] = []
-            for prefix in [""] if layout.columns or not structs else [f"{struct}." for struct in structs]:
-                parts, told = variable_records(variables, prefix, layout, records)
+            for prefix in [""] if options.columns or not structs else [f"{struct}." for struct in structs]:
+                parts, more_notices = variable_records(variables, prefix, options, records)
                 records += parts
-                notices += told
+                notices += more_notices
             return Experiment(tuple(records), str(path), tuple(notices))
 
     def write(self, experiment: Experiment, path: Path) -> None:

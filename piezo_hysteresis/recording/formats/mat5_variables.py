@@ -83,20 +83,20 @@ class Mat5Variables(Variables):
             raise KeyError(name)
         return self._variable(top)[name]
 
-    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
+    def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         matrix = self._long.get(name)
         shape = self[name].shape if matrix is None else matrix.shape
         self.check_column(name, shape, column)
-        intake = DecimatingBuffer.of(1, layout)
+        buffer = DecimatingBuffer.of(1, options)
         if matrix is not None:
             count = math.prod(shape) if column is None else shape[0]
-            _read(self._path, matrix, (column or 0) * count, count, intake)
-            return intake
+            _read(self._path, matrix, (column or 0) * count, count, buffer)
+            return buffer
         values = self[name]
         if values.dtype.kind not in "fiub":
             raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
-        intake.add_column(values.ravel() if column is None else values[:, column])
-        return intake
+        buffer.add_column(values.ravel() if column is None else values[:, column])
+        return buffer
 
     def _variable(self, top: str) -> dict[str, NDArray[Any]]:
         """Everything in one variable, by dotted names."""
@@ -201,7 +201,7 @@ def _small_or_long(stream: BinaryIO | Inflated, order: str) -> tuple[bytes, int]
     return stream.read(min(padded, 1 << 16))[:length], 8 + padded
 
 
-def _read(path: Path, matrix: _Matrix, first: int, count: int, intake: DecimatingBuffer) -> None:
+def _read(path: Path, matrix: _Matrix, first: int, count: int, buffer: DecimatingBuffer) -> None:
     """Take `count` numbers from the number `first` on."""
     with path.open("rb") as file:
         order = ORDERS[file.read(HEADER)[126:]]
@@ -209,10 +209,10 @@ def _read(path: Path, matrix: _Matrix, first: int, count: int, intake: Decimatin
         ahead = matrix.offset + first * matrix.kind.itemsize
         while ahead > 0:
             ahead -= len(stream.read(min(ahead, PIECE))) or ahead
-        while count > 0 and not intake.is_full:
+        while count > 0 and not buffer.is_full:
             raw = stream.read(min(count, PIECE) * matrix.kind.itemsize)
             values = np.frombuffer(raw[: len(raw) // matrix.kind.itemsize * matrix.kind.itemsize], matrix.kind)
             if not values.size:
                 raise RecordingError(f"a variable ends {count} numbers early")
-            intake.add(values.astype(np.float64)[:, None])
+            buffer.add(values.astype(np.float64)[:, None])
             count -= values.size

@@ -32,8 +32,8 @@ class NamedArrays:
         """True for the endings."""
         return path.is_file() and path.suffix.lower() in self._endings
 
-    def read(self, path: Path, layout: ReadOptions) -> Experiment:
+    def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The arrays as phases named by what the drive looks like, unless `ReadOptions.phases` says otherwise."""
         with naming(path, self._expected), self._opened(path) as variables:
-            records, notices = variable_records(variables, "", layout)
+            records, notices = variable_records(variables, "", options)
             return Experiment(tuple(records), str(path), tuple(notices))

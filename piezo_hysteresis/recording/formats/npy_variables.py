@@ -50,11 +50,11 @@ class NpyVariables(Variables):
     def __getitem__(self, name: str) -> NDArray[Any]:
         return np.asarray(self._columns[name])
 
-    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
+    def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         values = self._columns[name]
         self.check_column(name, values.shape, column)
         if values.dtype.kind not in "fiub":
             raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
-        buffer = DecimatingBuffer.of(1, layout)
+        buffer = DecimatingBuffer.of(1, options)
         buffer.add_column(values)
         return buffer

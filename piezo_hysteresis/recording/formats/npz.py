@@ -40,30 +40,30 @@ class Npz:
         """True for an .npz file or a folder that holds one."""
         return path.suffix == ".npz" if path.is_file() else any(path.glob("*.npz"))
 
-    def read(self, path: Path, layout: ReadOptions) -> Experiment:
+    def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The phases in the order of their file numbers."""
         files = [path] if path.is_file() else sorted(path.glob("*.npz"), key=_order)
         if strange := [file.name for file in files if not file.is_file()]:
             raise RecordingError(f"{path}: {strange[0]} is no regular file, expected .npz files only")
         records: list[Record] = []
         notices: list[Notice] = []
-        if len(files) > 1 and not isinstance(layout.phases, str | None):
+        if len(files) > 1 and not isinstance(options.phases, str | None):
             raise RecordingError(f"{path}: got start times of phases for {len(files)} files, expected one record")
         end = 0.0
         sizes = []
         for file in files:
             with naming(file, _EXPECTED):
-                sizes.append(_size(file, layout))
-        for file, size, average in zip(files, sizes, shared_averages(sizes, layout.average), strict=True):
+                sizes.append(_size(file, options))
+        for file, size, average in zip(files, sizes, shared_averages(sizes, options.average), strict=True):
             if size < average:
                 continue
             with naming(file, _EXPECTED):
-                parts, told = _phase(file, layout, average, end)
+                parts, more_notices = _phase(file, options, average, end)
             records += parts
-            notices += told
+            notices += more_notices
             end = parts[-1].start_time + parts[-1].duration
         if not records:
-            raise RecordingError(f"{path}: `average`: got {layout.average}, expected fewer samples than a phase has")
+            raise RecordingError(f"{path}: `average`: got {options.average}, expected fewer samples than a phase has")
         return Experiment(tuple(records), str(path), tuple(notices))
 
     def write(self, experiment: Experiment, path: Path) -> None:
@@ -83,42 +83,42 @@ class Npz:
                 np.savez(path / f"{number:02d}_{name}.npz", **_keys(record))
 
 
-def _places(values: NpzMembers, layout: ReadOptions) -> tuple[dict[str, str], dict[str, str]]:
+def _places(values: NpzMembers, options: ReadOptions) -> tuple[dict[str, str], dict[str, str]]:
     """Channel or label to the key that holds it, and those of them that were inferred_columns."""
-    place = {name: str(layout.columns.get(name, name)) for name in (*CHANNELS, *layout.columns, *LABELS)}
-    open_ = [c for c in ("voltage", "displacement") if c not in layout.columns and c not in values]
+    place = {name: str(options.columns.get(name, name)) for name in (*CHANNELS, *options.columns, *LABELS)}
+    open_ = [c for c in ("voltage", "displacement") if c not in options.columns and c not in values]
     names = [name for name in values if name not in place.values()]
-    guess = {c: names[at] for c, at in inferred_columns(names, (), open_).items()}
-    place |= guess
+    inferred = {c: names[at] for c, at in inferred_columns(names, (), open_).items()}
+    place |= inferred
     others = {name: name for name in values if is_channel(name) and name not in (*place, *place.values())}
-    return others | place, guess
+    return others | place, inferred
 
 
-def _size(file: Path, layout: ReadOptions) -> int:
+def _size(file: Path, options: ReadOptions) -> int:
     """Samples that a layout keeps of a file, before they are averaged."""
     with zipfile.ZipFile(file) as archive:
         values = NpzMembers(archive, file.stat().st_size)
-        part = layout.part(values.size(_places(values, layout)[0]["voltage"]))
+        part = options.part(values.size(_places(values, options)[0]["voltage"]))
         return part.stop - part.start
 
 
-def _phase(file: Path, layout: ReadOptions, average: int, end: float) -> tuple[list[Record], list[Notice]]:
+def _phase(file: Path, options: ReadOptions, average: int, end: float) -> tuple[list[Record], list[Notice]]:
     """Records of one file; `end` is where the one before it ended [s]."""
     with zipfile.ZipFile(file) as archive:
         values = NpzMembers(archive, file.stat().st_size)
-        place, guess = _places(values, layout)
+        place, inferred = _places(values, options)
         units = {c: unit_in(name, c) for c, name in place.items() if is_channel(c)}
-        part = layout.part(values.size(place["voltage"]))
+        part = options.part(values.size(place["voltage"]))
 
         def channel(name: str) -> Samples:
-            return layout.in_si(name, values.samples(place[name], part, average), units.get(name))
+            return options.in_si(name, values.samples(place[name], part, average), units.get(name))
 
         def number(name: str, default: float | None) -> float | None:
             return values.number(place[name]) if place[name] in values else default
 
-        period, breaks, told = _time_base(values, place, layout, lambda: channel("time"), average)
+        period, breaks, more_notices = _time_base(values, place, options, lambda: channel("time"), average)
         size = values.size(place["voltage"])
-        others = [c for c in units if c not in CHANNELS and (c in layout.columns or values.size(place[c]) == size)]
+        others = [c for c in units if c not in CHANNELS and (c in options.columns or values.size(place[c]) == size)]
         named = place["phase"] in values or _NUMBERED.match(file.name)
         records, notices = split_at_gaps(
             {name: channel(name) for name in ("voltage", "displacement", *others)},
@@ -127,28 +127,28 @@ def _phase(file: Path, layout: ReadOptions, average: int, end: float) -> tuple[l
             phase=values.text(place["phase"], _NUMBERED.sub("", file.stem)),
             start_time=number("start_time", end),
             continues=bool(number("continues", 0.0)),
-            truncated=bool(number("truncated", 0.0)) or layout.truncates(part),
+            truncated=bool(number("truncated", 0.0)) or options.truncates(part),
             initial_voltage=number("initial_voltage", None),
         )
-    notices += [*told, *inference_notice(guess, units)]
-    if layout.average is None and average > 1:
+    notices += [*more_notices, *inference_notice(inferred, units)]
+    if options.average is None and average > 1:
         notices.append(averaged_notice(average, period, records[0].phase))
-    if named and layout.phases is None:
+    if named and options.phases is None:
         return records, notices
-    records, told = labelled(records, layout.phases)
-    return records, [*notices, *told]
+    records, more_notices = labelled(records, options.phases)
+    return records, [*notices, *more_notices]
 
 
 def _time_base(
-    values: NpzMembers, place: dict[str, str], layout: ReadOptions, times: Callable[[], Samples], average: int
+    values: NpzMembers, place: dict[str, str], options: ReadOptions, times: Callable[[], Samples], average: int
 ) -> tuple[float, dict[int, int], list[Notice]]:
     """Sample period [s] from wherever the file tells it; missing samples, where it holds times; what to tell."""
-    if layout.sample_period is not None:
+    if options.sample_period is not None:
         if place["time"] in values and values.size(place["time"]) > average:
-            TimeColumn.of(times()).require(layout.sample_period * average)
-        return layout.sample_period * average, {}, []
-    if place["sample_period"] in values or "sample_period" in layout.columns:
-        period = layout.in_si("sample_period", np.array(values.number(place["sample_period"])))
+            TimeColumn.of(times()).require(options.sample_period * average)
+        return options.sample_period * average, {}, []
+    if place["sample_period"] in values or "sample_period" in options.columns:
+        period = options.in_si("sample_period", np.array(values.number(place["sample_period"])))
         return float(period) * average, {}, []
     if place["time"] in values:
         base = TimeColumn.of(times())

@@ -62,13 +62,13 @@ class NpzMembers:
             self._check(name, dtype, shape)
             if len(shape) != 1:
                 raise RecordingError(f"{name}: got shape {shape}, expected one dimension")
-            intake = DecimatingBuffer(1, part.start, min(part.stop, shape[0]), average)
-            for first in range(0, intake.stop or 0, PIECE):
+            buffer = DecimatingBuffer(1, part.start, min(part.stop, shape[0]), average)
+            for first in range(0, buffer.stop or 0, PIECE):
                 raw = stream.read(min(PIECE, shape[0] - first) * dtype.itemsize)
-                intake.add(np.frombuffer(raw, dtype).astype(np.float64)[:, None])
-        if intake.rows < (intake.stop or 0):
-            raise RecordingError(f"{name}: got {intake.rows} samples, expected {shape[0]}")
-        return intake.column(0)
+                buffer.add(np.frombuffer(raw, dtype).astype(np.float64)[:, None])
+        if buffer.rows < (buffer.stop or 0):
+            raise RecordingError(f"{name}: got {buffer.rows} samples, expected {shape[0]}")
+        return buffer.column(0)
 
     def number(self, name: str) -> float:
         """The only number of an array."""

@@ -74,10 +74,10 @@ class TdmsVariables(Variables):
             return np.array(list(self._increments))
         return np.asarray(self._channels[name][:])
 
-    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
+    def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         channel = self._channels[name]
         self.check_column(name, (len(channel),), column)
-        buffer = DecimatingBuffer.of(1, layout)
+        buffer = DecimatingBuffer.of(1, options)
         for first in range(0, len(channel), PIECE):
             values = np.asarray(channel[first : first + PIECE])
             if values.dtype.kind not in "fiub":

@@ -21,7 +21,7 @@ _PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
 
 
 def variable_records(
-    variables: Variables, prefix: str, layout: ReadOptions, before: Sequence[Record] = ()
+    variables: Variables, prefix: str, options: ReadOptions, before: Sequence[Record] = ()
 ) -> tuple[list[Record], list[Notice]]:
     """Records of what a file holds under names.
 
@@ -31,7 +31,7 @@ def variable_records(
         Name to array.
     prefix : str
         Beginning of the names of one record, e.g. ``"phase_01."``; empty for all.
-    layout : ReadOptions
+    options : ReadOptions
         Its `columns` go before the names.
     before : sequence of Record
         Records that come before.
@@ -42,44 +42,44 @@ def variable_records(
         If voltage or displacement is not found, or they form no record.
     """
     fields = [name.removeprefix(prefix) for name in variables if name.startswith(prefix)]
-    others = [name for name in (*fields, *layout.columns) if is_channel(name)]
-    given = {c: str(layout.columns.get(c, prefix + c)) for c in (*CHANNELS, *others, *LABELS)}
-    places = {c: place for c, place in given.items() if c in layout.columns or place in variables}
+    others = [name for name in (*fields, *options.columns) if is_channel(name)]
+    given = {c: str(options.columns.get(c, prefix + c)) for c in (*CHANNELS, *others, *LABELS)}
+    places = {c: place for c, place in given.items() if c in options.columns or place in variables}
     labels = {name: _label(variables[places[name]], places[name]) for name in LABELS if name in places}
-    if layout.sample_period is None and "sample_period" not in places and (found := inferred_period(variables)):
+    if options.sample_period is None and "sample_period" not in places and (found := inferred_period(variables)):
         value = float(_label(variables[found[0]], found[0]))
         labels["sample_period"] = repr(1.0 / value if found[1] else value)
-    timed = layout.sample_period is not None or "sample_period" in labels
+    timed = options.sample_period is not None or "sample_period" in labels
     names = [name for name in variables if name not in places.values()]
     wanted = [c for c in ("time", "voltage", "displacement") if c not in places and not (c == "time" and timed)]
-    guess = {c: names[at] for c, at in inferred_columns([n.rpartition(".")[2] for n in names], (), wanted).items()}
-    places |= guess
+    inferred = {c: names[at] for c, at in inferred_columns([n.rpartition(".")[2] for n in names], (), wanted).items()}
+    places |= inferred
     for channel in ("voltage", "displacement"):
         if channel not in places:
             raise RecordingError(f"got {_listed(variables)}, expected {given[channel]}; name it by `columns`")
     units = {c: unit_in(place, c) for c, place in places.items() if is_channel(c)}
-    intakes = {c: _channel(variables, places[c], layout) for c in units}
-    columns = {c: layout.in_si(c, intake.column(0), units[c]) for c, intake in intakes.items()}
-    needed = {*CHANNELS, *layout.columns}
+    buffers = {c: _channel(variables, places[c], options) for c in units}
+    columns = {c: options.in_si(c, buffer.column(0), units[c]) for c, buffer in buffers.items()}
+    needed = {*CHANNELS, *options.columns}
     columns = {c: v for c, v in columns.items() if c in needed or v.size == columns["voltage"].size}
     sizes = {name: values.size for name, values in columns.items()}
     if len(set(sizes.values())) > 1:
         raise RecordingError(f"got channels of {sizes} samples, expected equal lengths")
-    average = intakes["voltage"].factor
-    rest = layout.after_reading(average)
-    records, notices = table_records(columns, [(0, labels)], rest, before, truncated=layout.passes_over)
-    if layout.average is None and average > 1:
+    average = buffers["voltage"].factor
+    rest = options.after_reading(average)
+    records, notices = table_records(columns, [(0, labels)], rest, before, truncated=options.passes_over)
+    if options.average is None and average > 1:
         notices.append(averaged_notice(average, records[0].sample_period, labels.get("phase", "")))
-    return records, [*notices, *inference_notice(guess, units)]
+    return records, [*notices, *inference_notice(inferred, units)]
 
 
-def _channel(variables: Variables, place: str, layout: ReadOptions) -> DecimatingBuffer:
+def _channel(variables: Variables, place: str, options: ReadOptions) -> DecimatingBuffer:
     match = _PLACE.fullmatch(place)
     name, number = (match["name"], match["column"]) if match else (place, None)
     if name not in variables:
         raise RecordingError(f"got {_listed(variables)}, expected {place}")
     column = None if number is None else int(number) - 1
-    return variables.samples(name, column, layout)
+    return variables.samples(name, column, options)
 
 
 def _label(value: NDArray[Any], place: str) -> str:

@@ -37,7 +37,7 @@ class Variables(Mapping[str, NDArray[Any]]):
         """Let go of the file, and of what was read of it."""
 
     @abstractmethod
-    def samples(self, name: str, column: int | None, layout: ReadOptions) -> DecimatingBuffer:
+    def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         """The one column of a vector, or a column of a matrix, as a layout keeps it.
 
         Parameters
@@ -46,7 +46,7 @@ class Variables(Mapping[str, NDArray[Any]]):
             Dotted name.
         column : int or None
             Column in MATLAB, counted from 0.
-        layout : ReadOptions
+        options : ReadOptions
             Its `rows`, where they count from the beginning, and its `average` apply.
 
         Raises

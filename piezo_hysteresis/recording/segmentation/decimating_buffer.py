@@ -93,8 +93,8 @@ class DecimatingBuffer:
 
     Examples
     --------
-    >>> intake = DecimatingBuffer(1, start=1, stop=7, average=2)
-    >>> intake.add(np.arange(4.0)[:, None]), intake.add(np.arange(4.0, 9.0)[:, None]), intake.column(0).tolist()
+    >>> buffer = DecimatingBuffer(1, start=1, stop=7, average=2)
+    >>> buffer.add(np.arange(4.0)[:, None]), buffer.add(np.arange(4.0, 9.0)[:, None]), buffer.column(0).tolist()
     (None, None, [1.5, 3.5, 5.5])
     """
 
@@ -114,10 +114,10 @@ class DecimatingBuffer:
         self._rest = np.empty((0, self.width))
 
     @classmethod
-    def of(cls, width: int, layout: ReadOptions) -> DecimatingBuffer:
+    def of(cls, width: int, options: ReadOptions) -> DecimatingBuffer:
         """For columns of which a layout keeps a part."""
-        start, stop = layout.from_the_beginning
-        return cls(width, start, stop, layout.average)
+        start, stop = options.from_the_beginning
+        return cls(width, start, stop, options.average)
 
     @property
     def is_full(self) -> bool:

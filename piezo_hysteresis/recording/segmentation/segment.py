@@ -59,6 +59,6 @@ class Segment:
 
 
 def _averaged(values: Samples, average: int) -> Samples:
-    intake = DecimatingBuffer(1, average=average)
-    intake.add_column(values)
-    return intake.column(0)
+    buffer = DecimatingBuffer(1, average=average)
+    buffer.add_column(values)
+    return buffer.column(0)

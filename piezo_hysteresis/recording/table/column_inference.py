@@ -89,5 +89,5 @@ def inference_notice(found: Mapping[str, str], units: Mapping[str, str | None]) 
     """What was inferred_columns: channel to title, and the unit that the title names."""
     if not found:
         return ()
-    told = ", ".join(f"{c} = '{title}'{f' in {units[c]}' if units.get(c) else ''}" for c, title in found.items())
-    return (Notice("columns", f"columns taken by their titles: {told}; name others by `columns`"),)
+    message = ", ".join(f"{c} = '{title}'{f' in {units[c]}' if units.get(c) else ''}" for c, title in found.items())
+    return (Notice("columns", f"columns taken by their titles: {message}; name others by `columns`"),)

@@ -51,7 +51,7 @@ class Places:
     notices: tuple[Notice, ...]
 
 
-def resolve(titles: Sequence[str], width: int, layout: ReadOptions) -> Places:
+def resolve(titles: Sequence[str], width: int, options: ReadOptions) -> Places:
     """Find every channel and label of a table.
 
     Parameters
@@ -60,7 +60,7 @@ def resolve(titles: Sequence[str], width: int, layout: ReadOptions) -> Places:
         Column titles; empty where there are none.
     width : int
         Number of columns.
-    layout : ReadOptions
+    options : ReadOptions
         Its `columns` go before the titles.
 
     Raises
@@ -73,7 +73,7 @@ def resolve(titles: Sequence[str], width: int, layout: ReadOptions) -> Places:
     for at, (name, unit) in enumerate(parsed):
         if (name in CHANNELS or name in LABELS or _is_further(titles[at], name)) and name not in places:
             places[name] = (at, unit)
-    for channel, column in layout.columns.items():
+    for channel, column in options.columns.items():
         if isinstance(column, int):
             at = column - 1
         else:
@@ -83,7 +83,7 @@ def resolve(titles: Sequence[str], width: int, layout: ReadOptions) -> Places:
             raise RecordingError(f"`columns`: got {column!r} for {channel}, expected {_listed(titles, width)}")
         places[channel] = (at, unit_in(titles[at], channel) if titles else None)
     open_ = [c for c in ("time", "voltage", "displacement") if c not in places]
-    if "time" in open_ and layout.sample_period is not None:
+    if "time" in open_ and options.sample_period is not None:
         open_.remove("time")  # a guess is not worth a contradiction
     found = inferred_columns(titles, (at for at, _ in places.values()), open_)
     places |= {channel: (at, unit_in(titles[at], channel)) for channel, at in found.items()}
@@ -110,7 +110,7 @@ def _listed(titles: Sequence[str], width: int) -> str:
 def table_records(
     columns: Mapping[str, Samples],
     marks: Sequence[Mark],
-    layout: ReadOptions,
+    options: ReadOptions,
     before: Sequence[Record] = (),
     *,
     truncated: bool = False,
@@ -123,7 +123,7 @@ def table_records(
         Channels in SI units, `time` among them where the table has it.
     marks : sequence of Mark
         Where records begin, and their labels; empty for a table in one piece without any.
-    layout : ReadOptions
+    options : ReadOptions
         Its `rows`, `phases`, `sample_period` apply; its `average` has been applied.
     before : sequence of Record
         Records of tables that come before.
@@ -141,42 +141,42 @@ def table_records(
     RecordingError, RecordError
         If there is no sample period, or no sample.
     """
-    part = layout.part(min(values.size for values in columns.values()))
+    part = options.part(min(values.size for values in columns.values()))
     columns = {name: values[part] for name, values in columns.items()}
     size = part.stop - part.start
     marks = marks or [(0, {})]
-    if layout.phases is not None or not any("phase" in labels for _, labels in marks):
-        records, notices = _stretch(columns, marks[0][1], layout, before)
-        if truncated or layout.truncates(part):
+    if options.phases is not None or not any("phase" in labels for _, labels in marks):
+        records, notices = _segment(columns, marks[0][1], options, before)
+        if truncated or options.truncates(part):
             records[0] = replace(records[0], truncated=True)
-        named, told = labelled(records, layout.phases)
-        return named, [*notices, *told]
+        named, more_notices = labelled(records, options.phases)
+        return named, [*notices, *more_notices]
     starts = [max(row - part.start, 0) for row, _ in marks]
     records, notices = [], []
     for (a, b), (_, labels) in zip(itertools.pairwise([*starts, size]), marks, strict=True):
         if a < min(b, size):
             piece = {name: values[a : min(b, size)] for name, values in columns.items()}
-            parts, told = _stretch(piece, labels, layout, [*before, *records[-1:]])
+            parts, more_notices = _segment(piece, labels, options, [*before, *records[-1:]])
             records += parts
-            notices += told
-    if truncated or layout.truncates(part):
+            notices += more_notices
+    if truncated or options.truncates(part):
         records[0] = replace(records[0], truncated=True)
     return records, notices
 
 
-def _stretch(
-    columns: Mapping[str, Samples], labels: Mapping[str, str], layout: ReadOptions, before: Sequence[Record]
+def _segment(
+    columns: Mapping[str, Samples], labels: Mapping[str, str], options: ReadOptions, before: Sequence[Record]
 ) -> tuple[list[Record], list[Notice]]:
     phase = labels.get("phase") or "record"
     time = columns.get("time")
     labelled_period = _number(labels, "sample_period")
-    period = layout.sample_period or (labelled_period and labelled_period * (layout.average or 1))
+    period = options.sample_period or (labelled_period and labelled_period * (options.average or 1))
     notices: list[Notice] = []
     breaks: dict[int, int] = {}
     if time is not None and (time.size > 1 or period is None):
         base = TimeColumn.of(time)
-        if layout.sample_period is not None:
-            base.require(layout.sample_period)
+        if options.sample_period is not None:
+            base.require(options.sample_period)
         period = period or base.period
         breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
         notices = base.notices(phase)
@@ -187,7 +187,7 @@ def _stretch(
     if start is None:
         start = end if time is None else float(time[0])
     goes_on = abs(start - end) < 1.5 * period
-    parts, told = split_at_gaps(
+    parts, more_notices = split_at_gaps(
         {name: values for name, values in columns.items() if name != "time"},
         period,
         breaks,
@@ -197,7 +197,7 @@ def _stretch(
         truncated=_flag(labels, "truncated"),
         initial_voltage=_number(labels, "initial_voltage"),
     )
-    return parts, [*notices, *told]
+    return parts, [*notices, *more_notices]
 
 
 def _flag(labels: Mapping[str, str], name: str) -> bool:

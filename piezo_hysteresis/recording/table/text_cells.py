@@ -127,7 +127,7 @@ def decoded(block: bytes) -> str:
 
 
 def read_cells(
-    path: Path, dialect: Dialect, numbers: Mapping[str, int], words: Mapping[str, int], layout: ReadOptions
+    path: Path, dialect: Dialect, numbers: Mapping[str, int], words: Mapping[str, int], options: ReadOptions
 ) -> Cells:
     """Read columns of a text file.
 
@@ -139,7 +139,7 @@ def read_cells(
         How it is written.
     numbers, words : mapping of str to int
         Name of every column to read to its position, counted from 0.
-    layout : ReadOptions
+    options : ReadOptions
         Its `rows`, where they count from the beginning, and its `average` apply before anything is kept.
 
     Raises
@@ -147,28 +147,28 @@ def read_cells(
     RecordingError
         On a line that is longer than a block, or more samples than can be kept.
     """
-    intake = DecimatingBuffer.of(len(numbers), layout)
+    buffer = DecimatingBuffer.of(len(numbers), options)
     marks: list[tuple[int, dict[str, str]]] = []
     bad = 0
     for lines in _line_blocks(path, dialect.skipped):
-        first, behind = intake.rows, intake.rows + len(lines)
-        if behind > intake.start:
+        first, behind = buffer.rows, buffer.rows + len(lines)
+        if behind > buffer.start:
             values, wrong = _parsed(lines, dialect, list(numbers.values()))
             bad += wrong
         else:
             values = np.empty((len(lines), len(numbers)))  # passed over
-        intake.add(values)
-        if words and behind > intake.start:
+        buffer.add(values)
+        if words and behind > buffer.start:
             cells = _labels(lines, dialect, list(words.values()))
             changes = np.flatnonzero((cells[1:] != cells[:-1]).any(axis=1)) + 1
             for row in (0, *changes.tolist()):
                 labels = dict(zip(words, map(str, cells[row]), strict=True))
                 if not marks or marks[-1][1] != labels:
                     marks.append((first + row, labels))
-        if intake.is_full:
+        if buffer.is_full:
             break
-    columns = {name: intake.column(at) for at, name in enumerate(numbers)}
-    return Cells(columns, [(intake.kept_row(row), labels) for row, labels in marks], bad, intake.factor)
+    columns = {name: buffer.column(at) for at, name in enumerate(numbers)}
+    return Cells(columns, [(buffer.kept_row(row), labels) for row, labels in marks], bad, buffer.factor)
 
 
 def _line_blocks(path: Path, skipped: int) -> Iterator[list[str]]:

@@ -108,9 +108,9 @@ class TimeColumn:
 
     def notices(self, phase: str = "") -> list[Notice]:
         """What a reader of the data should know about their times."""
-        told = []
+        message = []
         if self.jitter > JITTER:
-            told.append(
+            message.append(
                 Notice(
                     "time_base",
                     f"steps of the time base scatter by {100 * self.jitter:.1f} % of the sample period "
@@ -120,7 +120,11 @@ class TimeColumn:
                 )
             )
         if missing := int(self.lost.sum()):
-            told.append(Notice("gap", f"{missing} samples are missing in {int((self.lost > 0).sum())} places", phase))
+            message.append(
+                Notice("gap", f"{missing} samples are missing in {int((self.lost > 0).sum())} places", phase)
+            )
         if back := int((self.lost == 0).sum()):
-            told.append(Notice("non_monotonic", f"the time does not increase at {back} places", phase, severe=back > 1))
-        return told
+            message.append(
+                Notice("non_monotonic", f"the time does not increase at {back} places", phase, severe=back > 1)
+            )
+        return message
