@@ -119,6 +119,8 @@ class NonlinearPart:
         elif isinstance(block, CreepExponentialBlock):
             steps = np.array([pole.step for pole in block.poles]).reshape(-1, 3)
             banks.append((0.0, 1.0 - steps[:, 0], steps[:, 1], block.c))
+        else:
+            raise ModelError(f"{type(block).__name__}: has no inverse, expected one of those that compensation knows")
 
     def _bracket(self) -> None:
         """Where roots are sought: between the turning points of the static curve, inside the limits."""

@@ -1,0 +1,227 @@
+"""How well a stage follows a path that it is driven along through the inverse of its model.
+
+The simulated stages of the package are independent of the models. Each is identified and diagnosed from a recording
+with 0.05 % of noise; then the same paths are driven with every method. The stage is at rest at 0 V before each path. The
+score is the rms error on the path in % of its range, read without noise through the 16-bit converters; learning measures
+with the noise.
+
+    python -m benchmarks.compensation --stages published creeping
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.compensation_recording import recorded
+from benchmarks.compensation_rivals import best_feedback, hysteresis_alone, linear_gain, multiplicative
+from benchmarks.compensation_speed import blocks as block_latency
+from benchmarks.compensation_speed import speed
+from benchmarks.figures import Cell, Figures, alone
+from benchmarks.naming_experiments import PackagedPlant, rich
+from piezo_hysteresis.compensation import IterativeLearning, Limits, Plan, learn, plan
+from piezo_hysteresis.discrepancy import diagnose
+from piezo_hysteresis.stage.plant import PlantParameters
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+PERIOD = 2e-5
+"""Sample period [s]."""
+LIMITS = Limits(0.0, 10.0)
+"""Of the drive."""
+LOW, HIGH = 0.12, 0.82
+"""Ends of the paths, as shares of the stroke at 10 V: 70 % of it."""
+STAGES = {
+    "published": PlantParameters(),
+    "creeping": PlantParameters().with_values({"creep.gamma": 0.0143}),
+    "plays, creeping": PlantParameters.from_mapping(
+        {"hysteresis.operator": "prandtl_ishlinskii", "creep.gamma": 0.0143}
+    ),
+    "resonance": PlantParameters().with_values(
+        {
+            "structure.resonance_share": 0.1,
+            "structure.resonance_frequency": 1200.0,
+            "structure.resonance_damping": 0.01,
+        }
+    ),
+}
+"""Stage to its physics: the paper's; with hidden creep; Prandtl-Ishlinskii with hidden creep; a mode at 1.2 kHz."""
+PATHS = (
+    ("sine", 1.0),
+    ("sine", 10.0),
+    ("sine", 50.0),
+    ("sine", 100.0),
+    ("sine", 200.0),
+    ("sine", 400.0),
+    ("triangle", 10.0),
+    ("triangle", 50.0),
+    ("triangle", 100.0),
+)
+FEEDBACK_FROM = 50.0
+"""Lowest frequency at which feedback is simulated, sample by sample [Hz]."""
+
+
+@dataclass(frozen=True)
+class Promise:
+    """Largest errors of the diagnosed model before, and after learning, in % of range."""
+
+    sines: float = 0.05
+    fast_sine: float = 0.1
+    triangles: float = 0.1
+    learned: float | None = None
+
+    def of(self, shape: str, frequency: float) -> float:
+        """Before learning."""
+        return self.triangles if shape == "triangle" else self.sines if frequency <= 100.0 else self.fast_sine
+
+
+PROMISED = {
+    "published": Promise(),
+    "creeping": Promise(),
+    "plays, creeping": Promise(0.7, 0.7, 0.7, 0.06),
+}
+
+
+def path(shape: str, frequency: float, stroke: float) -> np.ndarray:
+    """A path [m]: a third of a second, at least two and a half periods, from the middle of the range."""
+    count = round(max(2.5, min(10.0, 0.3 * frequency)) / frequency / PERIOD)
+    phase = np.arange(count) * PERIOD * frequency
+    if shape == "sine":
+        wave = 0.5 + 0.5 * np.sin(2.0 * np.pi * phase)
+    else:
+        wave = 0.5 + 0.5 * (1.0 - np.abs(4.0 * ((phase + 0.25) % 1.0) - 2.0))
+    return stroke * (LOW + (HIGH - LOW) * wave)
+
+
+class Bench:
+    """A stage, its models, and what is measured on it.
+
+    Parameters
+    ----------
+    parameters : PlantParameters
+        Physics.
+    seed : int
+        Of experiment and noise.
+    """
+
+    def __init__(self, parameters: PlantParameters, seed: int) -> None:
+        self.noisy = parameters
+        self.parameters = parameters.with_values({"sensor.noise": 0.0})
+        self.stroke = self._settled(10.0) - self._settled(0.0)
+        self.seed = seed
+        self.diagnosis = diagnose(rich(PackagedPlant(parameters, seed), seed))
+
+    def _settled(self, voltage: float) -> float:
+        return float(self.play(np.full(3000, voltage))[-1])
+
+    def play(self, voltage: np.ndarray, seed: int | None = None) -> np.ndarray:
+        """Displacement from rest at 0 V [m]; with the noise of the sensor where a seed is given."""
+        stage = SimulatedStage(self.parameters if seed is None else self.noisy, seed=seed or 0)
+        return stage.play(np.clip(voltage, 0.0, 10.0), initial_voltage=0.0).displacement
+
+    def percent(self, found: Plan, voltage: np.ndarray) -> float:
+        """Error on the path [% of its range]."""
+        off = self.play(voltage)[found.begin : found.begin + found.wanted.size] - found.wanted
+        return 100.0 * float(np.sqrt(np.mean(off**2))) / found.range
+
+
+def wanted_with_way(found: Plan) -> np.ndarray:
+    """The path with its way from rest and the time of the preview, as every method gets it."""
+    begin = found.begin
+    way = found.wanted[0] * (0.5 - 0.5 * np.cos(np.pi * np.arange(begin) / begin))
+    return np.concatenate((way, found.wanted))
+
+
+def rows_of(bench: Bench, with_feedback: bool) -> list[tuple[Cell, ...]]:
+    """Every path on one stage."""
+    base, extended = bench.diagnosis.baseline, bench.diagnosis.model
+    rows: list[tuple[Cell, ...]] = []
+    for shape, frequency in PATHS:
+        wanted = path(shape, frequency, bench.stroke)
+        found = plan(extended, wanted, LIMITS)
+        led = wanted_with_way(found)
+
+        def simple(voltage: np.ndarray, found: Plan = found) -> float:
+            return bench.percent(found, voltage)
+
+        rivals = [simple(linear_gain(led, bench.stroke, 10.0)), simple(hysteresis_alone(extended, led, LIMITS))]
+        rivals.append(simple(multiplicative(base, led, LIMITS)) if "bouc_wen" in base else float("nan"))
+        closed: float | None = None
+        if with_feedback and frequency >= FEEDBACK_FROM:
+            rms, _ = best_feedback(bench.parameters, led, found.begin, 10.0 / bench.stroke, LIMITS)
+            closed = 100.0 * rms / found.range
+        identified = plan(base, wanted, LIMITS)
+        noise = bench.noisy.sensor.noise * bench.noisy.full_stroke
+        learning = IterativeLearning(extended, found, LIMITS, noise=noise)
+        learn(learning, lambda u: bench.play(u, seed=17 + bench.seed), rounds=2)
+        rows.append(
+            (
+                f"{shape} {frequency:g} Hz",
+                *rivals,
+                closed,
+                bench.percent(identified, identified.voltage),
+                bench.percent(found, found.voltage),
+                100.0 * found.expected.total / found.range,
+                _learned(bench, learning),
+            )
+        )
+    return rows
+
+
+def _learned(bench: Bench, learning: IterativeLearning) -> float:
+    """Error of the last drive that was played [% of range]."""
+    last = learning.rounds[-1].plan
+    off = bench.play(last.voltage)[last.begin : last.begin + learning.wanted.size] - learning.wanted
+    return 100.0 * float(np.sqrt(np.mean(off**2)) / np.ptp(learning.wanted))
+
+
+COLUMNS = (
+    "path",
+    "linear gain",
+    "hysteresis inverse alone",
+    "multiplicative inverse",
+    "PI feedback, best gains",
+    "identified model",
+    "diagnosed model",
+    "expected with it",
+    "after two rounds",
+)
+
+
+def tracking(name: str, seed: int, with_feedback: bool) -> Figures:
+    """The table of one stage."""
+    bench = Bench(STAGES[name], seed)
+    rows = rows_of(bench, with_feedback)
+    failures = []
+    promise = PROMISED.get(name)
+    for row, (shape, frequency) in zip(rows, PATHS, strict=True):
+        if promise is None:
+            break
+        limit = promise.of(shape, frequency)
+        if not row[6] <= limit:  # type: ignore[operator]
+            failures.append(f"{row[0]}: {row[6]:.3f} %, promised {limit:g} %")
+        if promise.learned is not None and not row[8] <= promise.learned:  # type: ignore[operator]
+            failures.append(f"{row[0]} after two rounds: {row[8]:.3f} %, promised {promise.learned:g} %")
+    added = ", ".join(e.name for e in bench.diagnosis.model.effects)
+    title = f"Stage '{name}': rms error in % of the range of the path; diagnosed chain: {added}"
+    return Figures(title, COLUMNS, rows, tuple(failures))
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    parser.add_argument("--stages", nargs="+", choices=STAGES, default=list(STAGES))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--no-feedback", action="store_true", help="leave out the search for the gains of a PI")
+    parser.add_argument("--data", default=None, help="folder of measured data (default: PIEZO_DATA or ../shared/data)")
+    parser.add_argument("--samples", type=int, default=200_000, help="of the speed test")
+
+
+def run(options: argparse.Namespace) -> list[Figures]:
+    """A table for every stage, the measured record, and speed."""
+    tables = [tracking(name, options.seed, not options.no_feedback) for name in options.stages]
+    return [*tables, recorded(options.data), speed(options.samples), block_latency()]
+
+
+if __name__ == "__main__":
+    alone(__name__)

@@ -1,0 +1,119 @@
+"""Other ways to drive a stage along a path, for the benchmark of compensation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from piezo_hysteresis.blocks.kernel import kernel
+from piezo_hysteresis.compensation import Inverse, Limits
+from piezo_hysteresis.effects import Arx, BoucWen, ChainPosition
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.stage.plant import PlantParameters
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+
+def linear_gain(wanted: np.ndarray, stroke: float, voltage: float) -> np.ndarray:
+    """Voltage in proportion to the displacement, by the stroke [m] that `voltage` gives."""
+    return np.clip(wanted * voltage / stroke, 0.0, voltage)
+
+
+def hysteresis_alone(model: Model, wanted: np.ndarray, limits: Limits) -> np.ndarray:
+    """Inverse of hysteresis and creep behind a stage without dynamics: the gain of the model at dc, and no delay."""
+    chain = model.at(model.sample_period)
+    kept = [e for e in model.effects if e.place is not ChainPosition.DYNAMICS and e.host != Arx.name]
+    gain = 1.0
+    for label, block in zip(chain.labels, chain.blocks, strict=True):
+        if label in {e.name for e in model.effects if e.place is ChainPosition.DYNAMICS}:
+            gain *= block.static_slopes(0.0)[0]
+    static = replace(model, effects=(*kept, Arx(b=[gain], delay=1.0)))
+    inverse = Inverse(static, limits)
+    u, _ = inverse.command(wanted, inverse.rest(0.0))
+    return u[inverse.preview :]
+
+
+@kernel
+def run_multiplicative(w, a, beta, gamma, p1, p2, low, high, v):
+    """v_i = (w_i − h_(i−1) − p1 v_(i−1)³)/p2 with the explicit loop of the paper, Eq. (7); v (n,) is filled."""
+    h, last = 0.0, 0.0
+    for i in range(w.size):
+        x = min(max((w[i] - h - p1 * last * last * last) / p2, low), high)
+        dv = x - last
+        h += a * dv - beta * abs(dv) * h - gamma * dv * abs(h)
+        last = x
+        v[i] = x
+
+
+def multiplicative(model: Model, wanted: np.ndarray, limits: Limits) -> np.ndarray:
+    """The inverse multiplicative structure of Rakotondrabe 2011: the last state of the loop is taken off, no inversion."""
+    loop, scale = model["bouc_wen"], model.voltage_scale
+    arx = model["arx"]
+    assert isinstance(arx, Arx) and isinstance(loop, BoucWen)
+    numbers = [loop[n] for n in ("A", "beta", "gamma", "p1", "p2")]
+    v = np.empty_like(wanted)
+    w = wanted / (arx.dc_gain * model.displacement_scale)
+    run_multiplicative(w, *numbers, limits.voltage_min / scale, limits.voltage_max / scale, v)
+    return scale * v
+
+
+def feedback(
+    parameters: PlantParameters,
+    wanted: np.ndarray,
+    gains: tuple[float, float],
+    voltage_per_metre: float,
+    limits: Limits,
+) -> np.ndarray:
+    """Displacement under a PI controller that runs once per sample, beside the linear gain as feedforward.
+
+    Parameters
+    ----------
+    parameters : PlantParameters
+        The stage.
+    wanted : (n,) ndarray
+        Path [m].
+    gains : (float, float)
+        Proportional and integral gain, in units of `voltage_per_metre` and per sample.
+    voltage_per_metre : float
+        Slope of the stage [V/m].
+    limits : Limits
+        Of the drive.
+    """
+    stage = SimulatedStage(parameters)
+    sum_, y, u = 0.0, np.empty_like(wanted), np.empty(1)
+    last = 0.0
+    for i in range(wanted.size):
+        error = (wanted[i] - last) * voltage_per_metre
+        rough = wanted[i] * voltage_per_metre + gains[0] * error + sum_
+        u[0] = min(max(rough, limits.voltage_min), limits.voltage_max)
+        if u[0] == rough:  # no wind-up
+            sum_ += gains[1] * error
+        last = float(stage.exchange(u).displacement[0])
+        y[i] = last
+    return y
+
+
+def best_feedback(
+    parameters: PlantParameters, wanted: np.ndarray, begin: int, voltage_per_metre: float, limits: Limits
+) -> tuple[float, tuple[float, float]]:
+    """Smallest rms error behind sample `begin` [m] over a grid of gains, refined once, and the gains."""
+    tried: dict[tuple[float, float], float] = {}
+
+    def rms(gains: tuple[float, float]) -> float:
+        if gains not in tried:
+            y = feedback(parameters, wanted, gains, voltage_per_metre, limits)
+            tried[gains] = float(np.sqrt(np.mean((y - wanted)[begin:] ** 2)))
+        return tried[gains]
+
+    for p in (0.0, 0.3, 1.0):
+        for i in (0.01, 0.03, 0.1, 0.2):
+            rms((p, i))
+    best = min(tried, key=lambda gains: tried[gains])
+    for factor in (0.6, 0.8, 1.25, 1.6):
+        rms((best[0], best[1] * factor))
+    best = min(tried, key=lambda gains: tried[gains])
+    for p in (best[0] - 0.15, best[0] + 0.15):
+        if p >= 0.0:
+            rms((p, best[1]))
+    best = min(tried, key=lambda gains: tried[gains])
+    return tried[best], best
