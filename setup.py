@@ -49,6 +49,7 @@ setup(
             f"driver_node = {NAME}.nodes.start:driver_node",
             f"model_node = {NAME}.nodes.start:model_node",
             f"identification_node = {NAME}.nodes.start:identification_node",
+            f"compensation_node = {NAME}.nodes.start:compensation_node",
             f"piezo = {NAME}.cli.main:main",
         ]
     },

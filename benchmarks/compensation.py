@@ -1,9 +1,9 @@
 """How well a stage follows a path that it is driven along through the inverse of its model.
 
 The simulated stages of the package are independent of the models. Each is identified and diagnosed from a recording
-with 0.05 % of noise; then the same paths are driven with every method. The stage is at rest at 0 V before each path. The
-score is the rms error on the path in % of its range, read without noise through the 16-bit converters; learning measures
-with the noise.
+with 0.05 % of noise; then the same paths are driven with every method. The stage is at rest at 0 V before each path.
+The score is the rms error on the path in % of its range, read without noise through the 16-bit converters; learning
+measures with the noise. The first and the last 3 ms of a path, where it starts and stops with a kink, are not scored.
 
     python -m benchmarks.compensation --stages published creeping
 """
@@ -23,6 +23,7 @@ from benchmarks.figures import Cell, Figures, alone
 from benchmarks.naming_experiments import PackagedPlant, rich
 from piezo_hysteresis.compensation import IterativeLearning, Limits, Plan, learn, plan
 from piezo_hysteresis.discrepancy import diagnose
+from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
@@ -58,7 +59,9 @@ PATHS = (
     ("triangle", 50.0),
     ("triangle", 100.0),
 )
-FEEDBACK_FROM = 50.0
+EDGE = round(3e-3 / PERIOD)
+"""Samples at both ends of a path that are not scored."""
+FEEDBACK_FROM = 100.0
 """Lowest frequency at which feedback is simulated, sample by sample [Hz]."""
 
 
@@ -110,10 +113,18 @@ class Bench:
         self.parameters = parameters.with_values({"sensor.noise": 0.0})
         self.stroke = self._settled(10.0) - self._settled(0.0)
         self.seed = seed
+        self._free_run: float | None = None
         self.diagnosis = diagnose(rich(PackagedPlant(parameters, seed), seed))
 
     def _settled(self, voltage: float) -> float:
         return float(self.play(np.full(3000, voltage))[-1])
+
+    def free_run_percent(self, span: float) -> float:
+        """Error of the diagnosed model in free run on noise-free records of another seed [% of `span`]."""
+        if self._free_run is None:
+            held_out = rich(PackagedPlant(self.parameters, self.seed + 1), self.seed + 1)
+            self._free_run = errors(self.diagnosis.model, held_out).rms
+        return 100.0 * self._free_run / span
 
     def play(self, voltage: np.ndarray, seed: int | None = None) -> np.ndarray:
         """Displacement from rest at 0 V [m]; with the noise of the sensor where a seed is given."""
@@ -122,8 +133,13 @@ class Bench:
 
     def percent(self, found: Plan, voltage: np.ndarray) -> float:
         """Error on the path [% of its range]."""
-        off = self.play(voltage)[found.begin : found.begin + found.wanted.size] - found.wanted
-        return 100.0 * float(np.sqrt(np.mean(off**2))) / found.range
+        return score(self.play(voltage)[found.begin : found.begin + found.wanted.size], found.wanted)
+
+
+def score(reached: np.ndarray, wanted: np.ndarray) -> float:
+    """Rms error on a path [% of its range]."""
+    off = (reached - wanted)[EDGE:-EDGE]
+    return 100.0 * float(np.sqrt(np.mean(off**2)) / np.ptp(wanted))
 
 
 def wanted_with_way(found: Plan) -> np.ndarray:
@@ -149,7 +165,8 @@ def rows_of(bench: Bench, with_feedback: bool) -> list[tuple[Cell, ...]]:
         rivals.append(simple(multiplicative(base, led, LIMITS)) if "bouc_wen" in base else float("nan"))
         closed: float | None = None
         if with_feedback and frequency >= FEEDBACK_FROM:
-            rms, _ = best_feedback(bench.parameters, led, found.begin, 10.0 / bench.stroke, LIMITS)
+            part = slice(found.begin + EDGE, led.size - EDGE)
+            rms, _ = best_feedback(bench.parameters, led, part, 10.0 / bench.stroke, LIMITS)
             closed = 100.0 * rms / found.range
         identified = plan(base, wanted, LIMITS)
         noise = bench.noisy.sensor.noise * bench.noisy.full_stroke
@@ -162,7 +179,7 @@ def rows_of(bench: Bench, with_feedback: bool) -> list[tuple[Cell, ...]]:
                 closed,
                 bench.percent(identified, identified.voltage),
                 bench.percent(found, found.voltage),
-                100.0 * found.expected.total / found.range,
+                float(np.hypot(score(found.path_predicted, wanted), bench.free_run_percent(found.range))),
                 _learned(bench, learning),
             )
         )
@@ -172,8 +189,7 @@ def rows_of(bench: Bench, with_feedback: bool) -> list[tuple[Cell, ...]]:
 def _learned(bench: Bench, learning: IterativeLearning) -> float:
     """Error of the last drive that was played [% of range]."""
     last = learning.rounds[-1].plan
-    off = bench.play(last.voltage)[last.begin : last.begin + learning.wanted.size] - learning.wanted
-    return 100.0 * float(np.sqrt(np.mean(off**2)) / np.ptp(learning.wanted))
+    return score(bench.play(last.voltage)[last.begin : last.begin + learning.wanted.size], learning.wanted)
 
 
 COLUMNS = (

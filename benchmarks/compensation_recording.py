@@ -1,8 +1,8 @@
 """A measured piezo that was driven through another inverse: what ours would have commanded, and the error it predicts.
 
-The record Test of picma-p885 holds, in rows 11152 to 12151, a path that was driven through the authors' inverse. Our model
-is identified from the record Model, runs over Test up to that row, and is turned round from the state it is then in. No
-stage is at hand: the error of ours is a prediction, that of theirs a measurement.
+The record Test of picma-p885 holds, in rows 11152 to 12151, a path that was driven through the authors' inverse. Our
+model is identified from the record Model, runs over Test up to that row, and is turned round from the state it is then
+in. No stage is at hand: the error of ours is a prediction, that of theirs a measurement.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ def recorded(folder: str | None) -> Figures:
     test = read(place, "Test_Vi_Do_Di.dat")
     wanted = 1e-6 * np.loadtxt(file, usecols=DESIRED)[DRIVEN]
     voltage, measured = test.voltage, test.displacement
+    wanted += np.mean(measured[DRIVEN] - wanted)  # the path is written about zero, the sensor reads from its own
     before, state = model.run(voltage[: DRIVEN.start], model.rest(0.0))
     # what the sensor reads beyond the model, by the thousand rows before
     beyond = float(np.mean(measured[DRIVEN.start - 1000 : DRIVEN.start] - before[-1000:]))

@@ -46,7 +46,7 @@ def run_multiplicative(w, a, beta, gamma, p1, p2, low, high, v):
 
 
 def multiplicative(model: Model, wanted: np.ndarray, limits: Limits) -> np.ndarray:
-    """The inverse multiplicative structure of Rakotondrabe 2011: the last state of the loop is taken off, no inversion."""
+    """The multiplicative structure of Rakotondrabe 2011: the last state of the loop is taken off, no inversion."""
     loop, scale = model["bouc_wen"], model.voltage_scale
     arx = model["arx"]
     assert isinstance(arx, Arx) and isinstance(loop, BoucWen)
@@ -94,15 +94,15 @@ def feedback(
 
 
 def best_feedback(
-    parameters: PlantParameters, wanted: np.ndarray, begin: int, voltage_per_metre: float, limits: Limits
+    parameters: PlantParameters, wanted: np.ndarray, part: slice, voltage_per_metre: float, limits: Limits
 ) -> tuple[float, tuple[float, float]]:
-    """Smallest rms error behind sample `begin` [m] over a grid of gains, refined once, and the gains."""
+    """Smallest rms error over `part` of the path [m] over a grid of gains, refined once, and the gains."""
     tried: dict[tuple[float, float], float] = {}
 
     def rms(gains: tuple[float, float]) -> float:
         if gains not in tried:
             y = feedback(parameters, wanted, gains, voltage_per_metre, limits)
-            tried[gains] = float(np.sqrt(np.mean((y - wanted)[begin:] ** 2)))
+            tried[gains] = float(np.sqrt(np.mean((y - wanted)[part] ** 2)))
         return tried[gains]
 
     for p in (0.0, 0.3, 1.0):

@@ -21,6 +21,7 @@ import topics
 from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
 from piezo_hysteresis.acquisition.settings import DRIVER, IN_FORCE
 from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
+from piezo_hysteresis.nodes.compensation.compensation_node import COMPENSATION
 from piezo_hysteresis.nodes.identification.identification_node import IDENTIFICATION
 from piezo_hysteresis.nodes.model.model_node import MODEL
 from piezo_hysteresis.parameter import Parameter, Row, Setting
@@ -143,6 +144,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "in_force": lambda: settings(replace(row, name=f"in_force.{row.name}") for row in IN_FORCE),
     "model_node": lambda: settings(MODEL),
     "identification_node": lambda: settings(IDENTIFICATION),
+    "compensation_node": lambda: settings(COMPENSATION),
     "topics": lambda: table("topic | type | unit | QoS | rate | by", topics.rows()),
     "services": lambda: from_ros("Services"),
     "plant": lambda: settings(PlantParameters.table()),

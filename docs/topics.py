@@ -10,7 +10,7 @@ from piezo_hysteresis.nodes.topics import ALL, ANYONE, TOPICS, Topic
 
 POLICY = Path(__file__).parents[1] / "config" / "sros2_policy.xml"
 """Access control for one axis."""
-NODES = ("driver", "model", "identification")
+NODES = ("driver", "model", "identification", "compensation")
 """Nodes of the package that publish at all times."""
 RECORDERS = ("identification", "operator")
 """Keys that may take every topic of an axis."""

@@ -1,4 +1,4 @@
-"""One axis: its driver, and the model node that predicts as soon as it has a model."""
+"""One axis: its driver, the model node that predicts as soon as it has a model, and compensation where asked."""
 
 from pathlib import Path
 
@@ -22,6 +22,7 @@ ARGUMENTS = (
     ("stage", "", f"back end of the driver: {', '.join(BACK_ENDS)}; empty: as the parameter files say",
      ["", *BACK_ENDS]),
     ("autostart", "true", "configure and activate the driver at start", list(SWITCH)),
+    ("compensation", "false", "start the compensation node, too: it follows trajectories in metres", list(SWITCH)),
 )  # fmt: skip
 
 
@@ -52,7 +53,10 @@ def nodes(context: LaunchContext) -> list[Node]:
     model: dict[str, object] = {"model_file": value["model_file"]} if value["model_file"] else {}
     if switch("use_sim_time", value["use_sim_time"]):
         model["use_sim_time"] = True
-    return [
+    started = [
         node("driver_node", "driver.yaml", autostart=switch("autostart", value["autostart"]), **stage),
         node("model_node", "model.yaml", **model),
     ]
+    if switch("compensation", value["compensation"]):
+        started.append(node("compensation_node", "compensation.yaml", model_file=value["model_file"]))
+    return started

@@ -22,8 +22,8 @@ def load(name):
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
-        ("stage", {"namespace", "params_file", "use_sim_time", "model_file", "stage", "autostart"}),
-        ("identify", {"namespace", "params_file", "use_sim_time", "model_file", "stage", "autostart"}),
+        ("stage", {"namespace", "params_file", "use_sim_time", "model_file", "stage", "autostart", "compensation"}),
+        ("identify", {"namespace", "params_file", "use_sim_time", "model_file", "stage", "autostart", "compensation"}),
         ("replay", {"bag", "axis", "rate", "namespace", "params_file", "use_sim_time", "model_file"}),
     ],
 )

@@ -32,8 +32,8 @@ class Band:
         If the frequencies contradict one another.
     """
 
-    passed: float = 1600.0
-    stopped: float = 4000.0
+    passed: float = 2000.0
+    stopped: float = 5000.0
     length: float = 4e-3
 
     def __post_init__(self) -> None:
@@ -42,9 +42,9 @@ class Band:
 
     @classmethod
     def of(cls, sample_period: float) -> Band:
-        """The usual band for a sample period [s]: 1.6 to 4 kHz at 50 kHz, the same shares at another rate."""
+        """The usual band for a sample period [s]: 2 to 5 kHz at 50 kHz, the same shares at another rate."""
         rate = 1.0 / sample_period
-        return cls(0.032 * rate, 0.08 * rate, 200.0 * sample_period)
+        return cls(0.04 * rate, 0.1 * rate, 200.0 * sample_period)
 
     def taps(self, sample_period: float) -> Array:
         """Symmetric impulse response with sum 1, shape (2 k + 1,)."""

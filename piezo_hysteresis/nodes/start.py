@@ -21,6 +21,11 @@ def identification_node() -> int:
     return _run("identification.identification_node")
 
 
+def compensation_node() -> int:
+    """Run a compensation node."""
+    return _run("compensation.compensation_node")
+
+
 def _run(module: str) -> int:
     try:
         return int(import_module(f".{module}", __package__).main())

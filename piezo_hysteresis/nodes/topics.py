@@ -82,25 +82,39 @@ TOPICS: dict[str, Topic] = {
     for topic in (
         Topic(
             "samples", PointCloud2, SAMPLES, "V, m, s", "one block per `block_duration` (10 ms)", "driver",
-            readers=("driver", "model"),
+            readers=("driver", "model", "compensation"),
         ),
-        Topic("voltage", Float64, COMMAND, "V", "`live_rate` (50 Hz)", "driver"),
+        Topic("voltage", Float64, COMMAND, "V", "`live_rate` (50 Hz)", "driver", readers=("compensation",)),
         Topic("displacement", Float64, COMMAND, "m", "`live_rate`", "driver"),
         Topic("live", JointState, COMMAND, "V, m", "`live_rate`", "driver"),
         Topic("phase", String, LATCHED, "", "at every change", "driver"),
-        Topic("command", PointCloud2, COMMAND, "V", "", ANYONE, senders=("identification",), readers=("driver",)),
-        Topic("set_voltage", Float64, COMMAND, "V", "", ANYONE, readers=("driver",)),
-        Topic("claim", KeyValue, COMMAND, "", "", ANYONE, senders=("identification",), readers=("driver",)),
-        Topic("claimed_by", String, LATCHED, "", "at every change", "driver", readers=("identification",)),
-        Topic("command_status", DiagnosticStatus, COMMAND_STATUS, "", "at every event", "driver"),
+        Topic(
+            "command", PointCloud2, COMMAND, "V", "", ANYONE, senders=("identification", "compensation"),
+            readers=("driver",),
+        ),
+        Topic("set_voltage", Float64, COMMAND, "V", "", ANYONE, senders=("compensation",), readers=("driver",)),
+        Topic(
+            "claim", KeyValue, COMMAND, "", "", ANYONE, senders=("identification", "compensation"), readers=("driver",)
+        ),
+        Topic(
+            "claimed_by", String, LATCHED, "", "at every change", "driver", readers=("identification", "compensation")
+        ),
+        Topic(
+            "command_status", DiagnosticStatus, COMMAND_STATUS, "", "at every event", "driver",
+            readers=("compensation",),
+        ),
         Topic("predicted_samples", PointCloud2, SAMPLES, "m, s", "as `samples`", "model"),
         Topic("prediction", Float64, COMMAND, "m", "`live_rate`", "model"),
         Topic("residual", Float64, COMMAND, "m", "`live_rate`", "model"),
         Topic("residual_rms", Float64, COMMAND, "m", "`live_rate`", "model"),
         Topic("predicted_live", JointState, COMMAND, "V, m", "`live_rate`", "model"),
         Topic("change", DiagnosticStatus, COMMAND, "", "1 Hz, and at every alarm", "model"),
-        Topic("model", String, LATCHED, "", "at every new model", "identification", readers=("model",)),
-        Topic("status", DiagnosticStatus, STATUS, "", "at every step", "identification"),
+        Topic("model", String, LATCHED, "", "at every new model", "identification", readers=("model", "compensation")),
+        Topic("status", DiagnosticStatus, STATUS, "", "at every step", "identification", senders=("compensation",)),
+        Topic("trajectory", PointCloud2, COMMAND, "m, s", "", ANYONE, readers=("compensation",)),
+        Topic("set_displacement", Float64, COMMAND, "m", "", ANYONE, readers=("compensation",)),
+        Topic("tracking_error", Float64, COMMAND, "m", "50 Hz while a trajectory plays", "compensation"),
+        Topic("tracking_rms", Float64, COMMAND, "m", "50 Hz while a trajectory plays", "compensation"),
         Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL),
     )
 }  # fmt: skip

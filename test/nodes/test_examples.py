@@ -6,6 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.runtime.qos import LATCHED
 
 pytestmark = pytest.mark.nodes
 
@@ -45,3 +49,19 @@ def test_a_refused_waveform_is_told(lab):
     assert done.returncode == 1
     assert "my_sine: refused, " in done.stdout
     assert "expected 0 to 4 V" in done.stdout
+
+
+def test_a_scan_is_sent(lab):
+    lab.driver(namespace=NAMESPACE, real_time_factor=2.0)
+    statuses = lab.listen(DiagnosticStatus, f"{NAMESPACE}/status", LATCHED)
+    model = Path(__file__).parents[2] / "config" / "published_stage.yaml"
+    lab.start("compensation_node", namespace=NAMESPACE, model_file=str(model))
+    lab.streaming(f"{NAMESPACE}/samples")
+    lab.pause(3.0)  # the node looks for the driver twice a second
+    done = run(lab, "send_scan.py")
+    assert done.returncode == 0, done.stderr
+
+    def told():
+        return any(values_of(s)["state"] == "done" for s in list(statuses) if values_of(s)["phase"] == "my_scan")
+
+    lab.wait(told, f"the scan to be done, not {statuses[-1:]}")

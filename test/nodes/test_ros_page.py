@@ -8,14 +8,19 @@ from xml.etree import ElementTree
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
-from piezo_hysteresis.nodes.topics import TOPICS
+from piezo_hysteresis.nodes.topics import ANYONE, TOPICS
 
 pytestmark = pytest.mark.nodes
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "ros.md").read_text()
 POLICY = ROOT / "config" / "sros2_policy.xml"
-NODES = {"driver": "driver_node", "model": "model_node", "identification": "identification_node"}
+NODES = {
+    "driver": "driver_node",
+    "model": "model_node",
+    "identification": "identification_node",
+    "compensation": "compensation_node",
+}
 ALL_NODES = (*NODES.values(), "driver_node_stop")
 OF_ROS = {"/rosout", "/parameter_events", "/clock"}
 
@@ -32,12 +37,17 @@ def rows(heading):
 
 @pytest.fixture(scope="module")
 def nodes(shared_lab):
-    """The three nodes, all found."""
+    """The nodes of an axis, all found."""
     shared_lab.driver()
-    for executable in ("model_node", "identification_node"):
+    for executable in ("model_node", "identification_node", "compensation_node"):
         shared_lab.start(executable)
     there = shared_lab.node.get_node_names
-    last = {"driver_node": "/samples", "model_node": "/predicted_live", "identification_node": "/model"}
+    last = {
+        "driver_node": "/samples",
+        "model_node": "/predicted_live",
+        "identification_node": "/model",
+        "compensation_node": "/set_voltage",
+    }
     try:
         shared_lab.wait(lambda: set(ALL_NODES) <= set(there()), "all nodes")
         for node, topic in last.items():
@@ -65,7 +75,9 @@ def test_every_topic_is_published_as_documented(nodes):
     for name, (kind, _, _, _, by) in rows("Topics"):
         for node in NODES if by == "all" else [by] if by in NODES else []:
             documented[node]["/" + name.lstrip("/")] = kind
-    documented["identification"] |= {"/command": "sensor_msgs/PointCloud2", "/claim": "diagnostic_msgs/KeyValue"}
+    for topic in TOPICS.values():
+        for node in topic.senders:
+            documented[node]["/" + topic.name] = topic.type_name.replace("/msg/", "/")
     for node, topics in documented.items():
         assert published(nodes, NODES[node]) == topics, node
 
@@ -74,17 +86,24 @@ def test_quality_of_service_is_as_documented(nodes):
     for name, (_, _, quality, _, by) in rows("Topics"):
         if by not in NODES:
             continue
-        (info,) = nodes.node.get_publishers_info_by_topic("/" + name)
-        profile = info.qos_profile
-        assert (profile.reliability == ReliabilityPolicy.RELIABLE) == quality.startswith("reliable"), name
-        assert (profile.durability == DurabilityPolicy.TRANSIENT_LOCAL) == ("transient local" in quality), name
+        for info in nodes.node.get_publishers_info_by_topic("/" + name):
+            profile = info.qos_profile
+            assert (profile.reliability == ReliabilityPolicy.RELIABLE) == quality.startswith("reliable"), name
+            assert (profile.durability == DurabilityPolicy.TRANSIENT_LOCAL) == ("transient local" in quality), name
 
 
-def test_what_anyone_may_publish_is_subscribed_by_the_driver(nodes):
-    listened = dict(nodes.node.get_subscriber_names_and_types_by_node("driver_node", "/"))
-    open_to_all = {f"/{name}": cells[0] for name, cells in rows("Topics") if cells[-1] == "anyone"}
-    real = {n: kinds[0].replace("/msg/", "/") for n, kinds in listened.items() if n not in OF_ROS}
-    assert real == open_to_all
+def test_what_anyone_may_publish_is_subscribed_by_the_one_who_acts_on_it(nodes):
+    for node in ("driver", "compensation"):
+        listened = dict(nodes.node.get_subscriber_names_and_types_by_node(NODES[node], "/"))
+        open_to_all = {
+            f"/{topic.name}": topic.type_name.replace("/msg/", "/")
+            for topic in TOPICS.values()
+            if topic.by == ANYONE and node in topic.readers
+        }
+        assert open_to_all
+        assert open_to_all.items() <= {n: kinds[0].replace("/msg/", "/") for n, kinds in listened.items()}.items()
+    heard = {name for node in NODES for name, topic in TOPICS.items() if topic.by == ANYONE and node in topic.readers}
+    assert heard == {name for name, cells in rows("Topics") if cells[-1] == "anyone"}
 
 
 def test_every_service_is_served_as_documented(nodes):
@@ -131,7 +150,7 @@ def test_the_security_policy_allows_what_a_node_uses_and_nothing_more(nodes, nod
 
 def test_no_comment_of_the_policy_stands_where_sros2_looks_for_enclaves():
     whole = ElementTree.parse(POLICY, ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True)))
-    assert [e.tag for e in whole.getroot().find("enclaves")] == ["enclave"] * 5
+    assert [e.tag for e in whole.getroot().find("enclaves")] == ["enclave"] * 6
 
 
 def test_the_policy_has_a_key_for_who_drives_and_one_for_who_looks():

@@ -1,0 +1,20 @@
+"""Send the stage along a scan [m] from any lab software: `python send_scan.py --ros-args -r __ns:=/stage_x`."""
+
+import array
+
+import numpy as np
+import rclpy
+from rclpy.duration import Duration
+from sensor_msgs.msg import PointCloud2, PointField
+
+wanted = 10e-6 + 5e-6 * np.sin(2 * np.pi * 10.0 * 20e-6 * np.arange(50_000))  # m: 10 Hz for 1 s at the driver's 20 µs
+rclpy.init()
+node = rclpy.create_node("send_scan")
+publisher = node.create_publisher(PointCloud2, "trajectory", 10)
+while not publisher.get_subscription_count():  # until the compensation node is found
+    rclpy.spin_once(node, timeout_sec=0.1)
+scan = PointCloud2(height=1, width=wanted.size, point_step=8, row_step=8 * wanted.size, is_dense=True)
+scan.fields = [PointField(name="displacement", offset=0, datatype=PointField.FLOAT64, count=1)]
+scan.data, scan.header.frame_id = array.array("B", wanted.tobytes()), "my_scan"
+publisher.publish(scan)
+publisher.wait_for_all_acked(Duration(seconds=5.0))

@@ -1,0 +1,152 @@
+"""`PathRuns`: the jobs of the compensation node: plan and play a path, and play it again with corrections."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from ...compensation import IterativeLearning, Limits, Plan, plan
+from ...errors import StageError
+from ...identification.protocol.protocol import ProtocolPhase
+from ..identification.driver_client import DriverClient
+from .applied_state import AppliedState
+from .status import CompensationStatus
+from .tracking import Tracking
+from .trajectory import described, why_not
+
+TICK = 0.02
+"""Period at which a job goes on [s]."""
+_STARTED_WITHIN = 20.0
+"""Longest wait for the driver to begin with a waveform, or for its last samples [s]."""
+
+Job = Generator[None]
+
+
+class PathRuns:
+    """Jobs that go on by one step at every tick of the node.
+
+    Parameters
+    ----------
+    driver : DriverClient
+        Plays the drive.
+    status : CompensationStatus
+        Where every step is told.
+    values : mapping of str to object
+        Parameters of the node.
+    applied : callable
+        Gives the state of the model after what was applied.
+
+    Attributes
+    ----------
+    tracking : Tracking or None
+        Of what is played.
+    last : (str, Plan) or None
+        Name and plan of the last trajectory.
+    """
+
+    def __init__(
+        self,
+        driver: DriverClient,
+        status: CompensationStatus,
+        values: Mapping[str, Any],
+        applied: Callable[[], AppliedState],
+    ) -> None:
+        self._driver, self._status, self._values, self._applied = driver, status, values, applied
+        self._pool = ThreadPoolExecutor(1, "plan")
+        self.tracking: Tracking | None = None
+        self.last: tuple[str, Plan] | None = None
+
+    def close(self) -> None:
+        """Let no plan begin any more."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def planned(self, wanted: np.ndarray, limits: Limits) -> Plan:
+        """Plan of a path (n,) [m] from where the stage is."""
+        applied = self._applied()
+        return plan(
+            applied.model,
+            wanted,
+            limits,
+            start=applied.state,
+            approach=self._values["approach"],
+            approximate=self._values["approximate"],
+        )
+
+    def _in_thread(self, future: Future[Any]) -> Generator[None, None, Any]:
+        while not future.done():
+            yield
+        return future.result()
+
+    def follow(self, name: str, wanted: np.ndarray, limits: Limits) -> Job:
+        """Plan a path and, where it can be had, play it."""
+        self._status.show("planning", f"{wanted.size} samples", name)
+        found: Plan = yield from self._in_thread(self._pool.submit(self.planned, wanted, limits))
+        self.last = (name, found)
+        if not found.reachability.is_whole:
+            self._status.refuse(name, why_not(found))
+            return
+        if not self._values["play"]:
+            self._status.show("planned", described(found), name, expected=found.expected.total)
+            return
+        tracking = yield from self._play(name, found)
+        self._told(name, tracking)
+
+    def _told(self, name: str, tracking: Tracking) -> None:
+        rms, expected = tracking.rms or 0.0, tracking.plan.expected.total
+        reason = f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm"
+        self._status.show("done", reason, name, rms=rms, expected=expected)
+
+    def _play(self, name: str, found: Plan) -> Generator[None, None, Tracking]:
+        """Send a drive to the driver and collect what the stage does.
+
+        Raises
+        ------
+        StageError
+            If the driver refuses or stops it, or samples do not come.
+        """
+        tracking = self.tracking = Tracking(found)
+        self._status.show("playing", described(found), name, expected=found.expected.total)
+        self._driver.send(ProtocolPhase(name, found.voltage, found.sample_period))
+        waited = 0.0
+        while not tracking.is_whole:
+            state = self._driver.state
+            if state in ("refused", "stopped"):
+                raise StageError(f"the driver {state} it: {self._driver.reason}")
+            if tracking.first is None and state in ("playing", "done"):
+                tracking.begin(self._driver.first_index)
+            waited = 0.0 if state == "playing" else waited + TICK
+            if waited > _STARTED_WITHIN:
+                raise StageError(f"the driver is '{state}' and sends no samples for {_STARTED_WITHIN:g} s")
+            yield
+        return tracking
+
+    def rounds(self, name: str, first: Plan, limits: Limits) -> Job:
+        """Play the last trajectory again, and correct it by what is measured."""
+        applied = self._applied()
+        learning = IterativeLearning(
+            applied.model,
+            first,
+            limits,
+            noise=self._values["sensor_noise"],
+            approximate=self._values["approximate"],
+        )
+        # the stage is no longer where the first plan began
+        again: Plan = yield from self._in_thread(self._pool.submit(self.planned, first.wanted, limits))
+        learning.next = again if again.reachability.is_whole else None
+        for number in range(1 + self._values["learning_rounds"]):
+            if learning.next is None:
+                break
+            tracking = yield from self._play(f"{name}_{number}", learning.next)
+            yield from self._in_thread(self._pool.submit(learning.update, tracking.measured, applied.state))
+        if not learning.rounds:
+            raise StageError("the trajectory can no longer be had from where the stage is")
+        best, last = learning.best, learning.rounds[-1]
+        self.last = (name, best.plan)
+        reason = ", ".join(f"{1e9 * r.rms:.1f}" for r in learning.rounds)
+        reason = f"{reason} nm rms in {len(learning.rounds)} rounds" + (
+            f"; {learning.reason}" if learning.reason else ""
+        )
+        self._status.show("done", reason, name, rms=last.rms, expected=last.expected, best=best.rms)

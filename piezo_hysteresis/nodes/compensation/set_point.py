@@ -1,0 +1,65 @@
+"""`SetPoint`: one displacement that is held, with a slow integral of what the sensor says where that was asked for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from std_msgs.msg import Float64
+
+from ...compensation import Limits
+from ..runtime.sending import send
+
+_INTERVAL = 0.1
+"""Time between two corrections [s]: the driver ramps to each of them."""
+
+
+class SetPoint:
+    """Voltage for a displacement that is held.
+
+    The integral is slow on purpose: a fast loop belongs into the controller of the stage. It does not go on where the
+    voltage is at a limit.
+
+    Parameters
+    ----------
+    publisher : rclpy.publisher.Publisher
+        Of `set_voltage`.
+    integral_time : float
+        Time in which a constant error is corrected by itself once [s]; 0 switches the integral off.
+    """
+
+    def __init__(self, publisher: Any, integral_time: float) -> None:
+        self._publisher, self._integral_time = publisher, integral_time
+        self._target: float | None = None
+        self._voltage = self._slope = self._waited = 0.0
+        self._limits = Limits()
+        self._sum, self._count = 0.0, 0
+
+    def go(self, target: float, voltage: float, way: tuple[float, float], limits: Limits) -> None:
+        """Hold a displacement [m] by a voltage [V]; `way` is the change of both on the way there."""
+        self._target, self._voltage, self._limits = target, voltage, limits
+        if abs(way[1]) > 1e-9 and way[0] / way[1] > 0.0:
+            self._slope = way[0] / way[1]
+        self._waited, self._sum, self._count = 0.0, 0.0, 0
+        send(self._publisher, Float64(data=voltage))
+
+    def leave(self) -> None:
+        """Something else drives the stage from now on."""
+        self._target = None
+
+    def measured(self, mean: float, count: int) -> None:
+        """Take in the mean displacement of so many samples [m]."""
+        if self._target is not None:
+            self._sum, self._count = self._sum + mean * count, self._count + count
+
+    def tick(self, elapsed: float) -> None:
+        """Let `elapsed` seconds pass."""
+        self._waited += elapsed
+        if self._target is None or not self._integral_time or self._waited < _INTERVAL or not self._count:
+            return
+        error = self._target - self._sum / self._count
+        change = self._slope * error * self._waited / self._integral_time
+        self._waited, self._sum, self._count = 0.0, 0.0, 0
+        wanted = self._voltage + change
+        self._voltage = float(np.clip(wanted, self._limits.voltage_min, self._limits.voltage_max))
+        send(self._publisher, Float64(data=self._voltage))

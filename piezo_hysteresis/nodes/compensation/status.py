@@ -1,0 +1,57 @@
+"""`CompensationStatus`: what the compensation node does, on `status` at every change and on /diagnostics."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.clock import Clock, ClockType
+
+from ..messages.conversions import diagnostic
+from ..runtime.guarded_node import GuardedNode
+from ..runtime.sending import send
+from ..topics import DIAGNOSTICS, advertise
+
+
+class CompensationStatus:
+    """Publishes state and reason, and the errors expected and reached.
+
+    Parameters
+    ----------
+    node : GuardedNode
+        The compensation node; its full name stands before every status.
+    """
+
+    def __init__(self, node: GuardedNode) -> None:
+        self._node = node
+        self._name = f"{node.get_fully_qualified_name().lstrip('/')}: compensation"
+        self._publisher = advertise(node, "status")
+        self._diagnostics = advertise(node, DIAGNOSTICS)
+        self.refused = 0
+        self._shown = DiagnosticStatus()
+        self.show("idle", "waiting for a model and a trajectory")
+        node.create_timer(1.0, self._repeat, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def show(
+        self, state: str, reason: str, phase: str = "", level: bytes = DiagnosticStatus.OK, **errors: float
+    ) -> None:
+        """Publish a state; errors in metres."""
+        texts = {name: f"{error:.6g}" for name, error in errors.items()}
+        status = diagnostic(level, self._name, reason, "", state=state, phase=phase, refused=self.refused, **texts)
+        if status != self._shown:
+            self._shown = status
+            send(self._publisher, status)
+
+    def refuse(self, phase: str, reason: str) -> None:
+        """Tell that nothing moves, and why."""
+        self.refused += 1
+        self._node.get_logger().warning(f"refused '{phase}': {reason}", throttle_duration_sec=0.1)
+        self.show("refused", reason, phase, DiagnosticStatus.WARN)
+
+    def failed(self, phase: str, reason: str) -> None:
+        """Tell what went wrong after something had moved."""
+        self._node.get_logger().error(f"'{phase}': {reason}")
+        self.show("failed", reason, phase, DiagnosticStatus.ERROR)
+
+    def _repeat(self) -> None:
+        array = DiagnosticArray(status=[self._shown])
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        send(self._diagnostics, array)

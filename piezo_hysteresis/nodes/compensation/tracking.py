@@ -1,0 +1,79 @@
+"""`Tracking`: what the stage does while it follows a path, sample by sample beside what was wanted."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...acquisition.sample_block import SampleBlock
+from ...compensation import Plan
+
+Array = NDArray[np.float64]
+
+
+class Tracking:
+    """Collects the samples of one drive.
+
+    Parameters
+    ----------
+    plan : Plan
+        What is played.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.first: int | None = None
+        """Index of the first sample of the drive, once the driver has told it."""
+        self._measured = np.full(plan.voltage.size, np.nan)
+        self._early: list[SampleBlock] = []
+
+    def begin(self, first: int) -> None:
+        """The drive begins at this index; blocks that came before the driver told so are taken in."""
+        self.first = first
+        early, self._early = self._early, []
+        for block in early:
+            self.take(block)
+
+    def take(self, block: SampleBlock) -> None:
+        """Take in a block of `samples`."""
+        if self.first is None:
+            self._early = [*self._early[-200:], block]
+            return
+        begin = (int(block.index[0]) - self.first + 2**31) % 2**32 - 2**31
+        a, b = max(begin, 0), min(begin + block.size, self._measured.size)
+        if b > a:
+            self._measured[a:b] = block.displacement[a - begin : b - begin]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the last sample of the drive has come in."""
+        return bool(np.isfinite(self._measured[-1]))
+
+    @property
+    def lost(self) -> int:
+        """Samples of the drive that did not come in."""
+        return int(np.isnan(self._measured).sum())
+
+    @property
+    def measured(self) -> Array:
+        """Displacement beside the drive [m], shape (m,); lost samples are those that the model predicts."""
+        return np.where(np.isnan(self._measured), self.plan.predicted, self._measured)
+
+    @property
+    def errors(self) -> Array:
+        """Wanted − measured of the samples of the path that have come in [m]."""
+        begin = self.plan.begin
+        off = self.plan.wanted - self._measured[begin : begin + self.plan.wanted.size]
+        return np.asarray(off[np.isfinite(off)])
+
+    @property
+    def newest_error(self) -> float | None:
+        """Of the newest sample of the path that has come in; None before the first."""
+        errors = self.errors
+        return float(errors[-1]) if errors.size else None
+
+    @property
+    def rms(self) -> float | None:
+        """Rms of the errors so far [m]; None before the first."""
+        errors = self.errors
+        return float(np.sqrt(np.mean(errors**2))) if errors.size else None

@@ -1,0 +1,61 @@
+"""Trajectories as messages: a cloud with the field `displacement`, and plans as text."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sensor_msgs.msg import PointCloud2
+
+from ...compensation import Plan
+from ...errors import RecordError
+from ..messages.cloud import from_cloud
+from ..messages.conversions import PERIOD_TOLERANCE
+
+Array = NDArray[np.float64]
+
+
+def trajectory_from_cloud(cloud: PointCloud2, sample_period: float, longest: float) -> Array:
+    """Wanted displacement [m] of a message of `trajectory`, shape (n,).
+
+    Raises
+    ------
+    RecordError
+        On a cloud without `displacement`, a `time` of another period, samples that are not finite, or too many of them.
+    """
+    arrays = from_cloud(cloud, {"displacement": "f8"}, {"time": "f8"})
+    wanted, time = arrays["displacement"], arrays.get("time")
+    if wanted.size == 0:
+        raise RecordError("trajectory: got no samples, expected at least one")
+    if wanted.size * sample_period > longest:
+        raise RecordError(
+            f"trajectory: got {wanted.size * sample_period:.6g} s, expected at most {longest:g} s (longest_trajectory)"
+        )
+    if time is not None and time.size > 1:
+        off = np.abs(time - time[0] - sample_period * np.arange(time.size))
+        if not off.max() <= PERIOD_TOLERANCE * sample_period:
+            got = float(time[-1] - time[0]) / (time.size - 1)
+            raise RecordError(f"trajectory: got a period of {got:g} s, expected {sample_period:g} s (the driver's)")
+    return np.array(wanted, dtype=np.float64)
+
+
+def described(plan: Plan) -> str:
+    """A plan in one line."""
+    expected = plan.expected
+    stated = "no free-run error stated" if expected.free_run is None else f"model {1e9 * expected.free_run:.1f} nm"
+    return (
+        f"{plan.voltage.size * plan.sample_period:.3g} s, {plan.voltage.min():.3g} to {plan.voltage.max():.3g} V, "
+        f"at most {plan.largest_slew:.3g} V/s, expected error {1e9 * expected.total:.1f} nm rms "
+        f"(plan {1e9 * expected.planned:.1f} nm, {stated}), "
+        + ("all of it can be had" if plan.reachability.is_whole else why_not(plan))
+    )
+
+
+def why_not(plan: Plan) -> str:
+    """Why a path is refused, and what could be had instead."""
+    part, nearest = plan.reachability.parts[0], plan.reachability.nearest
+    ways = []
+    if nearest is not None and nearest.offset is not None:
+        ways.append(f"moved by {1e6 * nearest.offset:+.4g} µm")
+    if nearest is not None and nearest.amplitude is not None:
+        ways.append(f"with {100.0 * nearest.amplitude:.4g} % of its amplitude")
+    return f"out of reach: {part}" + (f"; it can be had {' or '.join(ways)}" if ways else "")

@@ -1,0 +1,165 @@
+"""The compensation node and a real driver: the stage goes where it was sent, or nothing moves."""
+
+import signal
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
+
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import dumps, save
+from piezo_hysteresis.nodes.messages.cloud import to_cloud
+from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.runtime.qos import LATCHED
+from piezo_hysteresis.stage.plant import PlantParameters
+
+pytestmark = pytest.mark.nodes
+
+NODE = "compensation_node"
+PERIOD = 1e-4
+DRIVER = {"sample_period": PERIOD, "block_duration": 0.02, "simulated__seed": 1, "max_slew_rate": 5000.0}
+PLANT = PlantParameters()
+NOISE = PLANT.sensor.noise * PLANT.full_stroke
+STROKE = PLANT.full_stroke
+# at 10 kHz the dynamics of the stage of the paper are about one sample of delay
+MODEL = Model(
+    (BoucWen(), Arx(b=[0.9 * 0.24641, 0.1 * 0.24641], delay=1)), PERIOD, 10.0, 1e-4, {"free_run_error": "5e-08"}
+)
+
+
+class Compensation:
+    """A driver, a compensation node, and what it tells."""
+
+    def __init__(self, lab, known=MODEL, **parameters):
+        self.lab = lab
+        self.statuses = lab.listen(DiagnosticStatus, "status", LATCHED)
+        self.driver = lab.driver(**DRIVER, real_time_factor=1.0)
+        self.samples = lab.streaming()
+        model = save(known, lab.folder / "model.yaml")
+        self.process = lab.start(NODE, **{"model_file": str(model), "approach": 0.05, **parameters})
+        self.trajectory = lab.publisher(PointCloud2, "trajectory")
+        lab.wait(self._is_ready, "the node to find the driver")
+
+    def _is_ready(self):
+        self.send(np.full(3, np.nan), "ready")
+        self.lab.pause(0.3)
+        return self.statuses and "expected finite" in self.statuses[-1].message
+
+    def send(self, wanted, phase="scan", period=PERIOD):
+        wanted = np.asarray(wanted, dtype=np.float64)
+        columns = {"time": period * np.arange(wanted.size), "displacement": wanted}
+        stamp = self.lab.node.get_clock().now().to_msg()
+        self.trajectory.publish(to_cloud(columns, {"time": "f8", "displacement": "f8"}, stamp, phase))
+
+    def until(self, phase, *states):
+        """The status of a phase, once it is in one of the states."""
+
+        def reached():
+            found = [s for s in list(self.statuses) if values_of(s)["phase"] == phase]
+            return next((s for s in found if values_of(s)["state"] in states), None)
+
+        return self.lab.wait(reached, f"{phase} to be {' or '.join(states)}")
+
+    def ask(self, name):
+        return self.lab.call(Trigger, f"{NODE}/{name}")
+
+
+def scan(low=0.2, high=0.7, frequency=5.0, duration=0.6):
+    """Swings between shares of the stroke [m]."""
+    t = PERIOD * np.arange(round(duration / PERIOD))
+    return STROKE * (low + (high - low) * 0.5 * (1.0 - np.cos(2 * np.pi * frequency * t)))
+
+
+def test_the_stage_follows_a_trajectory_and_learning_makes_it_better(lab):
+    wrong = MODEL.with_values({"bouc_wen.p2": 1.05 * MODEL.values()["bouc_wen.p2"]})
+    node = Compensation(lab, wrong, sensor_noise=NOISE)
+    errors, rms = lab.listen(Float64, "tracking_error"), lab.listen(Float64, "tracking_rms")
+    wanted = scan()
+    node.send(wanted)
+    done = values_of(node.until("scan", "done"))
+    assert 0.005 * STROKE < float(done["rms"]) < 0.05 * STROKE, "5 % of slope are missing in the model"
+    lab.wait(lambda: rms, "tracking_rms")
+    assert errors and abs(errors[-1].data) < 0.1 * STROKE
+    assert abs(rms[-1].data / float(done["rms"]) - 1.0) < 0.5
+    answer = node.ask("plan")
+    assert answer.success and "expected error" in answer.message and "V/s" in answer.message
+    before = len(node.statuses)
+    assert node.ask("learn").success
+    learned = lab.wait(
+        lambda: next((s for s in node.statuses[before:] if values_of(s)["state"] == "done"), None), "learning to end"
+    )
+    assert float(values_of(learned)["best"]) < 0.2 * float(done["rms"])
+    assert float(values_of(learned)["best"]) < 3.0 * NOISE
+    assert node.samples.steepest(PERIOD) <= DRIVER["max_slew_rate"] * 1.001
+    assert node.samples.voltage.min() >= 0.0 and node.samples.voltage.max() <= 10.0
+
+
+def test_what_cannot_be_followed_is_refused_whole_and_nothing_moves(lab):
+    node = Compensation(lab, longest_trajectory=2.0)
+    first = node.samples.newest.voltage[-1]
+    for phase, wanted, period, reason in (
+        ("gap", np.append(scan(), np.nan), PERIOD, "expected finite"),
+        ("slow", scan(), 2 * PERIOD, "period"),
+        ("long", np.zeros(30_000), PERIOD, "longest_trajectory"),
+        ("high", scan(0.2, 1.6), PERIOD, "out of reach"),
+        ("low", scan(0.0, 0.7), PERIOD, "voltage_min"),
+    ):
+        node.send(wanted, phase, period)
+        assert reason in node.until(phase, "refused").message
+    lab.pause(0.2)
+    assert np.ptp(node.samples.voltage) < 1e-3 and node.samples.newest.voltage[-1] == first
+    assert not node.ask("plan").success, "the last one that was planned is out of reach"
+
+
+def test_a_displacement_is_set_and_a_slow_integral_removes_what_is_left(lab):
+    node = Compensation(lab, integral_time=0.3)
+    target = 0.4 * STROKE
+    publisher = lab.publisher(Float64, "set_displacement")
+    publisher.publish(Float64(data=target))
+    node.until("set_displacement", "set")
+
+    def settled():
+        block = node.samples.newest
+        return abs(float(np.mean(block.displacement)) - target) < 0.001 * STROKE
+
+    lab.wait(settled, "the displacement that was set")
+    publisher.publish(Float64(data=5.0 * STROKE))
+    assert "out of reach" in node.until("set_displacement", "refused").message
+
+
+def test_stop_takes_the_stage_to_its_safe_voltage(lab):
+    node = Compensation(lab)
+    node.send(scan(duration=5.0))
+    node.until("scan", "playing")
+    lab.wait(lambda: node.samples.newest.voltage[-1] > 1.0, "the scan to begin")
+    assert node.ask("stop").success
+    lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
+    node.until("scan", "stopped")
+
+
+def test_its_end_leaves_the_stage_safe(lab):
+    node = Compensation(lab)
+    node.send(scan(duration=5.0))
+    lab.wait(lambda: node.samples.newest.voltage[-1] > 1.0, "the scan to begin")
+    node.process.signal(signal.SIGTERM)
+    assert node.process.wait() == 0
+    lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
+
+
+def test_a_new_model_takes_effect_between_trajectories(lab):
+    node = Compensation(lab)
+    models = lab.publisher(String, "model", LATCHED)
+    node.send(scan(duration=1.0), "first")
+    node.until("first", "playing")
+    doubled = MODEL.with_values({"arx.b[0]": 2.0 * MODEL.values()["arx.b[0]"]})
+    models.publish(String(data=dumps(doubled)))
+    done = values_of(node.until("first", "done"))
+    assert float(done["rms"]) < 0.004 * STROKE, "linear gain would leave some per cent"
+    lab.pause(0.5)  # the new model takes over with the next block
+    node.send(scan(0.3, 0.5), "second")
+    second = values_of(node.until("second", "done"))
+    assert float(second["rms"]) > 0.02 * STROKE, "the model of twice the gain was followed"
