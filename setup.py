@@ -50,6 +50,7 @@ setup(
             f"model_node = {NAME}.nodes.start:model_node",
             f"identification_node = {NAME}.nodes.start:identification_node",
             f"compensation_node = {NAME}.nodes.start:compensation_node",
+            f"keeper = {NAME}.acquisition.safety.keeper:main",
             f"piezo = {NAME}.cli.main:main",
         ]
     },

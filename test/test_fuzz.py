@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from piezo_hysteresis.cli.plant_option import _read as read_plant
+from piezo_hysteresis.cli.options.plant_option import _read as read_plant
 from piezo_hysteresis.effects import CHAIN
 from piezo_hysteresis.errors import PiezoError
 from piezo_hysteresis.model.model import Model

@@ -59,7 +59,9 @@ def test_every_dependency_that_pip_brings_is_pinned():
     assert {name.lower() for name in re.findall(r'"([\w.-]+)"', wanted.group(1))} <= pinned
 
 
-@pytest.mark.parametrize("name", ["driver_node", "model_node", "identification_node", "compensation_node", "piezo"])
+@pytest.mark.parametrize(
+    "name", ["driver_node", "model_node", "identification_node", "compensation_node", "keeper", "piezo"]
+)
 def test_executables_name_a_function_that_exists(name):
     entry = re.search(rf"{name} = {{NAME}}\.([\w.]+):(\w+)", (ROOT / "setup.py").read_text())
     source = ROOT / "piezo_hysteresis" / (entry.group(1).replace(".", "/") + ".py")

@@ -29,18 +29,24 @@ class BackEnd:
         Makes the stage from the values of the rows and an `Opening`.
     is_device : bool
         True for hardware: locked by the name of the device, and never faster than real time.
+    has_keeper : bool
+        True where a second process can bring the device to its safe voltage.
+    keeper_ends_driver : bool
+        True where it can do that only once the silent driver has ended: the device is one process's alone.
     """
 
     rows: tuple[Row, ...]
     open: Callable[[Mapping[str, Any], Opening], Stage]
     is_device: bool
+    has_keeper: bool = False
+    keeper_ends_driver: bool = False
 
 
 BACK_ENDS: Mapping[str, BackEnd] = {
     "simulated": BackEnd(simulated.PARAMETERS, simulated.open, is_device=False),
     "replay": BackEnd(replay.PARAMETERS, replay.open, is_device=False),
-    "gcs2": BackEnd(gcs2.PARAMETERS, gcs2.open, is_device=True),
-    "nidaqmx": BackEnd(daqmx.PARAMETERS, daqmx.open, is_device=True),
+    "gcs2": BackEnd(gcs2.PARAMETERS, gcs2.open, is_device=True, has_keeper=True),
+    "nidaqmx": BackEnd(daqmx.PARAMETERS, daqmx.open, is_device=True, has_keeper=True, keeper_ends_driver=True),
 }
 """Every back end by its word."""
 

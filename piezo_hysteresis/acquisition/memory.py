@@ -33,8 +33,11 @@ class MemoryAcquisition(StreamingAcquisition):
         self._rest_period = rest_period
 
     def _run(self) -> None:
-        cast(MemoryStage, self.stage).watch(lambda: self.playback.is_stopping)
+        cast(MemoryStage, self.stage).watch(self._is_interrupted)
         super()._run()
+
+    def _is_interrupted(self) -> bool:
+        return self.playback.is_stopping or (self._keeper is not None and self._keeper.is_lost)
 
     def _step(self) -> None:
         playback = cast(Playback, self.playback)
@@ -78,7 +81,7 @@ class MemoryAcquisition(StreamingAcquisition):
             first = max(self._time_base.index_at(time.monotonic()), self.index)
             stage.start()
             end = self._time_base.due(first + count)
-            while (now := time.monotonic()) < end and not playback.is_stopping:
+            while (now := time.monotonic()) < end and not self._is_interrupted():
                 if not self._wait_until(min(end, now + self._poll)):
                     break
             if time.monotonic() < end:
@@ -90,7 +93,7 @@ class MemoryAcquisition(StreamingAcquisition):
             self._break_off(playback)
             return
         with self._access:
-            drive = None if playback.is_stopping else playback.take(count)
+            drive = None if self._is_interrupted() else playback.take(count)
         if drive is None:
             self._break_off(playback)
         else:
@@ -99,6 +102,8 @@ class MemoryAcquisition(StreamingAcquisition):
     def _break_off(self, playback: Playback) -> None:
         """The device goes to its safe voltage by itself; what it measured on the way is not known."""
         self.stage.safe()
+        if self._keeper is not None:
+            self._keeper.require()
         with self._access:
             playback.jump(self.stage.description.safe_voltage)
         self._look(playback)

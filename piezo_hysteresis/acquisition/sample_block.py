@@ -62,6 +62,11 @@ class SampleBlock:
         kept: dict[str, Any] = {name: values[count:] for name, values in self.columns.items()}
         return replace(self, **kept)
 
+    def between(self, first: int, end: int) -> SampleBlock:
+        """Samples `first` to `end`, that one left out; the first one follows a gap only where the block's does."""
+        kept: dict[str, Any] = {name: values[first:end] for name, values in self.columns.items()}
+        return replace(self, **kept, follows_gap=self.follows_gap and first == 0)
+
     @property
     def sample_period(self) -> float | None:
         """Time between samples [s]; None for a block of one."""

@@ -15,9 +15,10 @@ from .command_check import CommandCheck
 from .memory import MemoryAcquisition
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
+from .safety.keeper_link import KeeperLink
+from .safety.stop_latch import StopLatch
 from .settings import DriverSettings
 from .stage_lock import StageLock
-from .stop_latch import StopLatch
 from .streaming import Delivery, Source, StreamingAcquisition
 from .time_base import TimeBase
 
@@ -55,6 +56,7 @@ class DriverSession:
         self.settings, self._values = settings, values
         self.latch = StopLatch() if latch is None else latch
         self._lock = StageLock([place])
+        self._keeper: KeeperLink | None = None
         opening = Opening(settings.sample_period, settings.real_time_factor, **({"read": read} if read else {}))
         try:
             self.stage = open_stage(settings.stage, values, opening)
@@ -64,6 +66,7 @@ class DriverSession:
         try:
             self.limits = settings.limits(self.stage.description, self.stage.sample_period)
             self.stage.restrict(self.limits, settings.ramp_rate)
+            self._keeper = self._kept()
             if BACK_ENDS[settings.stage].is_device:
                 self._lock.add(f"device {self.limits.name}")
         except BaseException:
@@ -100,6 +103,7 @@ class DriverSession:
             fail,
             lambda: subscribers() >= wanted,
             self.latch,
+            self._keeper,
         )
         if self.limits.streaming:
             acquisition = StreamingAcquisition(*arguments)
@@ -122,6 +126,16 @@ class DriverSession:
             "ramp_rate": settings.ramp_rate,
             "stopped": self.latch.is_set,
         }
+
+    def _kept(self) -> KeeperLink | None:
+        """A keeper beside a device that can have one."""
+        settings = self.settings
+        if not (BACK_ENDS[settings.stage].has_keeper and settings.keeper_timeout):
+            return None
+        period = self.stage.sample_period
+        return KeeperLink(
+            settings.stage, self._values, period, self.limits, settings.ramp_rate, settings.keeper_timeout
+        )
 
     def _source(self, stage: Stage) -> Source:
         if isinstance(stage, ReplayStage):
@@ -155,4 +169,6 @@ class DriverSession:
         try:
             self.stage.close()
         finally:
+            if self._keeper is not None:
+                self._keeper.close()
             self._lock.release()

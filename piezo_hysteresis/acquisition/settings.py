@@ -39,6 +39,9 @@ DRIVER: tuple[Row, ...] = (
     Parameter("command_max_age", "T_c", "s", 2.0, 0.0, 1e6, "oldest command that is played", _SOURCE),
     Parameter("claim_timeout", "T_o", "s", 10.0, 0.5, 600.0, "an owner unheard for longer has lost its claim", _SOURCE),
     Parameter("real_time_factor", "κ", "1", 1.0, 0.01, 1000.0, "speed of a simulated stage; 1: real time", _SOURCE),
+    Parameter(
+        "keeper_timeout", "T_k", "s", 1.0, 0.0, 60.0, "silence after which a device is made safe; 0: no keeper", _SOURCE
+    ),
     Parameter("discovery_time", "T_d", "s", 0.5, 0.0, 30.0, "wait for another driver of the same topics", _SOURCE),
 )
 """Rows of the driver itself; those of the back ends follow under ``"<word>."``."""
@@ -73,6 +76,7 @@ class DriverSettings:
     command_max_age: float
     claim_timeout: float
     real_time_factor: float
+    keeper_timeout: float
     discovery_time: float
 
     @classmethod

@@ -17,8 +17,9 @@ from .drive import Drive, Event, Phase
 from .latency_buffer import LatencyBuffer
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
+from .safety.keeper_link import KeeperLink
+from .safety.stop_latch import StopLatch
 from .sample_block import SampleBlock
-from .stop_latch import StopLatch
 from .time_base import TimeBase, read_together
 
 Source = Playback | RecordedPlayback
@@ -79,6 +80,8 @@ class StreamingAcquisition:
         The first block waits until it is true.
     latch : StopLatch, optional
         Set by `stop`; nothing is played and no set-point taken while it is.
+    keeper : KeeperLink, optional
+        Of the stage; the thread ends with an error once it is lost.
     """
 
     patience = 0.5
@@ -95,6 +98,7 @@ class StreamingAcquisition:
         fail: Callable[[PiezoError], None],
         ready: Callable[[], bool] = lambda: True,
         latch: StopLatch | None = None,
+        keeper: KeeperLink | None = None,
     ) -> None:
         self.stage, self.playback, self.tally = stage, playback, Tally()
         self.block_size, self.index = block_size, 0
@@ -103,6 +107,7 @@ class StreamingAcquisition:
         self._late = LatencyBuffer(round(stage.description.latency / time_base.sample_period), playback.phase.number)
         self._device_clock = DeviceClock(time_base) if stage.description.latency else None
         self._latch = StopLatch() if latch is None else latch
+        self._keeper = keeper
         self._access = threading.Lock()
         self._halting = threading.Event()
         self._safe = threading.Event()
@@ -174,6 +179,8 @@ class StreamingAcquisition:
                     return
             self._time_base.anchor(0, *read_together(self._node_clock))
             while not self._halting.is_set():
+                if self._keeper is not None:
+                    self._keeper.require()
                 self._step()
                 if self.playback.is_safe and self._late.is_empty:
                     self._safe.set()

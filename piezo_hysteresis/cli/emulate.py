@@ -13,7 +13,7 @@ from ..emulators.gcs2.controller import Controller
 from ..emulators.gcs2.faults import FAULTS as GCS2_FAULTS
 from ..emulators.gcs2.server import Gcs2Server
 from ..stage.simulated import SimulatedStage
-from .plant_option import add_plant_arguments, plant
+from .options.plant_option import add_plant_arguments, plant
 from .terminal import console
 
 _PORT = {"gcs2": 50000, "nidaqmx": 31763}

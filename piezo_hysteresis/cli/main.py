@@ -15,6 +15,7 @@ from ..errors import IdentificationError, PiezoError, printable
 
 COMMANDS = {
     "simulate": "play a protocol to a simulated stage and record it",
+    "record": "play a protocol to a stage and record it, without ROS",
     "emulate": "emulate a controller behind a TCP port",
     "calibrate": "measure the delay of a card without a stage",
     "identify": "identify a model from an experiment",

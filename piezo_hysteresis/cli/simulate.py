@@ -11,7 +11,7 @@ from ..record import Experiment, Record
 from ..report.json_file import write_json
 from ..stage.simulated import SimulatedStage
 from .destination import require_new_experiment, require_new_file
-from .plant_option import add_plant_arguments, plant
+from .options.plant_option import add_plant_arguments, plant
 from .terminal import console, progress
 
 PROTOCOLS = {"paper": protocol.paper, "short": protocol.short, "rich": protocol.rich}

@@ -6,11 +6,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.wire import (
+    GAIN,
+    LSB,
+    PERIOD,
+    RAMP,
+    SAFE_WITHIN,
+    TOP,
+    WiredSession,
+    check_wire,
+    device,
+    settings,
+    values,
+)
 from piezo_hysteresis.acquisition.drive import EventKind
 from piezo_hysteresis.emulators.fault import Faults
 from piezo_hysteresis.errors import ParameterError, StageError
 
-from .wire import GAIN, LSB, PERIOD, RAMP, SAFE_WITHIN, TOP, WiredSession, check_wire, device, settings, values
+pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
 
 WORDS = ("simulated", "memory", "gcs2", "nidaqmx")
 

@@ -79,7 +79,8 @@ def test_the_name_that_a_controller_tells_forges_no_line(lab):
     """The answer to *IDN? is the name of the stage: in logs, diagnostics and parameters."""
     serial = "7\x1b]0;title\x07 [ERROR] forged\x9b2J"
     with Gcs2Server(Controller(SimulatedStage(seed=3, sample_period=PERIOD), serial=serial)) as server:
-        driven = Driven(lab, "gcs2", gcs2__host=server.host, gcs2__port=server.port, gcs2__amplifier_gain=GAIN)
+        address = {"gcs2__host": server.host, "gcs2__port": server.port, "gcs2__max_slew_rate": 1e6}
+        driven = Driven(lab, "gcs2", gcs2__amplifier_gain=GAIN, **address)
         assert "forged" in driven.in_force("stage")
         assert driven.in_force("stage").isprintable()
         lab.wait(lambda: any(s.hardware_id for report in list(driven.told) for s in report.status), "its name")

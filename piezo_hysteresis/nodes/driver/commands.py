@@ -7,8 +7,8 @@ from collections.abc import Callable
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64
 
+from ...acquisition.safety.stop_latch import StopLatch
 from ...acquisition.session import DriverSession
-from ...acquisition.stop_latch import StopLatch
 from ...errors import PiezoError, StageError, printable
 from ..messages.conversions import from_stamp, waveform_from_cloud
 from ..messages.phase_text import phase_and_owner

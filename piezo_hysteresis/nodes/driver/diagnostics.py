@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 
 from ...acquisition.claim import Claim
-from ...acquisition.stop_latch import StopLatch
+from ...acquisition.safety.stop_latch import StopLatch
 from ...acquisition.streaming import StreamingAcquisition
 from ..messages.conversions import diagnostic
 from ..runtime.guarded_node import GuardedNode

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
 
 import numpy as np
-import pytest
+import yaml
 
 from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
 from piezo_hysteresis.acquisition.session import DriverSession
@@ -15,6 +19,7 @@ from piezo_hysteresis.acquisition.settings import DRIVER, DriverSettings
 from piezo_hysteresis.emulators.gcs2.controller import Controller
 from piezo_hysteresis.emulators.gcs2.server import Gcs2Server
 from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.gcs2.connection import Connection
 from piezo_hysteresis.stage.simulated import SimulatedMemoryStage, SimulatedStage
 
 PERIOD = 1e-4
@@ -41,6 +46,13 @@ class WireStage(SimulatedStage):
             return run(voltage)
 
         self._plant.run = kept
+        self.observe = lambda: None
+
+    @property
+    def output(self) -> float:
+        """Voltage put out now [V]."""
+        self.observe()
+        return float(self.parts[-1][-1]) if self.parts else 0.0
 
     @property
     def wire(self) -> np.ndarray:
@@ -56,7 +68,7 @@ def values(word: str, **changes) -> dict:
 def settings(word: str, **changes) -> DriverSettings:
     """Settings of a driver with the limits of this file."""
     defaults = {row.name: row.value for row in DRIVER}
-    limits = {"max_slew_rate": SLEW, "ramp_rate": RAMP, "sample_period": PERIOD}
+    limits = {"max_slew_rate": SLEW, "ramp_rate": RAMP, "sample_period": PERIOD, "keeper_timeout": 0.0}
     return DriverSettings.from_values(defaults | limits | {"stage": word} | changes)
 
 
@@ -83,7 +95,9 @@ class WiredSession:
 
     @property
     def output(self) -> float:
-        """Voltage put out last [V]."""
+        """Voltage put out now [V]."""
+        if isinstance(self.amplifier, WireStage):
+            return self.amplifier.output
         parts = self.amplifier.parts
         return float(parts[-1][-1]) if parts else 0.0
 
@@ -95,7 +109,7 @@ class WiredSession:
         deadline = time.monotonic() + timeout
         while not condition():
             if time.monotonic() > deadline:
-                pytest.fail(f"waited {timeout:g} s for {what}; failures: {[str(f) for f in self.failures]}")
+                raise TimeoutError(f"waited {timeout:g} s for {what}; failures: {[str(f) for f in self.failures]}")
             time.sleep(1e-3)
 
     def rises(self) -> None:
@@ -122,22 +136,40 @@ def device(word: str, **options) -> Iterator[tuple[str, dict, WireStage | None, 
     if word == "gcs2":
         amplifier = WireStage(seed=3)
         controller = Controller(amplifier, **options)
-        with Gcs2Server(controller) as server:
+        with Gcs2Server(controller) as server, closing(Connection(server.host, server.port, 5.0)) as observer:
+
+            def observe():  # it lives on when it is asked; its error is left to the driver
+                with suppress(StageError):
+                    observer.send("VOL? 1\n")
+                    observer.receive()
+
+            amplifier.observe = observe
             address = {"host": server.host, "port": server.port, "amplifier_gain": GAIN, "points_per_command": 100}
             yield word, values(word, max_slew_rate=1e6, **address), amplifier, (controller, server)
     elif word == "nidaqmx":
-        pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
         from piezo_hysteresis.emulators.daqmx.card import Card
         from piezo_hysteresis.emulators.daqmx.server import DaqmxServer
 
         amplifier = WireStage(seed=3)
         card = Card(amplifier, **options)
         with DaqmxServer(card) as server:
-            wiring = {"device": "Dev1", "server": f"127.0.0.1:{server.port}", "voltage_input": "ai1", "lead": 0.2}
+            wiring = {"device": "Dev1", "server": f"127.0.0.1:{server.port}", "voltage_input": "ai1", "lead": 0.5}
             yield word, values(word, max_slew_rate=1e6, **wiring), amplifier, (card, server)
     else:
         memory = word == "memory"
         yield "simulated", values("simulated", memory=memory, longest_block=50_000, dead_time=0.0), None, None
+
+
+def driver_process(folder: Path, word: str, parameters: dict, timeout: float) -> subprocess.Popen:
+    """A driver without ROS in a process of its own, `piezo record`; what it says is in ``folder/log``."""
+    ours = {"stage": word, "sample_period": PERIOD, "max_slew_rate": SLEW, "ramp_rate": RAMP, "voltage_max": TOP}
+    file = folder / "stage.yaml"
+    given = ours | {"keeper_timeout": timeout, word: parameters}
+    file.write_text(yaml.safe_dump({"/**": {"ros__parameters": given}}))
+    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "record", str(file), "short", "-o", str(folder / "e")]
+    environment = os.environ | {"XDG_RUNTIME_DIR": str(folder)}
+    with (folder / "log").open("wb") as log:
+        return subprocess.Popen(command, env=environment, stdout=log, stderr=log)
 
 
 def check_wire(wire: np.ndarray, *, begins: float = 0.0) -> None:

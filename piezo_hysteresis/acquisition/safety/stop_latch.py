@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import StageError
+from ...errors import StageError
 
 
 class StopLatch:

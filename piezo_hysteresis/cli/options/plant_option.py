@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..errors import ParameterError, RecordingError
-from ..stage.hidden import hidden_effect
-from ..stage.plant import PlantParameters
-from ..yaml_file import read_yaml
+from ...errors import ParameterError, RecordingError
+from ...stage.hidden import hidden_effect
+from ...stage.plant import PlantParameters
+from ...yaml_file import read_yaml
 
 
 def add_plant_arguments(parser: argparse.ArgumentParser) -> None:

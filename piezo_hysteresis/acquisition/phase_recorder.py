@@ -1,0 +1,115 @@
+"""`record_phases`: waveforms played to a stage one after the other, and the samples of each as records. No ROS."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from ..errors import PiezoError, StageError
+from ..record import Record
+from ..stage.stage import Samples
+from .drive import EventKind
+from .sample_block import SampleBlock
+from .session import DriverSession
+from .streaming import Delivery, StreamingAcquisition
+
+SILENCE = 60.0
+"""Time without a sample, beyond the length of the waveform, after which a stage is given up [s]."""
+
+
+def record_phases(
+    session: DriverSession,
+    phases: Iterable[tuple[str, Samples, int]],
+    progress: Callable[[str], None] = lambda name: None,
+) -> tuple[Record, ...]:
+    """Play phases and record them; the stage rests at its safe voltage afterwards.
+
+    Parameters
+    ----------
+    session : DriverSession
+        Opened, not started.
+    phases : iterable of (str, (n,) ndarray, int)
+        Name, drive at the sample period of the session [V], and how many samples are averaged into one.
+    progress : callable
+        Called with the name of each phase before it is played.
+
+    Returns
+    -------
+    tuple of Record
+        One per phase, or several where samples were never measured between them (a device reading out its memory);
+        all but the first continue the state of the stage.
+
+    Raises
+    ------
+    PiezoError
+        If the stage fails, or refuses a phase.
+    """
+    delivered: queue.SimpleQueue[Delivery | PiezoError] = queue.SimpleQueue()
+    acquisition = session.start(time.time_ns, delivered.put, delivered.put, lambda: 1)
+    records: list[Record] = []
+    try:
+        while acquisition.playback.is_stopping:  # from where another program has left the stage
+            _next(delivered, SILENCE)
+        for name, voltage, average in phases:
+            progress(name)
+            blocks = _played(session, acquisition, delivered, name, voltage)
+            records += _records(blocks, name, session.sample_period, average, bool(records))
+    finally:
+        session.make_safe()
+    return tuple(records)
+
+
+def _next(delivered: queue.SimpleQueue[Delivery | PiezoError], patience: float) -> Delivery:
+    try:
+        got = delivered.get(timeout=patience)
+    except queue.Empty:
+        raise StageError(f"no sample came for {patience:g} s, expected some; is the device alive?") from None
+    if isinstance(got, PiezoError):
+        raise got
+    return got
+
+
+def _played(
+    session: DriverSession,
+    acquisition: StreamingAcquisition,
+    delivered: queue.SimpleQueue[Delivery | PiezoError],
+    name: str,
+    voltage: Samples,
+) -> list[SampleBlock]:
+    """Blocks that hold samples of one phase, cut to those."""
+    waveform = session.check.waveform(voltage, 0, 0)
+    phase = acquisition.play(waveform, name, 0, session.check.first_step, lambda phase, size: None)
+    patience = SILENCE + 2 * waveform.size * session.sample_period
+    blocks: list[SampleBlock] = []
+    while True:
+        delivery = _next(delivered, patience)
+        inside = np.flatnonzero(delivery.block.phase == phase.number)
+        if inside.size:
+            blocks.append(delivery.block.between(int(inside[0]), int(inside[-1]) + 1))
+        for event in delivery.events:
+            if event.phase.number == phase.number and event.happening is EventKind.DONE:
+                return blocks
+            if event.phase.number == phase.number and event.happening is EventKind.STOPPED:
+                raise StageError(f"phase '{name}' was stopped; nothing was recorded")
+
+
+def _records(blocks: list[SampleBlock], name: str, period: float, average: int, continues: bool) -> list[Record]:
+    """The blocks of one phase as records, cut where samples were never measured."""
+    pieces: list[list[SampleBlock]] = []
+    for block in blocks:
+        if pieces and not block.follows_gap:
+            pieces[-1].append(block)
+        else:
+            pieces.append([block])
+    records: list[Record] = []
+    for piece in pieces:
+        voltage, displacement = (
+            np.concatenate([getattr(block, channel) for block in piece]) for channel in ("voltage", "displacement")
+        )
+        start = int(piece[0].index[0]) * period
+        record = Record(voltage, displacement, period, name, start, continues=continues or bool(records))
+        records.append(record.decimate(average) if 1 < average <= record.size else record)
+    return records

@@ -1,0 +1,92 @@
+"""`keeper`: a process that brings a stage to its safe voltage when the heartbeats of its driver end. No ROS.
+
+It is started by the driver (`KeeperLink`), which tells it on standard input how to open the stage, in one line of JSON,
+and after that sends a byte now and then. The keeper opens the stage over a connection of its own, without moving it,
+answers ``ready``, and does nothing as long as bytes come.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+from ...errors import PiezoError
+from ...stage.opening import Opening
+from ...stage.stage import Stage
+from ..back_ends import BACK_ENDS
+
+READY = "ready"
+"""What the keeper answers when it holds the stage."""
+GOODBYE = b"q"
+"""Sent by a driver that has made its stage safe itself."""
+ATTEMPTS = 5
+"""How often the keeper tries to bring the stage to its safe voltage."""
+_BETWEEN_ATTEMPTS = 0.2
+"""Time between two attempts [s]."""
+
+
+def main() -> int:
+    """Keep one stage; returns 0 where it needed nothing or was brought to its safe voltage, 1 where that failed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver makes the stage safe, and says goodbye
+    order = json.loads(sys.stdin.readline())
+    try:
+        stage = _opened(order)
+    except PiezoError as error:
+        print(f"{' '.join(str(error).split())}", flush=True)  # noqa: T201  # the answer to the driver
+        return 1
+    print(READY, flush=True)  # noqa: T201  # the answer to the driver
+    reason = _listen(order["timeout"])
+    if not reason:
+        os._exit(0)  # closing the stage would move it
+    sys.stderr.write(f"keeper: {reason}; bringing {stage.description.name} to its safe voltage\n")
+    if order["ends_driver"]:
+        with suppress(ProcessLookupError):
+            os.kill(order["driver"], signal.SIGKILL)
+    return _make_safe(stage, order)
+
+
+def _opened(order: Mapping[str, Any]) -> Stage:
+    stage = BACK_ENDS[order["stage"]].open(order["values"], Opening(order["sample_period"]))
+    stage.restrict(replace(stage.description, **order["limits"]), order["ramp_rate"])
+    return stage
+
+
+def _listen(timeout: float) -> str:
+    """Why the heartbeats ended; empty where the driver said goodbye."""
+    heard, descriptor = b"", sys.stdin.fileno()
+    while not heard.endswith(GOODBYE):
+        ready, _, _ = select.select([descriptor], [], [], timeout)
+        if not ready:
+            return f"the driver was silent for {timeout:g} s"
+        heard = os.read(descriptor, 4096)
+        if not heard:
+            return "the driver has died"
+    return ""
+
+
+def _make_safe(stage: Stage, order: Mapping[str, Any]) -> int:
+    time.sleep(stage.description.latency)  # what waits in the buffer of a device is played to its end first
+    for _ in range(ATTEMPTS):
+        try:
+            if order["ends_driver"]:  # its device was the driver's alone: the stage learns where it stands
+                stage = _opened(order)
+            stage.safe()
+        except PiezoError as error:
+            sys.stderr.write(f"keeper: {' '.join(str(error).split())}\n")
+            time.sleep(_BETWEEN_ATTEMPTS)
+        else:
+            sys.stderr.write(f"keeper: {stage.description.name} is at its safe voltage\n")
+            return 0
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,131 @@
+"""`KeeperLink`: starts the keeper of a stage, and sends it the heartbeats of the driver. No ROS."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping
+from typing import Any
+
+from ...errors import StageError
+from ...stage.description import Description
+from ..back_ends import BACK_ENDS
+from .keeper import GOODBYE, READY
+
+_START = 30.0
+"""Longest time that a keeper takes to start and to open the stage [s]."""
+_PER_TIMEOUT = 10
+"""Heartbeats within the silence that the keeper allows."""
+
+
+class KeeperLink:
+    """A keeper process beside this one.
+
+    Parameters
+    ----------
+    word : str
+        Back end of the stage.
+    values : mapping
+        Of its rows, by name.
+    sample_period : float
+        In force [s].
+    limits : Description
+        Of the driver.
+    ramp_rate : float
+        Of the way to the safe voltage [V/s].
+    timeout : float
+        Silence of this process after which the keeper acts [s].
+
+    Raises
+    ------
+    StageError
+        If the keeper cannot be started, or cannot open the stage over a connection of its own.
+    """
+
+    def __init__(
+        self,
+        word: str,
+        values: Mapping[str, Any],
+        sample_period: float,
+        limits: Description,
+        ramp_rate: float,
+        timeout: float,
+    ) -> None:
+        order = {
+            "stage": word,
+            "values": dict(values),
+            "sample_period": sample_period,
+            "limits": {name: getattr(limits, name) for name in ("voltage_min", "voltage_max", "max_slew_rate")},
+            "ramp_rate": ramp_rate,
+            "timeout": timeout,
+            "ends_driver": BACK_ENDS[word].keeper_ends_driver,
+            "driver": os.getpid(),
+        }
+        self._interval, self._ended, self._is_lost = timeout / _PER_TIMEOUT, threading.Event(), False
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "piezo_hysteresis.acquisition.safety.keeper"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # what ends the driver's group shall not end its keeper
+        )
+        assert self._process.stdin is not None
+        self._pipe = self._process.stdin.fileno()
+        answer = self._started(json.dumps(order))
+        if answer != READY:
+            self._process.kill()
+            self._process.wait()
+            raise StageError(
+                f"the keeper cannot hold the stage ({answer}), expected a second connection to it; free one, or set "
+                "keeper_timeout to 0 to go without a keeper"
+            )
+        os.set_blocking(self._pipe, False)
+        threading.Thread(target=self._beat, name="heartbeat", daemon=True).start()
+
+    @property
+    def is_lost(self) -> bool:
+        """True where the keeper has acted or died: the stage is no longer this driver's alone."""
+        return self._is_lost or (not self._ended.is_set() and self._process.poll() is not None)
+
+    def require(self) -> None:
+        """StageError where the keeper has acted or died."""
+        if self.is_lost:
+            raise StageError(
+                "the keeper of the stage has ended: this driver was silent for too long, or the keeper was killed; "
+                "configure anew"
+            )
+
+    def close(self) -> None:
+        """Send the keeper away: the stage is safe, or nothing can make it so. Harmless when repeated."""
+        if self._ended.is_set():
+            return
+        self._ended.set()
+        self._send(GOODBYE)
+        try:
+            self._process.wait(1.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
+
+    def _started(self, order: str) -> str:
+        out = self._process.stdout
+        assert out is not None
+        self._send(f"{order}\n".encode())
+        ready, _, _ = select.select([out], [], [], _START)
+        return out.readline().decode(errors="replace").strip() if ready else f"no answer within {_START:g} s"
+
+    def _beat(self) -> None:
+        while not self._ended.wait(self._interval):
+            self._send(b".")
+
+    def _send(self, text: bytes) -> None:
+        try:
+            os.write(self._pipe, text)
+        except OSError:  # closed from the other side, or full: nobody reads
+            self._is_lost = True

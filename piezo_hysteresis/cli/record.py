@@ -1,0 +1,106 @@
+"""``piezo record``: play a protocol to a stage and record it, without ROS.
+
+STAGE.yaml is a parameter file of the driver (config/driver.yaml): which back end, its parameters, the limits. The same
+checks, limits and locks hold as in the driver node. Ctrl-C brings the stage to its safe voltage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .. import recording
+from ..acquisition.back_ends import BACK_ENDS
+from ..acquisition.phase_recorder import record_phases
+from ..acquisition.session import DriverSession
+from ..acquisition.settings import DRIVER, DriverSettings
+from ..errors import ParameterError
+from ..identification.protocol.drive_limits import DriveLimits
+from ..record import Experiment
+from ..yaml_file import read_yaml
+from .simulate import PROTOCOLS
+from .terminal import console, progress
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("record", description=__doc__)
+    parser.add_argument("stage", metavar="STAGE.yaml", type=Path, help="parameter file of the driver")
+    parser.add_argument("protocol", choices=tuple(PROTOCOLS), help="what is played")
+    parser.add_argument("-o", "--output", metavar="FOLDER", required=True, help="experiment to write")
+    parser.add_argument("--seed", type=int, default=0, help="of everything random in the protocol (default: 0)")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Play, record, and write the experiment; returns 0.
+
+    Raises
+    ------
+    PiezoError
+        On a file, a stage, limits or a folder that are not acceptable; the stage is at its safe voltage then.
+    """
+    settings, values = read_stage(args.stage)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the stage is made safe
+    session = DriverSession(settings, values, f"a recording with {args.stage.resolve()}")
+    try:
+        force = session.in_force()
+        names = ("voltage_min", "voltage_max", "safe_voltage", "max_slew_rate", "ramp_rate")
+        limits = DriveLimits(session.sample_period, **{name: float(force[name]) for name in names})
+        protocol = PROTOCOLS[args.protocol](limits, args.seed)
+        console().print(f"{session.limits.name}\n{args.protocol}: {protocol.summary}")
+        played = 0.0
+        durations = iter([phase.duration for phase in protocol])
+        with progress("record") as tell:
+
+            def told(name: str) -> None:
+                nonlocal played
+                tell(name, played / protocol.summary.duration)
+                played += next(durations)
+
+            records = record_phases(session, ((p.name, p.voltage, p.stored_every) for p in protocol), told)
+    finally:
+        session.close()
+    recording.write(Experiment(records), args.output)
+    console().print(f"wrote {len(records)} records of {len(protocol)} phases to {args.output}")
+    return 0
+
+
+def read_stage(path: Path) -> tuple[DriverSettings, dict[str, Any]]:
+    """Settings of a driver and values of its back end, from a ROS parameter file keyed ``/**``.
+
+    Raises
+    ------
+    ParameterError
+        On a name that is no parameter of the driver, or a value that is not acceptable.
+    """
+    content = read_yaml(path)
+    given = content.get("/**") if isinstance(content, Mapping) else None
+    parameters = given.get("ros__parameters") if isinstance(given, Mapping) else None
+    if not isinstance(parameters, Mapping):
+        raise ParameterError(f"{path}: got no '/**: ros__parameters:', expected a parameter file of the driver")
+    flat = _flat(parameters)
+    rows = {row.name: row for row in DRIVER} | {
+        f"{word}.{row.name}": row for word, back_end in BACK_ENDS.items() for row in back_end.rows
+    }
+    unknown = sorted(set(flat) - set(rows))
+    if unknown:
+        raise ParameterError(f"{path}: {unknown[0]} is no parameter of the driver; docs/ros.md lists them")
+    checked = {name: row.check(flat.get(name, row.value), "") for name, row in rows.items()}
+    settings = DriverSettings.from_values(checked)
+    word = f"{settings.stage}."
+    return settings, {name.removeprefix(word): value for name, value in checked.items() if name.startswith(word)}
+
+
+def _flat(parameters: Mapping[Any, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as names with points between their parts."""
+    flat: dict[str, Any] = {}
+    for name, value in parameters.items():
+        if isinstance(value, Mapping):
+            flat |= _flat(value, f"{prefix}{name}.")
+        else:
+            flat[f"{prefix}{name}"] = value
+    return flat

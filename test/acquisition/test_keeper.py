@@ -1,0 +1,63 @@
+"""A driver that dies or stands still leaves no device energised: its keeper goes to the safe voltage, slew kept."""
+
+import os
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+from benchmarks.wire import PERIOD, RAMP, SAFE_WITHIN, check_wire, device, driver_process
+
+TIMEOUT = 0.5
+
+
+def wait(condition, what, folder, timeout=60.0):
+    deadline = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > deadline:
+            pytest.fail(f"waited {timeout:g} s for {what}\n{(folder / 'log').read_text()}")
+        time.sleep(2e-3)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize("word", ["gcs2", "nidaqmx"])
+def test_a_driver_that_is_killed_or_stopped_in_motion(tmp_path, word, number):
+    if word == "nidaqmx":
+        pytest.importorskip("nidaqmx")
+    with device(word) as (name, parameters, amplifier, _):
+        process = driver_process(tmp_path, name, parameters, TIMEOUT)
+        try:
+            wait(lambda: amplifier.output > 3.0, "motion", tmp_path)
+            process.send_signal(number)
+            begin = amplifier.wire.size
+            wait(lambda: "is at its safe voltage" in (tmp_path / "log").read_text(), "the keeper", tmp_path)
+            wire = amplifier.wire
+            assert abs(wire[-1]) <= SAFE_WITHIN
+            check_wire(wire)
+            moved = np.flatnonzero(np.abs(np.diff(wire[begin:])) > 0)
+            assert moved.size * PERIOD < 3 * 6.0 / RAMP + 2.0
+            if number == signal.SIGSTOP:
+                process.send_signal(signal.SIGCONT)
+                assert process.wait(30.0) != 0
+                assert abs(amplifier.output) <= SAFE_WITHIN, "what was stopped moves nothing when it goes on"
+        finally:
+            process.kill()
+            process.wait()
+
+
+def test_a_driver_whose_keeper_is_killed_ends_safe(tmp_path):
+    with device("gcs2") as (name, parameters, amplifier, _):
+        process = driver_process(tmp_path, name, parameters, TIMEOUT)
+        try:
+            wait(lambda: amplifier.output > 1.0, "motion", tmp_path)
+            children = subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True, check=True)
+            os.kill(int(children.stdout.split()[0]), signal.SIGKILL)
+            assert process.wait(30.0) == 2
+            assert "the keeper of the stage has ended" in (tmp_path / "log").read_text()
+            assert abs(amplifier.output) <= SAFE_WITHIN
+            check_wire(amplifier.wire)
+        finally:
+            process.kill()
+            process.wait()

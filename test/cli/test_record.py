@@ -1,0 +1,54 @@
+"""``piezo record``: a lab without ROS plays a protocol to a stage and records it."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis import recording
+
+STAGE = """
+/**:
+  ros__parameters:
+    stage: simulated
+    sample_period: 1.0e-4
+    real_time_factor: 20.0
+    block_duration: 0.05
+    simulated:
+      seed: 3
+      memory: {memory}
+"""
+
+
+@pytest.mark.parametrize("memory", ["false", "true"])
+def test_a_protocol_is_recorded_phase_by_phase(piezo, tmp_path, memory):
+    file, folder = tmp_path / "stage.yaml", tmp_path / "experiment"
+    file.write_text(STAGE.format(memory=memory))
+    done = piezo("record", file, "short", "-o", folder)
+    assert done.status == 0, done.err
+    assert "largest slew" in done.out, "told before anything moves"
+    planned = tmp_path / "planned"
+    assert piezo("simulate", "--protocol", "short", "--sample-period", 1e-4, "--seed", 0, "-o", planned).status == 0
+    got, expected = recording.read(folder).records, recording.read(planned).records
+    assert list(dict.fromkeys(r.phase for r in got)) == list(dict.fromkeys(r.phase for r in expected))
+    assert memory == "true" or [r.phase for r in got] == [r.phase for r in expected]
+    played, planned_voltage = (np.concatenate([r.voltage for r in records]) for records in (got, expected))
+    np.testing.assert_allclose(played, planned_voltage, atol=1e-3)
+    assert all(record.continues for record in got[1:])
+    assert not got[0].continues
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("stage: simulated", "expected a parameter file of the driver"),
+        ("/**:\n  ros__parameters:\n    speed: 1.0\n", "speed is no parameter of the driver"),
+        ("/**:\n  ros__parameters:\n    stage: toaster\n", "expected one of simulated"),
+        ("/**:\n  ros__parameters:\n    stage: gcs2\n    gcs2: {host: nowhere}\n", "max_slew_rate: got 0 V/s"),
+    ],
+)
+def test_a_file_that_makes_no_sense_is_refused_in_one_line(piezo, tmp_path, text, reason):
+    file = tmp_path / "stage.yaml"
+    file.write_text(text)
+    done = piezo("record", file, "short", "-o", tmp_path / "experiment")
+    assert done.status == 2
+    assert reason in done.err
+    assert done.err.count("\n") == 1
