@@ -40,7 +40,7 @@ COMPENSATION: tuple[Row, ...] = (
     Setting("driver", "driver_node", "name of the driver node in the same namespace"),
     Setting("play", True, "false: a trajectory is planned and kept for ~/plan and ~/learn, nothing moves"),
     Setting("approximate", False, "leave out effects that cannot be turned round instead of refusing the model"),
-    Setting("learning_rounds", 2, "corrections that ~/learn plays"),
+    Setting("learning_rounds", 2, "corrections that ~/learn plays", lower=0, upper=100),
     Parameter("sensor_noise", "σ", "m", 0.0, 0.0, 1e-3, "rms noise of the sensor, at which learning stops", _SOURCE),
     Parameter("approach", "t_a", "s", 0.1, 1e-3, 1e3, "duration of the way to the first sample of a path", _SOURCE),
     Parameter("longest_trajectory", "t_max", "s", 120.0, 1e-3, 1e5, "longer ones are refused", _SOURCE),
