@@ -21,7 +21,8 @@ from piezo_hysteresis.record import Experiment, Record
 
 SOURCE = Path(piezo_hysteresis.__file__).parent
 ROOMS = ("cli", "compensation", "discrepancy", "identification", "model", "nodes", "online", "report")
-OTHER_MEANINGS = {("report/figures/creep.py", "creep"), ("nodes/model/diagnostics.py", "offset")}
+ORDINARY = {"offset"}
+OTHER_MEANINGS = {("report/figures/creep.py", "creep")}  # the name of the figure
 LIMITS = DriveLimits(sample_period=2e-4)
 
 
@@ -119,7 +120,7 @@ def test_no_room_above_the_catalogue_names_an_effect_in_a_string():
         for node in ast.walk(tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
                 word = node.value.partition(".")[0]
-                if word in names and (where, node.value) not in OTHER_MEANINGS:
+                if word in names and node.value not in ORDINARY and (where, node.value) not in OTHER_MEANINGS:
                     found.append(f"{where}:{node.lineno}: '{node.value}'")
     assert not found, "\n".join(found)
 
