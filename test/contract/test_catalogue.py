@@ -5,6 +5,8 @@ from __future__ import annotations
 import runpy
 from pathlib import Path
 
+import pytest
+
 from piezo_hysteresis.effects import BASELINE, BY_NAME, CATALOGUE, CHAIN, FINER_FORMS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -54,6 +56,7 @@ def test_file_class_and_identifier_are_one_word() -> None:
         assert effect.__name__ == "".join(part.capitalize() for part in effect.name.split("_"))
 
 
-def test_the_page_is_what_the_classes_say() -> None:
+def test_the_page_is_what_the_classes_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS))
     generated = runpy.run_path(str(DOCS / "generate.py"))["catalogue"]()
     assert (DOCS / "catalogue.md").read_text() == generated, "run make docs"
