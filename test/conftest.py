@@ -16,6 +16,7 @@ settings.load_profile("patient")
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         nodes = item.get_closest_marker("nodes") is not None
-        item.add_marker(pytest.mark.xdist_group("nodes" if nodes else item.path.stem))
+        device = item.get_closest_marker("device") is not None
+        item.add_marker(pytest.mark.xdist_group("nodes" if nodes or device else item.path.stem))
         if nodes:
             item.add_marker(pytest.mark.flaky(reruns=1))

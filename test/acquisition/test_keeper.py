@@ -10,6 +10,8 @@ import pytest
 
 from benchmarks.wire import PERIOD, RAMP, SAFE_WITHIN, check_wire, device, driver_process
 
+pytestmark = pytest.mark.device
+
 TIMEOUT = 0.5
 
 

@@ -23,6 +23,8 @@ from piezo_hysteresis.acquisition.drive import EventKind
 from piezo_hysteresis.emulators.fault import Faults
 from piezo_hysteresis.errors import ParameterError, StageError
 
+pytestmark = pytest.mark.device
+
 pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
 
 WORDS = ("simulated", "memory", "gcs2", "nidaqmx")

@@ -103,7 +103,7 @@ def files(tmp_path_factory, folder):
         ("report {experiment} --answer {fine}", "no JSON"),
         ("report {experiment} --answer {list}", "got a list"),
         ("report {experiment} --model before={place}/none.yaml", "expected a model file"),
-        ("import {experiment} -o {experiment}", "choose an empty folder"),
+        ("import {experiment} -o {experiment}", "choose another one or remove it"),
         ("simulate -o {place}/s --plant {place}/none.yaml", "expected a YAML file"),
         ("simulate -o {place}/s --plant {list}", "got a list"),
         ("simulate -o {place}/s --plant {fine}", "unknown quantity"),

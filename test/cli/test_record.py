@@ -5,6 +5,8 @@ import pytest
 
 from piezo_hysteresis import recording
 
+pytestmark = pytest.mark.device
+
 STAGE = """
 /**:
   ros__parameters:

@@ -129,7 +129,7 @@ def test_a_fault_of_the_program_fails_what_was_asked_and_nothing_else(lab):
             assert statuses[-1].message.startswith(fault)
         else:
             assert asked.message.startswith(fault)
-    lab.wait(lambda: fault in newest(reports, "identification_node").message, "the fault on /diagnostics")
+    lab.wait(lambda: any(fault in s.message for r in list(reports) for s in r.status), "the fault on /diagnostics")
     assert process.is_running
     assert "\n[FATAL] forged" not in process.output
 

@@ -13,7 +13,7 @@ from benchmarks.naming_cases import Case
 from piezo_hysteresis.nodes.messages.conversions import values_of
 from piezo_hysteresis.recording import read, write
 
-from .test_identification_node import Identification
+from .identification.test_identification_node import Identification
 
 pytestmark = pytest.mark.nodes
 

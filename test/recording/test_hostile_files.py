@@ -21,6 +21,7 @@ from piezo_hysteresis.errors import PiezoError, RecordingError
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import read, write
 from piezo_hysteresis.recording.bag.mcap_file import MAGIC
+from piezo_hysteresis.stage.opening import Opening
 
 SECONDS = 60
 """A process that hangs is stopped after this; none of them needs a tenth of it."""
@@ -243,7 +244,7 @@ def test_hostile_settings_are_refused(tmp_path, name):
     path.write_text(SETTINGS[name])
     refused("simulate", "-o", tmp_path / "out", "--plant", path)
     with pytest.raises(PiezoError):
-        BACK_ENDS["simulated"].open(stage_values(path), 2e-5)
+        BACK_ENDS["simulated"].open(stage_values(path), Opening(2e-5))
 
 
 def test_settings_from_pipes_and_devices_are_refused(tmp_path):
@@ -251,7 +252,7 @@ def test_settings_from_pipes_and_devices_are_refused(tmp_path):
     for path in (tmp_path / "pipe", "/dev/zero", "/dev/null", tmp_path):
         assert "expected a regular file" in refused("simulate", "-o", tmp_path / "out", "--plant", path)
         with pytest.raises(PiezoError, match="expected a regular file"):
-            BACK_ENDS["simulated"].open(stage_values(path), 2e-5)
+            BACK_ENDS["simulated"].open(stage_values(path), Opening(2e-5))
 
 
 def stage_values(path):

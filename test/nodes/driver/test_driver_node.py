@@ -139,7 +139,7 @@ def test_a_failed_configure_tells_why_and_can_be_tried_again(lab):
     assert lab.transition("configure")
     answer = lab.call(SetParametersAtomically, "driver_node/set_parameters_atomically", _set(ramp_rate=1.0)).result
     assert not answer.successful
-    assert "read at configure" in answer.reason
+    assert "read when the driver is configured" in answer.reason
     answer = lab.call(
         SetParametersAtomically, "driver_node/set_parameters_atomically", _set(in_force__voltage_max=99.0)
     )
