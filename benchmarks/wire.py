@@ -135,7 +135,7 @@ def device(word: str, **options) -> Iterator[tuple[str, dict, WireStage | None, 
     """Word of the back end, values of its parameters, the amplifier, and the emulated device."""
     if word == "gcs2":
         amplifier = WireStage(seed=3)
-        controller = Controller(amplifier, **options)
+        controller = Controller(amplifier, **{"serial": f"{time.monotonic_ns()}"} | options)  # a device of its own
         with Gcs2Server(controller) as server, closing(Connection(server.host, server.port, 5.0)) as observer:
 
             def observe():  # it lives on when it is asked; its error is left to the driver
