@@ -1,4 +1,4 @@
-"""`make bench BENCH=change`: false alarms of the change watch over hours of simulated stream, and what it finds.
+"""`python -m benchmarks.change`: false alarms of the change watch over hours of simulated stream, and what it finds.
 
 Residuals of four kinds, 0.05 % of range rms each, on a stage that is driven with a 20 Hz sine at 5 kHz. The model is
 exact, so that all of the residual is noise; every stream has a baseline of its own.
