@@ -89,7 +89,8 @@ class ChangeWatch:
         bool
             True where a baseline was completed by the block.
         """
-        if answer.model is None or answer.warming_up or answer.residual.size == 0:
+        is_idle = self.baseline is None and not self.is_taking
+        if is_idle or answer.model is None or answer.warming_up or answer.residual.size == 0:
             self.restart()
             return False
         if self._scores is None or answer.model is not self._model:
@@ -104,7 +105,7 @@ class ChangeWatch:
         chain, state = predictor.chain, predictor.state
         if chain is None or state is None:
             return
-        if model is not self._model:
+        if self._model is not None and model is not self._model:
             self.since, self._wanted = 0, 0
         self._model = model
         values = model.values()
