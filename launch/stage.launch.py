@@ -9,7 +9,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
-from piezo_hysteresis.nodes.runtime.launch_values import SWITCH, parameter_file, switch
+from piezo_hysteresis.nodes.runtime.launch_values import SWITCH, number, parameter_file, replayed, switch
 
 SIGTERM_TIMEOUT = "30"
 """A driver ramps to its safe voltage before it ends; launch shall not kill it meanwhile [s]."""
@@ -21,6 +21,8 @@ ARGUMENTS = (
     ("model_file", "", "first model of the model node; empty: it waits for the topic model", None),
     ("stage", "", f"back end of the driver: {', '.join(BACK_ENDS)}; empty: as the parameter files say",
      ["", *BACK_ENDS]),
+    ("experiment", "", "recording for the back end replay, which it implies; all its phases are played", None),
+    ("real_time_factor", "", "speed of a simulated or replayed stage; empty: as the parameter files say", None),
     ("autostart", "true", "configure and activate the driver at start", list(SWITCH)),
     ("compensation", "false", "start the compensation node, too: it follows trajectories in metres", list(SWITCH)),
 )  # fmt: skip
@@ -49,12 +51,18 @@ def nodes(context: LaunchContext) -> list[Node]:
             sigterm_timeout=SIGTERM_TIMEOUT,
         )
 
-    stage = {"stage": value["stage"]} if value["stage"] else {}
+    driver: dict[str, object] = {"autostart": switch("autostart", value["autostart"])}
+    if value["experiment"]:
+        driver |= {"stage": replayed(value["stage"]), "replay.experiment": value["experiment"]}
+    elif value["stage"]:
+        driver["stage"] = value["stage"]
+    if value["real_time_factor"]:
+        driver["real_time_factor"] = number("real_time_factor", value["real_time_factor"])
     model: dict[str, object] = {"model_file": value["model_file"]} if value["model_file"] else {}
     if switch("use_sim_time", value["use_sim_time"]):
         model["use_sim_time"] = True
     started = [
-        node("driver_node", "driver.yaml", autostart=switch("autostart", value["autostart"]), **stage),
+        node("driver_node", "driver.yaml", **driver),
         node("model_node", "model.yaml", **model),
     ]
     if switch("compensation", value["compensation"]):

@@ -9,6 +9,10 @@ launch = pytest.importorskip("launch", reason="no wheels of launch exist; runs o
 pytest.importorskip("launch_ros")
 from launch_ros.utilities import evaluate_parameters  # noqa: E402
 
+STAGE_ARGUMENTS = {
+    "namespace", "params_file", "use_sim_time", "model_file", "stage", "experiment", "real_time_factor", "autostart",
+    "compensation",
+}  # fmt: skip
 FOLDER = Path(__file__).parents[1] / "launch"
 
 
@@ -22,8 +26,8 @@ def load(name):
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
-        ("stage", {"namespace", "params_file", "use_sim_time", "model_file", "stage", "autostart", "compensation"}),
-        ("identify", {"namespace", "params_file", "use_sim_time", "model_file", "stage", "autostart", "compensation"}),
+        ("stage", STAGE_ARGUMENTS),
+        ("identify", STAGE_ARGUMENTS),
         ("replay", {"bag", "axis", "rate", "namespace", "params_file", "use_sim_time", "model_file"}),
     ],
 )
@@ -62,6 +66,24 @@ def test_words_that_mean_nothing_are_refused(name, value):
     entities = load("stage").generate_launch_description().entities
     with pytest.raises((RuntimeError, ValueError), match=name):
         _ = [entity.visit(context) for entity in entities]
+
+
+def driver_parameters(**values):
+    context = launch.LaunchContext()
+    stage = load("stage")
+    context.launch_configurations.update({name: value for name, value, _, _ in stage.ARGUMENTS}, **values)
+    driver = next(node for node in stage.nodes(context) if node.node_executable == "driver_node")
+    return evaluate_parameters(context, driver._Node__parameters)[-1]
+
+
+def test_an_experiment_is_replayed_at_the_speed_asked_for():
+    given = driver_parameters(experiment="/data/run 1", real_time_factor="2")
+    assert given == {
+        "stage": "replay", "replay.experiment": "/data/run 1", "real_time_factor": 2.0, "autostart": True
+    }  # fmt: skip
+    for wrong in ({"experiment": "x", "stage": "simulated"}, {"real_time_factor": "fast"}):
+        with pytest.raises(ValueError, match="got"):
+            driver_parameters(**wrong)
 
 
 def test_only_the_model_node_follows_simulated_time():

@@ -68,10 +68,10 @@ def open_stage(word: str, values: Mapping[str, Any], opening: Opening) -> Stage:
     PiezoError
         If the stage cannot be opened like that; one that was opened is closed again.
     """
-    if opening.real_time_factor != 1.0 and word != "simulated":
+    if opening.real_time_factor != 1.0 and BACK_ENDS[word].is_device:
         raise ParameterError(
-            f"real_time_factor: got {opening.real_time_factor:g} for stage '{word}', expected 1; only 'simulated' has "
-            "another"
+            f"real_time_factor: got {opening.real_time_factor:g} for stage '{word}', expected 1; a device runs in real "
+            "time"
         )
     stage = BACK_ENDS[word].open(values, opening)
     try:

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import StageError
-from ..record import Record
 from .drive import Drive, Event, EventKind, Phase
 
 
@@ -16,8 +15,10 @@ class RecordedPlayback:
 
     Parameters
     ----------
-    records : iterable of Record
-        In the order in which the stage plays them.
+    phases : iterable of tuple
+        Name and number of samples of every phase, in the order in which the stage plays them.
+    voltage : float
+        Before the first one [V].
     repeat : bool
         Begin again after the last one; otherwise a phase ``hold`` follows.
     """
@@ -25,13 +26,13 @@ class RecordedPlayback:
     is_playing = is_stopping = False
     is_safe = True
 
-    def __init__(self, records: Iterable[Record], repeat: bool = False) -> None:
-        self._records = tuple(records)
+    def __init__(self, phases: Iterable[tuple[str, int]], voltage: float, repeat: bool = False) -> None:
+        self._phases = tuple(phases)
         self._repeat = repeat
         self._next = 0
         self._left: float = 0
         self.phase = Phase(0, "idle")
-        self.voltage = float(self._records[0].voltage[0])
+        self.voltage = voltage
 
     def take(self, count: int) -> Drive:
         """Labels of the next `count` samples; the voltages are for a stage that ignores them."""
@@ -42,18 +43,16 @@ class RecordedPlayback:
             if not self._left:
                 self._open()
                 events.append(Event(at, EventKind.BEGAN, self.phase))
-            stretch = int(min(count - at, self._left))
-            phase[at : at + stretch] = self.phase.number
-            self._left -= stretch
-            at += stretch
+            part = int(min(count - at, self._left))
+            phase[at : at + part] = self.phase.number
+            self._left -= part
+            at += part
         return Drive(np.full(count, self.voltage), phase, tuple(events))
 
     def _open(self) -> None:
         if self._repeat:
-            self._next %= len(self._records)
-        ended = self._next == len(self._records)
-        name = "hold" if ended else self._records[self._next].phase
-        self._left = float("inf") if ended else self._records[self._next].size
+            self._next %= len(self._phases)
+        name, self._left = self._phases[self._next] if self._next < len(self._phases) else ("hold", float("inf"))
         self.phase = Phase(self.phase.number + 1, name)
         self._next += 1
 

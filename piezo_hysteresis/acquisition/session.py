@@ -113,6 +113,11 @@ class DriverSession:
         self._acquisition = acquisition
         return acquisition
 
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What a user should know about the stage before it moves, a sentence each."""
+        return self.stage.notices if isinstance(self.stage, ReplayStage) else ()
+
     def in_force(self) -> dict[str, float | str | bool]:
         """What holds, by the names of `IN_FORCE`."""
         limits, settings = self.limits, self.settings
@@ -139,7 +144,7 @@ class DriverSession:
 
     def _source(self, stage: Stage) -> Source:
         if isinstance(stage, ReplayStage):
-            return RecordedPlayback(stage, self._values["repeat"])
+            return RecordedPlayback(stage.phases, stage.voltage, self._values["repeat"])
         settings, safe = self.settings, self.limits.safe_voltage
         playback = Playback(stage.voltage, safe, self.sample_period, settings.ramp_rate, settings.hold_timeout)
         if abs(stage.voltage - safe) > settings.ramp_rate * self.sample_period:

@@ -38,7 +38,9 @@ DRIVER: tuple[Row, ...] = (
     ),
     Parameter("command_max_age", "T_c", "s", 2.0, 0.0, 1e6, "oldest command that is played", _SOURCE),
     Parameter("claim_timeout", "T_o", "s", 10.0, 0.5, 600.0, "an owner unheard for longer has lost its claim", _SOURCE),
-    Parameter("real_time_factor", "κ", "1", 1.0, 0.01, 1000.0, "speed of a simulated stage; 1: real time", _SOURCE),
+    Parameter(
+        "real_time_factor", "κ", "1", 1.0, 0.01, 1000.0, "speed of a simulated or replayed stage; 1: real time", _SOURCE
+    ),
     Parameter(
         "keeper_timeout", "T_k", "s", 1.0, 0.0, 60.0, "silence after which a device is made safe; 0: no keeper", _SOURCE
     ),

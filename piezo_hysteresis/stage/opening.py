@@ -22,7 +22,7 @@ class Opening:
     sample_period : float
         Time between samples [s]; 0 for the stage's own.
     real_time_factor : float
-        Seconds of a simulated stage per second; 1 for every real one.
+        Seconds of a simulated or replayed stage per second; 1 for every real one.
     read : callable
         Reads the records of a recording from its path: stages read no files of samples by themselves.
     """

@@ -9,7 +9,6 @@ from piezo_hysteresis.acquisition.drive import EventKind
 from piezo_hysteresis.acquisition.playback import Playback
 from piezo_hysteresis.acquisition.recorded_playback import RecordedPlayback
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.record import Record
 
 PERIOD = 1e-3
 
@@ -169,9 +168,9 @@ def test_no_step_is_steeper_than_the_ramp_or_the_waveform(script, hold_timeout, 
 
 
 def test_a_recording_brings_its_own_phases():
-    records = [Record(np.zeros(3), np.zeros(3), 1.0, "rest"), Record(np.ones(2), np.ones(2), 1.0, "step")]
-    _, phase, events = taken(RecordedPlayback(records), 2, 2, 4)
+    phases = (("rest", 3), ("step", 2))
+    _, phase, events = taken(RecordedPlayback(phases, 0.0), 2, 2, 4)
     assert phase.tolist() == [1, 1, 1, 2, 2, 3, 3, 3]
     assert [e[::2] for e in events] == [(0, "1 rest"), (3, "2 step"), (5, "3 hold")]
-    _, phase, events = taken(RecordedPlayback(records, repeat=True), 8)
+    _, phase, events = taken(RecordedPlayback(phases, 0.0, repeat=True), 8)
     assert [e[::2] for e in events] == [(0, "1 rest"), (3, "2 step"), (5, "3 rest")]

@@ -76,10 +76,38 @@ def test_channels_are_replayed_where_every_record_has_them():
     assert ReplayStage([full, RECORDS[0]]).exchange(np.zeros(10)).channels == {}
 
 
+def slow_ramp(period, count):
+    """A ramp of 3 V/s, stored as averages over `period`."""
+    return Record(3.0 * period * (np.arange(count) + 0.5), np.zeros(count), period, "ramp")
+
+
+@given(factor=st.integers(2, 9), cuts=st.lists(st.integers(1, 40), min_size=1, max_size=6))
+def test_slow_phases_are_played_between_the_centres_of_their_averages(factor, cuts):
+    fast, slow = Record(VOLTAGE, DISPLACEMENT, 1e-3, "triangle"), slow_ramp(1e-3 * factor, 12)
+    stage = ReplayStage([fast, slow])
+    assert stage.sample_period == 1e-3
+    assert stage.phases == (("triangle", 50), ("ramp", 12 * factor))
+    assert "1 of 2 phases" in stage.notices[0]
+    assert "ramp" in stage.notices[0]
+    got = np.concatenate([stage.exchange(np.zeros(n)).voltage for n in [*cuts, 50 + 12 * factor]])
+    np.testing.assert_array_equal(got[:50], VOLTAGE)
+    inside = slice(factor, 11 * factor)  # the ends are held for half a slow sample
+    ramp = got[50 : 50 + 12 * factor]
+    np.testing.assert_allclose(ramp[inside], 3e-3 * (np.arange(12 * factor) + 0.5)[inside], rtol=1e-12)
+
+
+def test_a_longer_period_is_played_as_averages():
+    stage = ReplayStage(RECORDS[:2], sample_period=2e-3)
+    got = stage.exchange(np.zeros(25))
+    np.testing.assert_allclose(got.voltage, VOLTAGE.reshape(25, 2).mean(axis=1), rtol=1e-15)
+    assert stage.finished
+    assert ReplayStage(RECORDS).notices == ()
+
+
 def test_recordings_that_cannot_be_replayed_in_one_go_are_refused():
     with pytest.raises(StageError, match="no record"):
         ReplayStage([])
-    with pytest.raises(StageError, match="one sample period"):
-        ReplayStage([RECORDS[0], Record([0.0], [0.0], 2e-3)])
+    with pytest.raises(StageError, match="whole multiple"):
+        ReplayStage(RECORDS, sample_period=2.5e-3)
     with pytest.raises(StageError, match="at least one sample"):
         ReplayStage(RECORDS).exchange(np.zeros(0))

@@ -105,6 +105,8 @@ class DriverNode(GuardedNode, LifecycleNode):
         self._commands.attach(session, self._topics)
         self._diagnostics.state(DiagnosticStatus.OK, "configured, not active", name)
         self.get_logger().info(f"configured: {name}, {1 / session.sample_period:g} samples per second")
+        for notice in session.notices:
+            self.get_logger().warning(notice)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -44,3 +44,30 @@ def parameter_file(name: str, text: str) -> list[str]:
     if not path.is_file():
         raise ParameterError(f"{name}: got '{printable(text)}', expected a file that exists")
     return [str(path)]
+
+
+def number(name: str, text: str) -> float:
+    """A number.
+
+    Raises
+    ------
+    ParameterError
+        On any other text.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        raise ParameterError(f"{name}: got '{printable(text)}', expected a number") from None
+
+
+def replayed(stage: str) -> str:
+    """The back end that plays a recording, where none or this one is named.
+
+    Raises
+    ------
+    ParameterError
+        Where another back end is named.
+    """
+    if stage not in ("", "replay"):
+        raise ParameterError(f"stage: got '{printable(stage)}' beside an experiment to replay, expected 'replay'")
+    return "replay"

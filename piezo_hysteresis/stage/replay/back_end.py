@@ -25,7 +25,9 @@ def open(values: Mapping[str, Any], opening: Opening) -> Stage:
     path = values["experiment"]
     if not path:
         raise RecordingError("replay.experiment: got no path, expected that of a recording")
-    records = tuple(opening.read(path))
-    if opening.sample_period:
-        records = tuple(r for r in records if abs(r.sample_period / opening.sample_period - 1) < 1e-6)
-    return ReplayStage(records, name=f"replay of {Path(path).name}", repeat=values["repeat"])
+    return ReplayStage(
+        opening.read(path),
+        name=f"replay of {Path(path).name}",
+        repeat=values["repeat"],
+        sample_period=opening.sample_period,
+    )

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import StageError
 from ...record import Record
 from ..stage import Acquired, Description, Samples
+from .resampled import ResampledRecord
 
 
 class ReplayStage:
-    """Plays records of one sample period, one after the other, as a streaming stage.
+    """Plays records one after the other, as a streaming stage of one sample period.
 
     The drive asked for is not played: `Description.ignores_drive` tells so, and what comes back is the recorded voltage
     with the recorded displacement. After the last record the last sample is held, or everything begins again.
@@ -20,16 +22,19 @@ class ReplayStage:
     Parameters
     ----------
     records : iterable of Record
-        An `Experiment` or any sequence; all of one sample period.
+        An `Experiment` or any sequence.
     name : str
         Name of the stage.
     repeat : bool
         Begin again after the last sample.
+    sample_period : float
+        Time between played samples [s]; 0 for the shortest one of the records. Records of another period are resampled:
+        see `ResampledRecord`, and `notices`.
 
     Raises
     ------
     StageError
-        Without a record, or with records of different sample periods.
+        Without a record, or where one cannot be resampled.
 
     Examples
     --------
@@ -38,27 +43,24 @@ class ReplayStage:
     ([0.0, 1.0], True)
     """
 
-    def __init__(self, records: Iterable[Record], *, name: str = "replay", repeat: bool = False) -> None:
-        self._records = tuple(records)
-        if not self._records:
+    def __init__(
+        self, records: Iterable[Record], *, name: str = "replay", repeat: bool = False, sample_period: float = 0.0
+    ) -> None:
+        recorded = tuple(records)
+        if not recorded:
             raise StageError(f"{name}: got no record, expected at least one")
-        periods = sorted({r.sample_period for r in self._records})
-        if periods[-1] > periods[0] * (1 + 1e-9):
-            raise StageError(
-                f"{name}: got records of {periods[0]:g} to {periods[-1]:g} s per sample, expected one sample period; "
-                "replay the phases of each period by themselves"
-            )
-        self._applied = np.concatenate([r.voltage for r in self._records])
-        self._measured = np.concatenate([r.displacement for r in self._records])
-        shared = [name for name in self._records[0].channels if all(name in r.channels for r in self._records)]
-        self._channels = {name: np.concatenate([r.channels[name] for r in self._records]) for name in shared}
+        period = sample_period or min(r.sample_period for r in recorded)
+        self._played = tuple(ResampledRecord(r, period) for r in recorded)
+        self._ends = np.cumsum([played.size for played in self._played])
+        self._channels = [key for key in recorded[0].channels if all(key in r.channels for r in recorded)]
         self._repeat, self._position, self._closed = repeat, 0, False
-        low, high = float(self._applied.min()), float(self._applied.max())
+        low = min(float(played.record.voltage.min()) for played in self._played)
+        high = max(float(played.record.voltage.max()) for played in self._played)
         self._description = Description(
             name=name,
             streaming=True,
-            sample_period_min=periods[0],
-            sample_period_max=periods[0],
+            sample_period_min=period,
+            sample_period_max=period,
             voltage_min=low,
             voltage_max=high,
             safe_voltage=min(max(0.0, low), high),
@@ -66,8 +68,21 @@ class ReplayStage:
             ignores_drive=True,
         )
 
-    def __iter__(self) -> Iterator[Record]:
-        return iter(self._records)
+    @property
+    def phases(self) -> tuple[tuple[str, int], ...]:
+        """Name and number of played samples of every record, in order."""
+        return tuple((played.record.phase, played.size) for played in self._played)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What is played differently from how it was recorded, a sentence each."""
+        names = [played.record.phase for played in self._played if played.is_resampled]
+        if not names:
+            return ()
+        return (
+            f"{self._description.name}: {len(names)} of {len(self._played)} phases are resampled to "
+            f"{self.sample_period:g} s per sample: {', '.join(names)}",
+        )
 
     @property
     def description(self) -> Description:
@@ -82,18 +97,17 @@ class ReplayStage:
     @property
     def voltage(self) -> float:
         """Recorded voltage of the sample played last [V]; before the first one, of that."""
-        return float(self._applied[max(self._position - 1, 0)])
+        return float(self._values(self._last, _voltage_of)[0])
 
     @property
     def finished(self) -> bool:
         """True when every sample has been played and nothing repeats."""
-        return self._position >= self._applied.size
+        return bool(self._position >= self._ends[-1])
 
     @property
     def record(self) -> Record:
         """The record that the next sample comes from; after the end the last one."""
-        ends = np.cumsum([r.size for r in self._records])
-        return self._records[min(int(np.searchsorted(ends, self._position, side="right")), len(ends) - 1)]
+        return self._played[self._places(np.array([min(self._position, self._ends[-1] - 1)]))[0]].record
 
     def configure(self, sample_period: float) -> None:
         """Accept the recording's own sample period [s]; StageError for any other."""
@@ -106,14 +120,13 @@ class ReplayStage:
         count = int(np.size(voltage))
         if count == 0:
             raise StageError(f"{self._description.name}: got an empty block, expected at least one sample")
-        total = self._applied.size
+        total = int(self._ends[-1])
         index = np.arange(self._position, self._position + count)
         index = index % total if self._repeat else np.minimum(index, total - 1)
         end = self._position + count
         self._position = (end - 1) % total + 1 if self._repeat else min(end, total)
-
-        others = {name: values[index] for name, values in self._channels.items()}
-        return Acquired(self._applied[index], self._measured[index], others)
+        others = {key: self._values(index, _channel(key)) for key in self._channels}
+        return Acquired(self._values(index, _voltage_of), self._values(index, _displacement_of), others)
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
         """Ignored: nothing is put out."""
@@ -131,7 +144,7 @@ class ReplayStage:
     def read_displacement(self) -> float:
         """Recorded displacement of the sample played last [m]."""
         self._require_open()
-        return float(self._measured[max(self._position - 1, 0)])
+        return float(self._values(self._last, _displacement_of)[0])
 
     def safe(self) -> None:
         """Nothing is energised."""
@@ -140,6 +153,36 @@ class ReplayStage:
         """End the replay; every later call that takes samples raises StageError."""
         self._closed = True
 
+    @property
+    def _last(self) -> NDArray[np.int64]:
+        return np.array([max(self._position - 1, 0)])
+
+    def _places(self, index: NDArray[np.int64]) -> NDArray[np.intp]:
+        """Number of the record of every played sample."""
+        return np.searchsorted(self._ends, index, side="right")
+
+    def _values(self, index: NDArray[np.int64], channel: Callable[[Record], Samples]) -> Samples:
+        """One channel at played samples."""
+        places = self._places(index)
+        values = np.empty(index.size)
+        for place in np.unique(places):
+            played, here = self._played[place], places == place
+            first = self._ends[place] - played.size
+            values[here] = played.at(channel(played.record), index[here] - first)
+        return values
+
     def _require_open(self) -> None:
         if self._closed:
             raise StageError(f"{self._description.name}: is closed, expected an open stage; make a new one")
+
+
+def _voltage_of(record: Record) -> Samples:
+    return record.voltage
+
+
+def _displacement_of(record: Record) -> Samples:
+    return record.displacement
+
+
+def _channel(name: str) -> Callable[[Record], Samples]:
+    return lambda record: record.channels[name]
