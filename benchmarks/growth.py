@@ -130,8 +130,8 @@ def run(options: argparse.Namespace) -> list[Figures]:
     for what, against, sizes, make in CASES:
         times = [seconds(make(size), repeats=3)[0] for size in sizes]
         slope = exponent(sizes, times)
-        told = ", ".join(f"{size:g}: {time:.3g}" for size, time in zip(sizes, times, strict=True))
-        rows.append((what, against, slope, told))
+        listed = ", ".join(f"{size:g}: {time:.3g}" for size, time in zip(sizes, times, strict=True))
+        rows.append((what, against, slope, listed))
         curves.append((f"{what} against {against}: {slope:.2f}", sizes, times))
     if options.figure:
         draw(curves, options.figure)

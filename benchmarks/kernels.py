@@ -132,10 +132,10 @@ def compare(u: np.ndarray) -> Figures:
             speed, python_speed = u.size / mine / 1e6, short.size / slow / 1e6
             beside = [cell for c in others for cell in (u.size / c / 1e6, mine / c)]
             rows.append((name, speed, *beside, python_speed, speed / python_speed))
-    told = "M samples/s" if compiler() else "M samples/s, gcc not found: no C beside it"
+    unit = "M samples/s" if compiler() else "M samples/s, gcc not found: no C beside it"
     c_columns = [head for flags in FLAGS[: len(built)] for head in (" ".join(("C", *flags)), "time over it")]
     columns = ("loop", "ours", *c_columns, "Python + lfilter", "over Python")
-    return Figures(f"Kernels, {u.size:.0e} samples, {told}", columns, rows)
+    return Figures(f"Kernels, {u.size:.0e} samples, {unit}", columns, rows)
 
 
 def sensitivities(samples: int) -> Figures:

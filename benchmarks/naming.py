@@ -1,7 +1,7 @@
 """Naming benchmark: does the gap finder name what is hidden, and only that?
 
 Prints every case as it ends, then the confusion matrix, the figures of every group, the gaps and the time; writes all
-to a JSON file after every case, so that a campaign that was stopped is not lost.
+to a JSON file after every case, so that a run that was stopped is not lost.
 
     python -m benchmarks.naming --quick
     python -m benchmarks.naming --seeds 5 --jobs 2 --json naming.json
@@ -164,7 +164,7 @@ def gaps(outcomes: list[Outcome]) -> Table:
 
 
 def main() -> None:
-    """Run the campaign and print its tables."""
+    """Run the benchmark and print its tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=5, help="seeds of every effect; other groups in proportion")
     parser.add_argument("--quick", action="store_true", help="one seed at the middle noise")
@@ -182,7 +182,7 @@ def main() -> None:
     for k, (case, found) in enumerate(zip(wanted, answers, strict=True), 1):
         try:
             outcome = found.result()
-        except Exception as error:  # a crash is counted, and the campaign goes on
+        except Exception as error:  # a crash is counted, and the benchmark goes on
             console.print(f"{k}/{len(wanted)} {case.label} seed {case.seed}: [red]{error!r}")
             crashes += 1
             continue

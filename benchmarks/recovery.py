@@ -1,4 +1,4 @@
-"""Recovery campaign: does identification return the published model from its own data?
+"""Recovery benchmark: does identification return the published model from its own data?
 
 Data by Eq. (5) to (7) at 20 µs with the published coefficients, v = V/10, white noise of 0.05 % of the full stroke.
 Beside the joint identification stands what the plain published three steps reach: driven by noise, the hysteresis
@@ -125,7 +125,7 @@ def coverage(results: list[Recovery]) -> float:
 
 
 def figures(results: list[Recovery]) -> Figures:
-    """The campaign in figures: joint identification beside the plain published steps, and the target."""
+    """The benchmark in figures: joint identification beside the plain published steps, and the target."""
     worst = np.max(np.abs([r.parameters for r in results]), axis=0)
     plain = np.max(np.abs([r.published_parameters for r in results]), axis=0)
     exact = sum(r.delay == plant.DELAY for r in results)
@@ -152,7 +152,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
-    """Run the campaign."""
+    """Run the benchmark."""
     with ProcessPoolExecutor(options.jobs) as pool:
         return [figures(list(pool.map(recover, range(options.seeds))))]
 

@@ -167,9 +167,9 @@ class Soak:
         counts = self.keeper.counts
         unaccounted = applied - counts["samples received"] - counts[LOST] - counts[BEFORE]
         if abs(unaccounted) > ALLOWED * self.soaked.starts["driver_node"]:
-            self.keeper.break_promise(f"{unaccounted} samples neither received nor told lost")
+            self.keeper.break_promise(f"{unaccounted} samples neither received nor reported lost")
         rows: list[tuple[Cell, ...]] = [("voltages given to the stage", applied), ("outside limits or slew", outside)]
-        rows += [("given, neither received nor told lost: the last blocks of killed drivers", unaccounted)]
+        rows += [("given, neither received nor reported lost: the last blocks of killed drivers", unaccounted)]
         rows += [(name, counts[name]) for name in sorted(counts) if name != "promises broken"]
         rows += [(f"fault: {name}", self.struck[name]) for name in FAULTS]
         rows += [("slowest recovery, s", self.slowest)]

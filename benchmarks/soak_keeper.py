@@ -26,8 +26,8 @@ from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, samples_f
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS
 from piezo_hysteresis.recording import Bag
 
-LOST = "samples lost on the way to the keeper, told by the index"
-BEFORE = "samples before the keeper had found the driver, told by the index"
+LOST = "samples lost on the way to the keeper, according to the index"
+BEFORE = "samples before the keeper had found the driver, according to the index"
 DEEP = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
 
 
@@ -87,7 +87,7 @@ class Keeper:
         return self._publishers[name]
 
     def fate(self, name: str) -> str:
-        """State of a command; empty before the driver told one."""
+        """State of a command; empty before the driver reported one."""
         return self.state.get(name, ("", 0))[0]
 
     def break_promise(self, what: str) -> None:
@@ -115,27 +115,27 @@ class Keeper:
 
     def _compare(self, block: SampleBlock, number: int) -> None:
         """A sample of a command against what was commanded."""
-        told = self._commands.get(number)
-        if told is None:
+        values = self._commands.get(number)
+        if values is None:
             return
         inside = block.phase == number
         at = block.index[inside].astype(np.int64) - self._firsts[number]
-        if (at < 0).any() or (at >= told.size).any():
+        if (at < 0).any() or (at >= values.size).any():
             self.break_promise(f"phase {number} has samples outside its command")
             return
-        wrong = np.abs(block.voltage[inside] - told[at]) > self._tolerance
+        wrong = np.abs(block.voltage[inside] - values[at]) > self._tolerance
         self.counts["samples of commands compared"] += int(inside.sum())
         if wrong.any():
             self.break_promise(f"phase {number}: {int(wrong.sum())} samples were not played as commanded")
 
     def _on_status(self, status: DiagnosticStatus) -> None:
-        told = values_of(status)
-        self.state[status.name] = (told["state"], int(told.get("first_index") or 0))
-        self.counts[f"commands {told['state']}"] += 1
-        if told["state"] == "playing" and status.name in self._waveforms:
+        values = values_of(status)
+        self.state[status.name] = (values["state"], int(values.get("first_index") or 0))
+        self.counts[f"commands {values['state']}"] += 1
+        if values["state"] == "playing" and status.name in self._waveforms:
             with self._access:
-                self._commands[int(told["phase"])] = self._waveforms[status.name]
-                self._firsts[int(told["phase"])] = int(told["first_index"])
+                self._commands[int(values["phase"])] = self._waveforms[status.name]
+                self._firsts[int(values["phase"])] = int(values["first_index"])
 
     def _on_predicted(self, cloud: PointCloud2) -> None:
         columns = from_cloud(cloud, PREDICTED_SAMPLES)
@@ -151,7 +151,7 @@ class Keeper:
 
     def missing(self, bag: Path, killed: float) -> int:
         """Blocks that a recorder had recorded a second before it was `killed` [s] and that are not in its bag."""
-        rows = np.fromfile(f"{bag}.told").reshape(-1, 2)
+        rows = np.fromfile(f"{bag}.progress").reshape(-1, 2)
         before = rows[rows[:, 0] <= killed - 1.0, 1]
         held = sum(1 for _ in Bag(bag).messages({f"{NAMESPACE}/samples"}))
         self.counts["blocks recorded by recorders that were killed"] += held

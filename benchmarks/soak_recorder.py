@@ -1,6 +1,6 @@
 """A recorder of its own process, so that it can be killed: every topic of the axis into the bag given.
 
-Twenty times a second it notes in BAG.told, unbuffered, the time and how many blocks of samples it has recorded.
+Twenty times a second it notes in BAG.progress, unbuffered, the time and how many blocks of samples it has recorded.
 
 python -m benchmarks.soak_recorder BAG --ros-args …
 """
@@ -24,11 +24,11 @@ class Recorder(GuardedNode):
     def __init__(self) -> None:
         super().__init__("recorder")
         self.bag = BagRecorder(self, Path(sys.argv[1]))
-        self._told = Path(sys.argv[1] + ".told").open("wb", buffering=0)  # noqa: SIM115
-        self.create_timer(0.05, self._tell)
+        self._log = Path(sys.argv[1] + ".progress").open("wb", buffering=0)  # noqa: SIM115
+        self.create_timer(0.05, self._note)
 
-    def _tell(self) -> None:
-        self._told.write(np.array([time.monotonic(), self.bag.counts["samples"]]).tobytes())
+    def _note(self) -> None:
+        self._log.write(np.array([time.monotonic(), self.bag.counts["samples"]]).tobytes())
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import numpy as np
 import piezo_hysteresis
 
 STEP = 20.0 / 2**16
-"""Of the converter of the simulated stage [V]: what it applies is rounded, and so is the voltage it tells."""
+"""Step of the converter of the simulated stage [V]. The applied and the reported voltage are rounded to it."""
 
 
 class StageLog:

@@ -145,12 +145,12 @@ def run(options: argparse.Namespace) -> list[Figures]:
     for module in IMPORTS:
         row(f"import {module}", [import_time(module) for _ in range(options.repeats)])
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    told = (
+    labels = (
         "model node subscribes after its start",
         "first block after the driver's start",
         "first prediction after the last sample of its block",
     )
-    for what, times in zip(told, zip(*repeated(node_times, options.repeats), strict=True), strict=True):
+    for what, times in zip(labels, zip(*repeated(node_times, options.repeats), strict=True), strict=True):
         row(what, list(times))
     row("both started at once, first prediction heard", repeated(meeting_time, options.repeats))
     os.environ.setdefault("FASTDDS_DEFAULT_PROFILES_FILE", str(LARGE_BLOCKS))

@@ -62,12 +62,12 @@ class StreamRecorder:
         self.bag = BagRecorder(self._node, folder, topics)
 
     def _on_status(self, status: DiagnosticStatus) -> None:
-        told = values_of(status)
-        if told["state"] == "playing":
+        values = values_of(status)
+        if values["state"] == "playing":
             self.begun += 1
-        elif told["state"] == "done":
-            self.played.append(int(told["first_index"]))
-        elif told["state"] in ENDED:
+        elif values["state"] == "done":
+            self.played.append(int(values["first_index"]))
+        elif values["state"] in ENDED:
             self._failure = f"the driver did not play {status.name}: {status.message}"
 
     def wait(self, done: Callable[[], bool], what: str, timeout: float = PATIENCE) -> None:

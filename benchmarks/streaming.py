@@ -128,7 +128,7 @@ def stream(
         "CPU of all, % of a core": sum(shares),
         **{f"memory of {name}, MB": size for name, size in zip(names, sizes, strict=True)},
     }
-    return figures, [f"{rate / 1e3:g} kHz: {failure}" for _, told in counted for failure in told]
+    return figures, [f"{rate / 1e3:g} kHz: {failure}" for _, failures in counted for failure in failures]
 
 
 def _over_axes(name: str, values: list[Cell]) -> Cell:

@@ -46,15 +46,15 @@ deadline = time.monotonic() + DISCOVERY
 while time.monotonic() < deadline and not all(p.get_subscription_count() for p in publishers.values()):
     time.sleep(0.05)
 
-began, first, told = time.monotonic(), None, 0
+began, first, published = time.monotonic(), None, 0
 for message in bag.in_time_order(options.topics):
     first = first or message.time_ns
     due = began + (message.time_ns - first) * 1e-9 / options.rate
     time.sleep(max(0.0, due - time.monotonic()))
-    if message.time_ns - told >= CLOCK_STEP * 1e9:
-        told = message.time_ns
+    if message.time_ns - published >= CLOCK_STEP * 1e9:
+        published = message.time_ns
         now = Clock()
-        now.clock.sec, now.clock.nanosec = divmod(told, 1_000_000_000)
+        now.clock.sec, now.clock.nanosec = divmod(published, 1_000_000_000)
         clock.publish(now)
     publishers[message.topic].publish(message.raw)
 for one in publishers.values():

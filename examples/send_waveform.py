@@ -33,7 +33,7 @@ waveform.header.stamp = node.get_clock().now().to_msg()  # an old command is ref
 finished = Future()
 
 
-def told(status: DiagnosticStatus) -> None:
+def on_status(status: DiagnosticStatus) -> None:
     """Print what the driver says about our waveform."""
     state = {value.key: value.value for value in status.values}["state"]
     if status.name == "my_sine":
@@ -43,7 +43,7 @@ def told(status: DiagnosticStatus) -> None:
 
 
 latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-node.create_subscription(DiagnosticStatus, "command_status", told, latched)
+node.create_subscription(DiagnosticStatus, "command_status", on_status, latched)
 publisher.publish(waveform)
 publisher.wait_for_all_acked(Duration(seconds=5.0))
 rclpy.spin_until_future_complete(node, finished, timeout_sec=30.0)

@@ -22,7 +22,7 @@ _NAME = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 
 
 def are_finite(samples: Samples) -> bool:
-    """Whether every sample, of at least one, is; the sum of squares tells at once, unless it is too large itself."""
+    """Whether all samples are finite. The sum of squares is a fast test; if it overflows, every sample is tested."""
     return math.isfinite(ddot(samples, samples)) or bool(np.isfinite(samples).all())
 
 

@@ -69,7 +69,7 @@ def packed(columns: Mapping[str, ArrayLike], layout: Mapping[str, str]) -> NDArr
     Parameters
     ----------
     columns : mapping of str to (n,) array_like
-        Values by field name; the first one tells how many there are.
+        Values by field name; the length of the first one is their number.
     layout : mapping of str to str
         Field names in the order of the point, with their numpy types; float64 first keeps numpy's views aligned.
 

@@ -188,7 +188,7 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """One finding about the quality of data: told, never silently mended.
+    """One finding about the quality of data. It is reported; the data are never changed silently.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Two processes share the tests; all that start nodes go to one of them, and these the other core.
 
-Tests of real processes over DDS need the processor in time. One that fails is tried once more, and told as RERUN: a
+Tests of real processes over DDS need the processor in time. One that fails is tried once more, and reported as RERUN: a
 promise that does not hold fails twice, a computer that was busy elsewhere does not. Nor does it fail a property: no
 example has a deadline.
 """

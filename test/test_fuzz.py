@@ -38,9 +38,9 @@ def or_refused(function, *arguments):
     try:
         return function(*arguments)
     except PiezoError as error:
-        told = str(error)
-    assert "\n" not in told
-    assert len(told) < 6000
+        message = str(error)
+    assert "\n" not in message
+    assert len(message) < 6000
     return None
 
 

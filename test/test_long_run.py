@@ -67,18 +67,18 @@ def test_a_day_of_predictions_is_exact_and_memory_stays_flat(period):
     finally:
         tracemalloc.stop()
     assert worst < 1e-15
-    assert predictor.continuity.received == round(DAY / period) // size * size
-    assert predictor.continuity.lost == 0
+    assert predictor.sequence.received == round(DAY / period) // size * size
+    assert predictor.sequence.lost == 0
     half = len(sizes) // 2  # by then the history of the drive is as long as it gets
     assert max(sizes[half:]) < 1.05 * max(sizes[:half])
 
 
 @given(st.integers(10**9, 2**38), st.integers(1, 5000), st.integers(0, 10**6))
 def test_a_thousand_million_samples_are_counted_to_the_last(count, size, lost):
-    continuity, clock = SequenceCheck(2e-5), TimeBase(2e-5)
+    sequence, clock = SequenceCheck(2e-5), TimeBase(2e-5)
     clock.anchor(0, 0.0, 0)
     for first in (count, count + size + lost):
-        arrival = continuity.join(first % 2**32, clock.stamp(first), size)
+        arrival = sequence.join(first % 2**32, clock.stamp(first), size)
     assert (arrival.missing, arrival.repeated, arrival.restarted) == (lost, 0, False)
     assert clock.stamp(count + 1) - clock.stamp(count) == pytest.approx(20_000, abs=2)
 

@@ -18,7 +18,7 @@ U, Y = np.linspace(0.0, 5.0, 12), np.linspace(0.0, 1e-5, 12)
 
 
 @pytest.mark.parametrize(
-    ("make", "told"),
+    ("make", "message"),
     [
         (lambda: Record([], [], 1e-3), "voltage.*sample"),
         (lambda: Record([0.0, np.nan], [0.0, 0.0], 1e-3), "voltage: sample 1 is nan, expected finite"),
@@ -35,8 +35,8 @@ U, Y = np.linspace(0.0, 5.0, 12), np.linspace(0.0, 1e-5, 12)
         (lambda: Experiment((), "bag"), "'bag' holds no record"),
     ],
 )
-def test_what_is_no_measurement_is_refused_in_one_line(make, told):
-    with pytest.raises(RecordError, match=told) as error:
+def test_what_is_no_measurement_is_refused_in_one_line(make, message):
+    with pytest.raises(RecordError, match=message) as error:
         make()
     assert "\n" not in str(error.value)
     assert isinstance(error.value, ValueError)

@@ -34,7 +34,7 @@ ROOT = Path(__file__).parents[2]
 NAMESPACE = "/demo"
 LIMITS = DriveLimits()
 PATIENCE = 600.0
-"""Longest wait for a campaign or a fit [s]."""
+"""Longest wait for a protocol or a fit [s]."""
 signalled: list[int] = []
 """Signals that asked the demo to end."""
 
@@ -99,25 +99,25 @@ class Demo:
         if not answer.success:
             raise RuntimeError(f"{service}: {answer.message}")
         columns = (TextColumn("          {task.description:44.44s}"), BarColumn(24), TimeElapsedColumn())
-        told: dict[str, str] = {}
+        values: dict[str, str] = {}
 
         def finished() -> bool:
-            nonlocal told
-            told = {} if bench.status is None else values_of(bench.status)
-            return told.get("state") in ("done", "failed", "aborted")
+            nonlocal values
+            values = {} if bench.status is None else values_of(bench.status)
+            return values.get("state") in ("done", "failed", "aborted")
 
         bench.status = None
         with Progress(*columns, console=self.console, transient=True) as shown:
             task = shown.add_task(service, total=100.0)
             for _ in bench.until(finished, service, PATIENCE):
                 if bench.status is not None:
-                    doing = told.get("phase") or bench.status.message
-                    percent = float(told.get("percent", 0))
-                    shown.update(task, description=f"{told.get('state')}: {doing}", completed=percent)
+                    doing = values.get("phase") or bench.status.message
+                    percent = float(values.get("percent", 0))
+                    shown.update(task, description=f"{values.get('state')}: {doing}", completed=percent)
         assert bench.status is not None
-        if told["state"] != "done":
-            raise RuntimeError(f"{service} {told['state']}: {bench.status.message}")
-        return {**told, "verdict": bench.status.message}
+        if values["state"] != "done":
+            raise RuntimeError(f"{service} {values['state']}: {bench.status.message}")
+        return {**values, "verdict": bench.status.message}
 
     def run(self, bench: Bench) -> Path:
         """From the published numbers to the verdict; returns the path of the experiment."""
@@ -125,14 +125,14 @@ class Demo:
         self.say(f"plan: {self.plan(bench)}")
 
         count = len(bench.models)
-        told = self.run_job(bench, "identify")
-        experiment = Path(told["experiment"])
-        self.say(f"identified: {told['verdict']}; recorded in {os.path.relpath(experiment)}")
+        values = self.run_job(bench, "identify")
+        experiment = Path(values["experiment"])
+        self.say(f"identified: {values['verdict']}; recorded in {os.path.relpath(experiment)}")
         self.look(bench, "identified", bench.new_model(count))
 
         count = len(bench.models)
-        told = self.run_job(bench, "diagnose")
-        self.verdict = told["verdict"]
+        values = self.run_job(bench, "diagnose")
+        self.verdict = values["verdict"]
         self.say(f"[bold]verdict: {self.verdict}[/bold]")
         self.look(bench, "extended", bench.new_model(count))
         return experiment
@@ -182,7 +182,7 @@ def main() -> int:
     subprocess.run([*hide, *(["--name", arguments.effect] if arguments.effect else [])], check=True)
 
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    for ending in (signal.SIGINT, signal.SIGTERM):  # also where a shell has told it to ignore them
+    for ending in (signal.SIGINT, signal.SIGTERM):  # also if a shell has made the process ignore them
         signal.signal(ending, interrupt)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     demo = Demo(folder)

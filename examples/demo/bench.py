@@ -162,10 +162,10 @@ class Bench:
         stamp = self.node.get_clock().now().to_msg()
         self._command.publish(command_to_cloud(voltage, self._sample_period, name, stamp))
         self.wait(lambda: name in self._ended, f"end of '{name}'", timeout)
-        told = values_of(self._ended[name])
-        if told["state"] != "done":
-            raise RuntimeError(f"the driver did not play '{name}': {told['state']}, {self._ended[name].message}")
-        first = int(told["first_index"])
+        values = values_of(self._ended[name])
+        if values["state"] != "done":
+            raise RuntimeError(f"the driver did not play '{name}': {values['state']}, {self._ended[name].message}")
+        first = int(values["first_index"])
         last = (first + voltage.size - 1) % 2**32
         self.wait(lambda: self._seen(last), "the prediction of the last sample", 30.0)
         index, residual = (np.concatenate(column) for column in zip(*self._blocks, strict=True))

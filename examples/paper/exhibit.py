@@ -14,7 +14,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-# Okabe and Ito's palette: told apart by colour-blind readers, and in grey
+# Okabe and Ito's palette: distinguished by colour-blind readers, and in grey
 MEASURED, DYNAMIC, STATIC, THIRD = "#000000", "#0072B2", "#D55E00", "#009E73"
 
 

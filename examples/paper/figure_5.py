@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 import published
-from campaign import experiment, plant, published_steps
 from exhibit import DYNAMIC, MEASURED, STATIC, Exhibit, canvas, main
+from two_stages import experiment, plant, published_steps
 
 from piezo_hysteresis.identification.steps.frequency_response import welch
 from piezo_hysteresis.identification.steps.three_steps import voltage_signals

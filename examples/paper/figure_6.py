@@ -7,8 +7,8 @@ fitted down to its noise; a Prandtl-Ishlinskii one, which Bouc-Wen can only appr
 from __future__ import annotations
 
 import published
-from campaign import OPERATORS, TITLES, experiment, published_steps
 from exhibit import MEASURED, STATIC, Exhibit, canvas, main
+from two_stages import OPERATORS, TITLES, experiment, published_steps
 
 
 def figure_6() -> Exhibit:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 import published
-from campaign import joint, last_period, plant, published_steps
 from exhibit import DYNAMIC, Exhibit, canvas, main
+from two_stages import joint, last_period, plant, published_steps
 from validation import draw_loops, error_row, sine
 
 

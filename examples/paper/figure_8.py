@@ -7,9 +7,9 @@ the error is the row that the published coefficients predict (table_1.py).
 from __future__ import annotations
 
 import published
-from campaign import alone, joint
 from exhibit import STATIC, Exhibit, canvas, main
 from table_1 import lag_error
+from two_stages import alone, joint
 from validation import draw_loops
 
 

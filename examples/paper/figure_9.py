@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import published
-from campaign import alone, experiment, joint, last_period
 from exhibit import DYNAMIC, MEASURED, STATIC, Exhibit, canvas, main
+from two_stages import alone, experiment, joint, last_period
 
 
 def figure_9() -> Exhibit:

@@ -8,8 +8,8 @@ the lag of G in both.
 from __future__ import annotations
 
 import published
-from campaign import OPERATORS, TITLES, alone, experiment, joint
 from exhibit import DYNAMIC, STATIC, Exhibit, canvas, main
+from two_stages import OPERATORS, TITLES, alone, experiment, joint
 
 from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.model.model import Model

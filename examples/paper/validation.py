@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import published
-from campaign import experiment, last_period
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
+from two_stages import experiment, last_period
 
 from piezo_hysteresis import Model, Record
 

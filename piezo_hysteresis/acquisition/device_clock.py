@@ -7,14 +7,14 @@ import math
 from .time_base import TimeBase
 
 _WINDOW = 100
-"""Blocks of which the earliest tells whether the clock of the device has to be moved."""
+"""Number of blocks among which the least delayed one shows the difference of the clocks."""
 
 
 class DeviceClock:
     """Follows the clock of a device by the times at which its blocks come.
 
     Two quartz clocks part by some 50 µs per second. A block never comes before its last sample was taken, and mostly a
-    little later: of many blocks the least late one tells how far the clocks have parted.
+    little later: of many blocks, the least delayed one shows how far the clocks differ.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ Samples = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """A numbered stretch of the stream: the label of its samples.
+    """A numbered section of the stream: the label of its samples.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Event:
     """A phase began, was played to its end, or was stopped, before sample `offset` of the block."""
 
     offset: int
-    happening: EventKind
+    kind: EventKind
     phase: Phase
 
 

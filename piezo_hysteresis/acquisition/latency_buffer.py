@@ -27,7 +27,7 @@ class LatencyBuffer:
 
     @property
     def is_empty(self) -> bool:
-        """True when nothing that happened is still to be told."""
+        """True when nothing that happened is still to be reported."""
         return not self._events
 
     def follow(self, drive: Drive) -> Drive:

@@ -17,7 +17,7 @@ class MemoryAcquisition(StreamingAcquisition):
     """As `StreamingAcquisition`, for a `MemoryStage`.
 
     Waveforms and ramps are uploaded in blocks as long as the memory; while a voltage is held, single samples are read
-    on the slow path. The index follows the clock: time in which nothing was measured is a jump of the index, told by
+    on the slow path. The index follows the clock: time in which nothing was measured is a jump of the index, marked by
     `SampleBlock.follows_gap`.
 
     Parameters
@@ -68,7 +68,7 @@ class MemoryAcquisition(StreamingAcquisition):
                 return
             playback.pass_unseen(first - self.index)
             drive = playback.take(1)
-        self._tell(first, drive, Acquired(np.array([voltage]), np.array([displacement])))
+        self._pass_on(first, drive, Acquired(np.array([voltage]), np.array([displacement])))
 
     def _play(self, playback: Playback, count: int) -> None:
         """One block from upload to read-out; a stop is noticed between any two messages to the device."""
@@ -97,7 +97,7 @@ class MemoryAcquisition(StreamingAcquisition):
         if drive is None:
             self._break_off(playback)
         else:
-            self._tell(first, drive, acquired)
+            self._pass_on(first, drive, acquired)
 
     def _break_off(self, playback: Playback) -> None:
         """The device goes to its safe voltage by itself; what it measured on the way is not known."""

@@ -90,9 +90,9 @@ def _played(
         if inside.size:
             blocks.append(delivery.block.between(int(inside[0]), int(inside[-1]) + 1))
         for event in delivery.events:
-            if event.phase.number == phase.number and event.happening is EventKind.DONE:
+            if event.phase.number == phase.number and event.kind is EventKind.DONE:
                 return blocks
-            if event.phase.number == phase.number and event.happening is EventKind.STOPPED:
+            if event.phase.number == phase.number and event.kind is EventKind.STOPPED:
                 raise StageError(f"phase '{name}' was stopped; nothing was recorded")
 
 

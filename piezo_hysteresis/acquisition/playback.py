@@ -128,10 +128,10 @@ class Playback:
             events += [Event(at, *event) for event in self._events]
             self._events.clear()
             number = self.phase.number
-            stretch = self._advance(count - at)
-            voltage[at : at + stretch.size] = stretch
-            phase[at : at + stretch.size] = number
-            at += stretch.size
+            part = self._advance(count - at)
+            voltage[at : at + part.size] = part
+            phase[at : at + part.size] = number
+            at += part.size
         events += [Event(count, *event) for event in self._events if event[0] is not EventKind.BEGAN]
         self._events = [event for event in self._events if event[0] is EventKind.BEGAN]
         return Drive(voltage, phase, tuple(events))
@@ -139,29 +139,29 @@ class Playback:
     def _advance(self, count: int) -> Samples:
         """Samples of what is under way, at least one and at most `count`, and what comes after them."""
         if self._waveform is not None:
-            stretch = self._waveform[self._played : self._played + count]
-            self._played += stretch.size
-            self.voltage = float(stretch[-1])
+            part = self._waveform[self._played : self._played + count]
+            self._played += part.size
+            self.voltage = float(part[-1])
             if self._played == self._waveform.size:
                 self._waveform = None
                 self._events.append((EventKind.DONE, self.phase))
                 self._hold()
-            return stretch
+            return part
         if self.pending:
             steps = np.arange(1, min(count, self.pending) + 1)
             ramp = self.voltage + math.copysign(self._step, self._target - self.voltage) * steps
-            stretch = np.clip(ramp, min(self.voltage, self._target), max(self.voltage, self._target))
-            self.voltage, self._held = float(stretch[-1]), 0
+            part = np.clip(ramp, min(self.voltage, self._target), max(self.voltage, self._target))
+            self.voltage, self._held = float(part[-1]), 0
             if not self.pending:
-                self.voltage = stretch[-1] = self._target
+                self.voltage = part[-1] = self._target
                 self._stopping = False
-            return stretch
+            return part
         self.voltage, self._stopping = self._target, False
-        stretch = np.full(min(count, self._hold_limit - self._held), self.voltage)
-        self._held += stretch.size
+        part = np.full(min(count, self._hold_limit - self._held), self.voltage)
+        self._held += part.size
         if self._held == self._hold_limit:
             self._held, self._target = 0, self._safe_voltage
-        return stretch
+        return part
 
     def _hold(self) -> None:
         self._target, self._held = self.voltage, 0

@@ -32,8 +32,8 @@ class SampleBlock:
     stage : str
         Name of the stage.
     follows_gap : bool
-        True where samples before the block were never measured (a device reading out its memory), as told by the
-        index; False where a jump of the index means lost messages.
+        True where samples before the block were never measured (a device reading out its memory), as the jump of the
+        index shows; False where a jump of the index means lost messages.
     """
 
     stamp: int

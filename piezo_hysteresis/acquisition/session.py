@@ -157,7 +157,7 @@ class DriverSession:
         Raises
         ------
         StageError
-            If the ramp was not finished in time; the stage has then been told to go there by itself.
+            If the ramp was not finished in time; the stage has then been asked to go there by itself.
         """
         acquisition, self._acquisition = self._acquisition, None
         if acquisition is None:

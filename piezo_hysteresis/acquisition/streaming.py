@@ -155,13 +155,13 @@ class StreamingAcquisition:
             return self.playback.stop(), was_playing
 
     def make_safe(self, timeout: float) -> bool:
-        """Stop, wait until the stage rests at the safe voltage and has told so, and end the thread.
+        """Stop, wait until the stage rests at the safe voltage and has reported it, and end the thread.
 
         Returns
         -------
         bool
             False where the stage was not there within `timeout` [s]. True also for a thread that had failed: it has
-            made the stage safe, or told that it could not.
+            made the stage safe, or reported that it could not.
         """
         if not self._thread.is_alive():
             return True
@@ -204,7 +204,7 @@ class StreamingAcquisition:
         acquired = stage.exchange(drive.voltage)
         if self._device_clock is not None:
             self._follow(self._device_clock)
-        self._tell(self.index, self._late.follow(drive), acquired)
+        self._pass_on(self.index, self._late.follow(drive), acquired)
 
     def _keep_pace(self) -> bool:
         """Wait until the next block is due; False where the thread has to end first."""
@@ -229,7 +229,7 @@ class StreamingAcquisition:
         """False where the thread has to end first."""
         return not self._halting.wait(max(steady - time.monotonic(), 0.0))
 
-    def _tell(self, first: int, drive: Drive, acquired: Acquired) -> None:
+    def _pass_on(self, first: int, drive: Drive, acquired: Acquired) -> None:
         """Deliver samples that begin at index `first`; what lies before them was never measured."""
         self.tally.clock_jumps += abs(self._time_base.follow(first, *read_together(self._node_clock)))
         count = acquired.voltage.size

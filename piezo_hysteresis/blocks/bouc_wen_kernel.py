@@ -29,7 +29,7 @@ H_REFERENCE = 0.2
 SUB_STEP = 0.01
 """Longest step of v for n ≠ 1 [1]."""
 JUMP = 0.05
-"""Change of v in one sample beyond which a slow record holds a jump: how fast, the model's own period tells."""
+"""Change of v in one sample beyond which a slow record holds a jump; the jump takes one sample period of the model."""
 SLOWEST = 1e-4
 """Rates below this (normalised units per second) count as this, so that the rate law stays finite."""
 

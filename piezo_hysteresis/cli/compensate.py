@@ -22,7 +22,7 @@ from ..report.tables.table import Table
 from .terminal import console, show
 
 MOST_PARTS = 3
-"""Parts of a path that are told one by one."""
+"""Parts of a path that are reported one by one."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         server = DaqmxServer(Card(stage, faults=[NI_FAULTS.parse(text) for text in args.fault]), args.host, port)
     ended = threading.Event()
-    for ending in (signal.SIGINT, signal.SIGTERM):  # also where a shell has told it to ignore them
+    for ending in (signal.SIGINT, signal.SIGTERM):  # also if a shell has made the process ignore them
         signal.signal(ending, lambda *_: ended.set())
     d = stage.description
     with server:

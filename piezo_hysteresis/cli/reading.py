@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         help="one or several recordings: bag, folder of .npz, .csv, .mat, …",
     )
-    group = parser.add_argument_group("options for reading, if the recording lacks the information")
+    group = parser.add_argument_group("options for reading, if the recording does not contain the information")
     group.add_argument(
         "--format",
         choices=tuple(recording.FORMATS),

@@ -54,14 +54,14 @@ def run(args: argparse.Namespace) -> int:
         console().print(f"{session.limits.name}\n{args.protocol}: {protocol.summary}")
         played = 0.0
         durations = iter([phase.duration for phase in protocol])
-        with progress("record") as tell:
+        with progress("record") as show:
 
-            def told(name: str) -> None:
+            def phase_begins(name: str) -> None:
                 nonlocal played
-                tell(name, played / protocol.summary.duration)
+                show(name, played / protocol.summary.duration)
                 played += next(durations)
 
-            records = record_phases(session, ((p.name, p.voltage, p.stored_every) for p in protocol), told)
+            records = record_phases(session, ((p.name, p.voltage, p.stored_every) for p in protocol), phase_begins)
     finally:
         session.close()
     recording.write(Experiment(records), args.output)

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class UnreachablePart:
-    """A stretch of a path that the limits of the drive do not allow.
+    """A part of a path that the limits of the drive do not allow.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ def diagnose(
     ModelError
         If the records are faster than the model.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # trials that run away are told by their cost
+    with np.errstate(over="ignore", invalid="ignore"):  # diverging trials show in their cost
         return _diagnosed(experiment, model, effects, progress or (lambda word, fraction: None))
 
 
@@ -90,7 +90,10 @@ def _diagnosed(
     progress: Progress,
     known: Selection | None = None,
 ) -> Diagnosis:
-    """The diagnosis; `known` is a search whose model tells what slow samples have lost better than its baseline."""
+    """The diagnosis; `known` is an earlier search.
+
+    Its model corrects averaged samples better than the baseline does.
+    """
     noise_of_drive = voltage_noise(experiment.records)
     if noise_of_drive.any():
         experiment = _quieted(experiment, noise_of_drive)

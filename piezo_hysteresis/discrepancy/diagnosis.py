@@ -52,7 +52,7 @@ class Diagnosis:
     next_experiment : NextExperiment or None
         What would separate explanations that the data could not.
     experiment : Experiment
-        As it was compared: a voltage that was measured is followed but for its noise. Its notices tell the quality of
+        As it was compared: the noise of a measured voltage is removed first. Its notices describe the quality of
         the data, and what they cannot show.
     change : ParameterChange or None
         The parameter of a given model that has changed, where that explains the records.

@@ -22,7 +22,7 @@ from .search.training_data import TrainingData
 Array = NDArray[np.float64]
 
 PIECES = 16.0
-"""Independent pieces of the structured misfit in one record, so that a longer record tells no more about a parameter.
+"""Independent pieces of the structured misfit in one record, so that a longer record narrows no interval further.
 
 Chosen by the coverage of intervals on stages of other form (`python -m benchmarks.coverage`)."""
 

@@ -88,7 +88,7 @@ FINER_FORMS: tuple[type[Effect], ...] = (LevelDependentMemory, CreepTwoRates)
 """Finer forms of effects that an identified model may hold; a search names the effect, not its form."""
 
 CATALOGUE: tuple[type[Effect], ...] = tuple(e for e in CHAIN if e not in (*BASELINE, *FINER_FORMS))
-"""The effects that a Hammerstein-MBW model can lack."""
+"""The effects that can be added to a Hammerstein-MBW model."""
 
 BY_NAME: dict[str, type[Effect]] = {e.name: e for e in CHAIN}
 """Every effect by its identifier."""

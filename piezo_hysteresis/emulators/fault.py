@@ -40,7 +40,8 @@ class FaultCatalogue:
     Parameters
     ----------
     once : mapping of str to (str, str)
-        Faults that strike once: word -> (``COMMAND[:occurrence]`` they strike at unless told otherwise, what happens).
+        Faults that strike once: word -> (``COMMAND[:occurrence]`` they strike at unless stated otherwise, what
+        happens).
     lasting : mapping of str to str
         Faults that last, from the start or from a command on: word -> what happens.
     values : mapping of str to float
@@ -82,7 +83,7 @@ class FaultCatalogue:
 
 
 class Faults:
-    """Faults in motion: counts commands and tells what strikes.
+    """Active faults: counts the commands and returns the fault that occurs at each.
 
     Parameters
     ----------

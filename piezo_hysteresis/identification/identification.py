@@ -18,7 +18,7 @@ from .steps.dynamics import Dynamics, OrderError
 from .steps.three_steps import ThreeSteps
 
 CORRELATED = 0.95
-"""Correlation from which two numbers are told to be hard to separate."""
+"""Correlation from which two numbers are reported to be hard to separate."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -174,11 +174,11 @@ class Chain:
         if self._inner.stop < len(self.blocks):
             inputs[-1] = float(y[-1])
         if not hand_out(y, self._factor_out, RUNAWAY * self.setting.displacement_scale):
-            self._tell_divergence(u, state, channels, first)
+            self._report_divergence(u, state, channels, first)
         time = state.time + u.size * self.setting.sample_period
         return ChainState(tuple(states), tuple(inputs), time)
 
-    def _tell_divergence(self, u: Array, state: ChainState, channels: Channels, first: int) -> None:
+    def _report_divergence(self, u: Array, state: ChainState, channels: Channels, first: int) -> None:
         x = u
         for label, block, s in zip(self.labels, self.blocks, state.blocks, strict=True):
             if isinstance(block, ChannelBlock):

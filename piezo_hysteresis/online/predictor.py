@@ -52,7 +52,7 @@ class Predictor:
         Model in force.
     chain, state : Chain, ChainState or None
         Its coefficients, and its state after the newest sample.
-    continuity : SequenceCheck
+    sequence : SequenceCheck
         Counts of received, lost and repeated samples.
 
     Notes
@@ -83,7 +83,7 @@ class Predictor:
                 f"sample period: got {sample_period:g} s, expected {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
             )
         self.sample_period = sample_period
-        self.continuity = SequenceCheck(sample_period)
+        self.sequence = SequenceCheck(sample_period)
         self.model: Model | None = None
         self.chain: Chain | None = None
         self._warmup: Warmup | None = None
@@ -161,7 +161,7 @@ class Predictor:
         index : int
             Running index of the first sample, modulo 2³².
         stamp : int
-            Its time [ns]; tells a new start of the driver from a late block.
+            Its time [ns]; distinguishes a restart of the driver from a late block.
         voltage : (n,) array_like
             Drive voltage [V].
         displacement : (n,) array_like
@@ -185,7 +185,7 @@ class Predictor:
         drive, measured = samples(voltage, "voltage"), samples(displacement, "displacement")
         if drive.size != measured.size:
             raise RecordError(f"displacement: got {measured.size} samples, expected {drive.size} as in voltage")
-        arrival = self.continuity.join(index, stamp, drive.size, follows_gap)
+        arrival = self.sequence.join(index, stamp, drive.size, follows_gap)
         drive, measured = drive[arrival.repeated :], measured[arrival.repeated :]
         modelled: Array | None = None
         if drive.size:

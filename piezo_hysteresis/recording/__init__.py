@@ -101,7 +101,7 @@ def read(
     Returns
     -------
     Experiment
-        In SI units; `notices` tell what was found in the data and what was done about it.
+        In SI units; `notices` list what was found in the data and what was done about it.
 
     Raises
     ------

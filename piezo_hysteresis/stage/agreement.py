@@ -24,7 +24,7 @@ class Agreement:
     settling_samples : int
         Samples within which the voltage follows a step.
     displacement_min, displacement_max : float
-        Range of the sensor [m]: on its ends it may stand still, which readers of a recording tell as clipped.
+        Range of the sensor [m]: at its ends the signal may stand still, which readers of a recording report as clipped.
     """
 
     def __init__(

@@ -19,7 +19,7 @@ def test_phases_and_events_are_those_of_the_stream_so_much_later(latency, sizes,
     events = [(m, Event(m, EventKind.BEGAN, Phase(m, "p"))) for m in sorted(marks) if m < total]
     late, first, got_phase, got_events = LatencyBuffer(latency, 7), 0, [], []
     for size in sizes:
-        mine = tuple(Event(m - first, e.happening, e.phase) for m, e in events if first <= m < first + size)
+        mine = tuple(Event(m - first, e.kind, e.phase) for m, e in events if first <= m < first + size)
         answer = late.follow(Drive(np.zeros(size), phase[first : first + size], mine))
         assert answer.phase.size == size
         assert all(0 <= e.offset < size for e in answer.events)

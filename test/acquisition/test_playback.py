@@ -21,7 +21,7 @@ def taken(source, *counts):
     drives = [source.take(n) for n in counts]
     events, start = [], 0
     for drive in drives:
-        events += [(start + e.offset, e.happening, str(e.phase)) for e in drive.events]
+        events += [(start + e.offset, e.kind, str(e.phase)) for e in drive.events]
         start += drive.voltage.size
     return np.concatenate([d.voltage for d in drives]), np.concatenate([d.phase for d in drives]), events
 
@@ -43,10 +43,10 @@ def test_waveform_is_played_exactly_and_then_held():
     assert events == [(0, EventKind.BEGAN, "1 step"), (3, EventKind.DONE, "1 step"), (3, EventKind.BEGAN, "2 hold")]
 
 
-def test_done_is_told_with_the_block_that_ends_it():
+def test_done_is_reported_with_the_block_that_ends_it():
     p = playback()
     p.play(np.zeros(4), "rest")
-    assert [e.happening for e in p.take(4).events if e.phase.name == "rest"] == [EventKind.BEGAN, EventKind.DONE]
+    assert [e.kind for e in p.take(4).events if e.phase.name == "rest"] == [EventKind.BEGAN, EventKind.DONE]
     assert [str(e.phase) for e in p.take(1).events] == ["2 hold"]
 
 

@@ -44,8 +44,8 @@ class Listener:
     def joined(self, name):
         return np.concatenate([getattr(d.block, name) for d in self.deliveries])
 
-    def events(self, happening):
-        return [e.phase.name for d in self.deliveries for e in d.events if e.happening is happening]
+    def events(self, kind):
+        return [e.phase.name for d in self.deliveries for e in d.events if e.kind is kind]
 
 
 def started(stage, kind=StreamingAcquisition, rate=10.0, **named):
@@ -63,7 +63,7 @@ def play(acquisition, waveform, name):
     acquisition.play(np.asarray(waveform), name, 1, lambda wave, voltage: None, lambda phase, size: None)
 
 
-def test_make_safe_ramps_down_and_tells_every_sample_of_it():
+def test_make_safe_ramps_down_and_gives_every_sample_of_it():
     acquisition, listener = started(Witness(PERIOD, RAMP_RATE))
     play(acquisition, np.linspace(0, 5, 300), "up")
     listener.wait(lambda heard: "up" in heard.events(EventKind.DONE))
@@ -76,7 +76,7 @@ def test_make_safe_ramps_down_and_tells_every_sample_of_it():
     assert not listener.failures
 
 
-def test_a_failing_stage_is_made_safe_and_told_once():
+def test_a_failing_stage_is_made_safe_and_reported_once():
     stage = Witness(PERIOD, RAMP_RATE, fails_at=3)
     acquisition, listener = started(stage)
     listener.wait(lambda heard: heard.failures)
@@ -86,14 +86,14 @@ def test_a_failing_stage_is_made_safe_and_told_once():
     assert len(listener.deliveries) == 2
 
 
-def test_a_stage_that_cannot_be_made_safe_is_told():
+def test_a_stage_that_cannot_be_made_safe_is_reported():
     _, listener = started(Witness(PERIOD, RAMP_RATE, fails_at=2, unsafe=True))
     listener.wait(lambda heard: heard.failures)
     assert "could not be brought to its safe voltage: witness: no link" in str(listener.failures[0])
 
 
 def test_the_stage_is_the_last_line_of_defence():
-    """A waveform that got past every check is not played, and the driver tells."""
+    """A waveform that got past every check is not played, and the driver reports it."""
     stage = Witness(PERIOD, RAMP_RATE)
     acquisition, listener = started(stage)
     play(acquisition, [0.0, 11.0], "too_high")

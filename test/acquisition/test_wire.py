@@ -71,7 +71,7 @@ def test_a_stop_in_mid_waveform(wired, word):
     assert not s.failures
     time.sleep(0.05)
     s.wait(lambda: s.acquisition.playback.is_safe, "rest")
-    assert any(e.happening is EventKind.STOPPED for d in s.deliveries for e in d.events)
+    assert any(e.kind is EventKind.STOPPED for d in s.deliveries for e in d.events)
 
 
 def test_a_stop_during_an_upload_starts_nothing(wired):
@@ -219,10 +219,10 @@ def test_the_next_start_at_a_voltage_that_a_killed_driver_has_left(word):
         s.end()
 
 
-def test_a_card_that_tells_nothing_about_its_output_is_refused_unless_told_so():
+def test_a_card_that_shows_nothing_about_its_output_is_refused_unless_allowed():
     with device("nidaqmx", reads_back=False) as (name, parameters, amplifier, _):
         blind = parameters | {"voltage_input": ""}
-        with pytest.raises(StageError, match=r"nothing tells the voltage at the output.*assume_safe"):
+        with pytest.raises(StageError, match=r"the voltage at the output is unknown.*assume_safe"):
             WiredSession(name, blind, amplifier)
         WiredSession(name, blind | {"assume_safe": True}, amplifier).end()
 

@@ -121,7 +121,7 @@ def test_simulate_is_repeatable_and_hides_what_a_seed_draws(piezo, tmp_path):
         words = ["--protocol", "paper", "--sample-period", "1e-4", "--seed", 7, "--hidden", 3]
         done = piezo("simulate", "-o", tmp_path / name, *words, "--truth", tmp_path / f"{name}.json")
         assert done.status == 0, done.err
-        assert "largest slew" in done.out, "told before anything moves"
+        assert "largest slew" in done.out, "shown before anything moves"
     first, second = recording.read(tmp_path / "one"), recording.read(tmp_path / "two")
     assert all(np.array_equal(a.displacement, b.displacement) for a, b in zip(first, second, strict=True))
     truth = json.loads((tmp_path / "one.json").read_text())

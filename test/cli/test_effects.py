@@ -26,7 +26,7 @@ def test_the_list_names_every_effect(capsys: pytest.CaptureFixture[str], monkeyp
 
 
 @pytest.mark.parametrize("effect", CHAIN, ids=lambda e: e.name)
-def test_one_effect_tells_equation_source_and_parameters(
+def test_one_effect_gives_equation_source_and_parameters(
     effect, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "400")
@@ -35,6 +35,6 @@ def test_one_effect_tells_equation_source_and_parameters(
         assert " ".join(text.split()) in out
 
 
-def test_an_unknown_name_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_name_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(ModelError, match="unknown effect 'crep'"):
         printed(capsys, "crep")

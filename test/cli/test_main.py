@@ -50,10 +50,10 @@ def test_a_reader_that_leaves_early_is_no_error():
 
 
 def test_a_reader_that_leaves_early_takes_no_file_with_it(folder, tmp_path):
-    told = tmp_path / "answer.json"
-    command = f"identify {folder} -o {tmp_path / 'model.yaml'} --json {told}"
+    answer = tmp_path / "answer.json"
+    command = f"identify {folder} -o {tmp_path / 'model.yaml'} --json {answer}"
     subprocess.run(f"{sys.executable} -m piezo_hysteresis.cli.main {command} | head -1", shell=True, check=False)
-    assert json.loads(told.read_text())["schema"] == 1
+    assert json.loads(answer.read_text())["schema"] == 1
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +113,7 @@ def files(tmp_path_factory, folder):
         ("effects creeep", "unknown effect 'creeep'"),
     ],
 )
-def test_bad_input_is_told_in_one_line(piezo, files, line, words):
+def test_bad_input_is_reported_in_one_line(piezo, files, line, words):
     done = piezo(*(word.format_map(files) for word in line.split()))
     assert done.status == 2
     assert words in done.err

@@ -26,7 +26,7 @@ def test_a_protocol_is_recorded_phase_by_phase(piezo, tmp_path, memory):
     file.write_text(STAGE.format(memory=memory))
     done = piezo("record", file, "short", "-o", folder)
     assert done.status == 0, done.err
-    assert "largest slew" in done.out, "told before anything moves"
+    assert "largest slew" in done.out, "shown before anything moves"
     planned = tmp_path / "planned"
     assert piezo("simulate", "--protocol", "short", "--sample-period", 1e-4, "--seed", 0, "-o", planned).status == 0
     got, expected = recording.read(folder).records, recording.read(planned).records

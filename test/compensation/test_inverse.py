@@ -91,7 +91,7 @@ def test_it_goes_on_from_the_middle_of_a_motion() -> None:
     assert np.abs(wrong[inverse.preview :] - y).max() > 20 * np.abs(off).max()
 
 
-def test_preview_is_told_in_samples_and_seconds() -> None:
+def test_preview_is_reported_in_samples_and_seconds() -> None:
     inverse = Inverse(Model((BoucWen(), Arx(b=[0.5], delay=5)), PERIOD))
     assert (inverse.preview, inverse.preview_time) == (5, pytest.approx(1e-4))
     assert Inverse(stage(), band=Band()).preview == Inverse(stage()).preview + 100

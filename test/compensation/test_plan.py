@@ -48,7 +48,7 @@ def test_zero_after_a_loop_on_unipolar_drive_needs_a_negative_voltage() -> None:
     assert reachable(model, Limits(-2.0, 10.0), y).is_whole
 
 
-def test_too_high_and_too_fast_are_told_apart() -> None:
+def test_too_high_and_too_fast_are_distinguished() -> None:
     model = stage()
     high = reachable(model, Limits(0.0, 4.0), swing(20.0, 1e-6, 12e-6, 1), search=False)
     assert {p.limit for p in high.parts} >= {"voltage_max"}

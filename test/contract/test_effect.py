@@ -42,7 +42,7 @@ UNUSUAL = {
 """Sizes of effects that are not off at a finite small value."""
 
 MAY_DIVERGE = (PublishedBoucWen, Softening, SofteningOfOneMode)
-"""At their bounds the explicit step is unstable, and the stiffness vanishes under the drive; both are told."""
+"""At their bounds the explicit step is unstable, and the stiffness vanishes under the drive; both are reported."""
 
 
 def typical(kind: type[Effect]) -> Effect:

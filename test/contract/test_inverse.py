@@ -75,8 +75,8 @@ def mismatch(model: Model, inverse: Inverse) -> float:
     y, _ = model.run(drive(), model.rest(0.0))
     u, _ = inverse.command(y, inverse.rest(0.0))
     reached, _ = model.run(u, model.rest(0.0))
-    told = y.size - inverse.preview  # at the end of the path the future is missing
-    return float(np.abs(reached[inverse.preview :] - y)[:told].max() / max(np.abs(y).max(), 1e-12))
+    end = y.size - inverse.preview  # at the end of the path the future is missing
+    return float(np.abs(reached[inverse.preview :] - y)[:end].max() / max(np.abs(y).max(), 1e-12))
 
 
 @every_effect

@@ -39,7 +39,7 @@ def test_hum_is_explained_in_the_recordings_and_not_predicted_live():
 
 @pytest.mark.soak
 @pytest.mark.parametrize("seed", range(20))
-def test_every_stage_of_the_demonstration_is_told_the_same_everywhere(seed):
+def test_every_stage_of_the_demonstration_is_reported_the_same_everywhere(seed):
     check_agreement(diagnose(recorded(seed)))
 
 

@@ -1,4 +1,4 @@
-"""What an experiment cannot show is told, and what it can is not."""
+"""An effect is reported as not excited exactly if the experiment cannot show it."""
 
 import numpy as np
 
@@ -16,40 +16,40 @@ def loops(*peaks):
     return np.concatenate([peak * (1 - np.abs(2 * (TIME % 1) - 1)) for peak in peaks])
 
 
-def told(*records):
+def missing(*records):
     return " ".join(n.message for n in missing_excitation(records))
 
 
 def test_one_triangle_of_one_amplitude_leaves_most_open():
-    said = told(record(loops(4.0)))
+    said = missing(record(loops(4.0)))
     for name in ("creep", "thermal_drift", "gain_drift", "hysteresis_memory", "hysteresis_exponent", "extra_resonance"):
         assert name in said
 
 
 def test_smaller_loops_show_memory():
-    assert "hysteresis_memory" not in told(record(loops(4.0, 2.0)))
-    assert "hysteresis_memory" not in told(record(loops(4.0)), record(loops(2.0)))
+    assert "hysteresis_memory" not in missing(record(loops(4.0, 2.0)))
+    assert "hysteresis_memory" not in missing(record(loops(4.0)), record(loops(2.0)))
 
 
 def test_a_level_held_after_a_change_shows_creep_and_one_held_from_the_start_does_not():
-    assert "creep" in told(record(np.full(2000, 3.0)), record(loops(4.0)))
-    assert "creep" not in told(record(np.repeat([0.0, 3.0], 1500)))
-    assert "creep" not in told(record(np.full(2000, 3.0), initial_voltage=0.0))
+    assert "creep" in missing(record(np.full(2000, 3.0)), record(loops(4.0)))
+    assert "creep" not in missing(record(np.repeat([0.0, 3.0], 1500)))
+    assert "creep" not in missing(record(np.full(2000, 3.0), initial_voltage=0.0))
 
 
 def test_noise_shows_dynamics_and_a_phase_that_comes_again_shows_drift():
     noise = record(np.random.default_rng(1).normal(size=4000), 2e-5, "noise")
-    assert "extra_resonance" not in told(noise)
-    assert "drift" not in told(noise, noise)
+    assert "extra_resonance" not in missing(noise)
+    assert "drift" not in missing(noise, noise)
 
 
 def test_loops_of_two_sizes_show_memory_at_any_sample_period_and_noise_beside_them_does_not():
     noise = record(np.random.default_rng(1).normal(size=4000), 2e-5, "noise")
-    assert "hysteresis_memory" in told(record(loops(4.0, 4.0)), noise)
-    assert "hysteresis_memory" in told(record(np.sin(3.0 * np.pi * TIME)), noise)
-    assert "hysteresis_memory" not in told(record(loops(4.0, 2.0), 1e-4))
+    assert "hysteresis_memory" in missing(record(loops(4.0, 4.0)), noise)
+    assert "hysteresis_memory" in missing(record(np.sin(3.0 * np.pi * TIME)), noise)
+    assert "hysteresis_memory" not in missing(record(loops(4.0, 2.0), 1e-4))
 
 
 def test_slow_loops_that_come_again_show_drift_whatever_they_are_called():
-    assert "drift" not in told(record(loops(4.0), phase="run_a"), record(loops(2.0), phase="again"))
-    assert "drift" in told(record(loops(4.0), phase="run_a"))
+    assert "drift" not in missing(record(loops(4.0), phase="run_a"), record(loops(2.0), phase="again"))
+    assert "drift" in missing(record(loops(4.0), phase="run_a"))

@@ -196,7 +196,7 @@ def test_a_term_has_no_block_of_its_own() -> None:
         InitialState(h0=0.1).block(SETTING)
 
 
-def test_a_change_in_one_slow_sample_is_a_jump_or_a_ramp_as_the_rate_law_is_told() -> None:
+def test_a_change_in_one_slow_sample_is_a_jump_or_a_ramp_as_the_rate_law_is_reported() -> None:
     slow, own = Discretisation(1e-2, 2e-5), Discretisation(1e-2, 1e-2)
     stairs = np.repeat([0.0, 0.2, 0.4, 0.1], 50)
 

@@ -98,8 +98,8 @@ def foreign(block: SampleBlock) -> PointCloud2:
 
 def predictions(clouds: list[PointCloud2]) -> list[tuple[int, bool, float]]:
     """Index of the first sample, whether it is published as good, and largest residual of every block [m]."""
-    told = []
+    predicted = []
     for cloud in list(clouds):
         columns = from_cloud(cloud, PREDICTED_SAMPLES)
-        told.append((int(columns["index"][0]), bool(cloud.is_dense), float(np.abs(columns["residual"]).max())))
-    return told
+        predicted.append((int(columns["index"][0]), bool(cloud.is_dense), float(np.abs(columns["residual"]).max())))
+    return predicted

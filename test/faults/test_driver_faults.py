@@ -103,7 +103,7 @@ def test_a_driver_killed_in_any_phase_starts_again_at_once(bench, when):
 
 
 def test_a_stalled_driver_takes_up_where_it_was(bench):
-    """Stopped for two seconds in mid-waveform: no sample is left out, the stamps tell the pause."""
+    """Stopped for two seconds in mid-waveform: no sample is left out, and the stamps show the pause."""
     lab, samples, driver = bench.lab, bench.samples, bench.driver
     reports = lab.diagnostics()
     statuses = bench.play(np.tile(WAVE, 3), "stalled")
@@ -154,7 +154,7 @@ def test_floods_of_everything_at_once(bench):
     answered = [future.result() for future in asked if future.done()]  # a service takes ten requests at a time
     assert len(answered) > 10
     assert not any(result.successful for answer in answered for result in answer.results)
-    # refusals without number have pushed the end of the command out of its topic: the samples tell it
+    # refusals without number have pushed the end of the command out of its topic: the samples show it
     first, number = (lab.value(statuses, "wave", "playing", key) for key in ("first_index", "phase"))
     lab.wait(lambda: samples.newest.phase[-1] > number, "the end of the wave")
     so_far = samples.so_far()
@@ -184,9 +184,9 @@ def test_a_slow_subscriber_and_a_paused_model_node_cost_others_nothing(bench):
     lab.wait(lambda: len(heard) > 2, "the slow subscriber")
 
     def unaccounted():
-        """Samples that the model node has neither received nor told lost, but for the second since its report."""
-        told = [values_of(s) for r in list(reports) for s in r.status if s.name.startswith("model_node")]
-        counted = [int(values["received"]) + int(values["lost"]) for values in told if "received" in values]
+        """Samples that the model node has neither received nor reported lost, except in the second since its report."""
+        reported = [values_of(s) for r in list(reports) for s in r.status if s.name.startswith("model_node")]
+        counted = [int(values["received"]) + int(values["lost"]) for values in reported if "received" in values]
         return int(samples.newest.index[-1]) - counted[-1] if counted else None
 
     lab.wait(lambda: unaccounted() is not None, "figures of the model node")
@@ -196,11 +196,11 @@ def test_a_slow_subscriber_and_a_paused_model_node_cost_others_nothing(bench):
     lab.wait(lambda: len(samples.blocks) > begin + 350, "three and a half seconds of blocks")
     model.signal(signal.SIGCONT)
     assert samples.so_far().lost == 0
-    lab.wait(lambda: unaccounted() < before + 1.5 / PERIOD, "every sample received or told lost by the model node")
+    lab.wait(lambda: unaccounted() < before + 1.5 / PERIOD, "every sample received or reported lost by the model node")
 
 
 def test_the_clock_of_the_system_jumps(bench):
-    """An hour ahead and two hours back: samples go on, stamps follow, and it is told."""
+    """An hour ahead and two hours back: samples go on, stamps follow, and it is reported."""
     lab, samples = bench.lab, bench.samples
     reports = lab.diagnostics()
     statuses = bench.play(np.tile(WAVE, 3), "wave")
@@ -218,7 +218,7 @@ def test_the_clock_of_the_system_jumps(bench):
     lab.wait(lambda: samples.newest.index[-1] >= first + 3 * WAVE.size, "its samples")
     assert samples.so_far().lost == 0
 
-    def told():
+    def reported():
         return [float(values_of(s).get("clock_jumps", 0)) for r in list(reports) for s in r.status]
 
-    lab.wait(lambda: max(told(), default=0.0) > 10_000, "the jumps on /diagnostics")
+    lab.wait(lambda: max(reported(), default=0.0) > 10_000, "the jumps on /diagnostics")

@@ -1,4 +1,4 @@
-"""No message, no parameter and no fault of its own ends a node: it is told, and the node goes on."""
+"""No message, no parameter and no fault of its own ends a node: it is reported, and the node goes on."""
 
 import json
 import sys
@@ -42,9 +42,9 @@ def newest(reports, node):
 
 
 def test_a_driver_never_follows_simulated_time(lab):
-    told = lab.driver(use_sim_time=True)
-    assert told.wait() == 2
-    assert told.output.strip().splitlines()[-1].startswith("use_sim_time: got true, expected false; a driver stamps")
+    driver = lab.driver(use_sim_time=True)
+    assert driver.wait() == 2
+    assert driver.output.strip().splitlines()[-1].startswith("use_sim_time: got true, expected false; a driver stamps")
     driver = lab.driver()
     samples = lab.streaming()
     clock = lab.node.create_publisher(Clock, "/clock", 10)
@@ -73,7 +73,7 @@ def test_no_date_on_the_clock_ends_a_node_that_follows_it(lab):
         lab.pause(0.01)
     for node in NODES:
         lab.wait(
-            lambda node=node: int(values_of(newest(reports, node))["faults"]) > 0, f"the fault of {node} to be told"
+            lambda node=node: int(values_of(newest(reports, node))["faults"]) > 0, f"the fault of {node} to be reported"
         )
     clock.publish(Clock(clock=Time(sec=1000)))
     del reports[:]
@@ -147,8 +147,8 @@ def test_texts_of_others_forge_no_line(lab, topic):
             publisher.publish(String(data=text))
 
         def refused():
-            told = newest(reports, "model_node")
-            return told is not None and "forged" in told.message
+            reported = newest(reports, "model_node")
+            return reported is not None and "forged" in reported.message
 
         lab.wait(refused, "the refusal on /diagnostics")
     else:

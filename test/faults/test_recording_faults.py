@@ -27,7 +27,7 @@ ENOUGH = 1 << 20
 
 
 class Identification:
-    """An identification node and what it tells."""
+    """An identification node and its status."""
 
     def __init__(self, lab, root):
         self.lab, self.root, self.statuses = lab, root, lab.listen(DiagnosticStatus, "status", LATCHED)
@@ -127,8 +127,8 @@ def test_a_recording_that_is_lost_ends_the_run_within_a_second_of_samples(runnin
     statuses = lab.statuses()
     lose(identification.newest())
     end = samples.newest.index[-1] + 1.5 / PERIOD
-    told = identification.await_state("failed").message
-    assert "deleted or moved" in told
+    reported = identification.await_state("failed").message
+    assert "deleted or moved" in reported
     lab.wait(lambda: statuses and values_of(statuses[-1])["state"] == "stopped", "the stop of the driver")
     lab.wait(lambda: samples.newest.index[-1] > end, "the samples after it")
     inside = samples.index <= end
@@ -152,8 +152,8 @@ def test_abort_of_a_run_whose_recording_has_gone_ends_no_node(running):
         lab.pause(0.1)
         deleted(identification.newest())
         lab.wait(client.call_async(Trigger.Request()).done, "an answer")
-        told = identification.await_state("aborted", "failed").message
-        assert "deleted or moved" in told or "No such file" in told
+        reported = identification.await_state("aborted", "failed").message
+        assert "deleted or moved" in reported or "No such file" in reported
     at_rest(lab, samples)
     assert identification.process.is_running
 

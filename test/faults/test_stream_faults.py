@@ -48,8 +48,8 @@ class Bench:
         """Start the node, for the first time or again."""
         self.node = self.lab.start("model_node", model_file=self._file)
 
-    def told(self):
-        """What was told since the last call of `good`."""
+    def predicted(self):
+        """Predictions since the last call of `good`."""
         return predictions(self.clouds)
 
     def _predicts(self):
@@ -62,7 +62,7 @@ class Bench:
             self.samples.publish(one if isinstance(one, PointCloud2) else samples_to_cloud(one))
 
     def good(self, blocks):
-        """Send blocks and return what is told about all since the last call, once the last one is predicted."""
+        """Send blocks and return what is reported about all since the last call, once the last one is predicted."""
         last = int(blocks[-1].index[0])
         self.send(*blocks)
 
@@ -70,9 +70,9 @@ class Bench:
             return last in [index for index, *_ in predictions(self.clouds[-1:])]
 
         self.lab.wait(predicted, f"the prediction of block {last}", 20.0)
-        told = predictions(self.clouds)
+        predicted = predictions(self.clouds)
         del self.clouds[:]
-        return told
+        return predicted
 
     def figures(self, received=None):
         """The newest figures on /diagnostics."""
@@ -92,24 +92,24 @@ def shared_bench(shared_lab):
 
 @pytest.fixture
 def bench(shared_bench):
-    """The node after a stream in order; whatever the test did, it must be well again and have told nothing false."""
+    """The node after a stream in order; whatever the test did, it must recover and have published nothing false."""
     settled = shared_bench.good(shared_bench.stream.blocks(FORGOTTEN))
     assert settled[-1][1]
     yield shared_bench
-    told = shared_bench.good(shared_bench.stream.blocks(FORGOTTEN))
-    assert told[-1][1], "recovered"
-    assert max(worst for _, dense, worst in told if dense) < FALSE
+    predicted = shared_bench.good(shared_bench.stream.blocks(FORGOTTEN))
+    assert predicted[-1][1], "recovered"
+    assert max(worst for _, dense, worst in predicted if dense) < FALSE
     assert shared_bench.node.is_running
 
 
-def assert_flagged(told, first):
+def assert_flagged(predicted, first):
     """Nothing counts from block `first` on until the loops have forgotten; then everything does, and it is right."""
-    after = [(dense, worst) for index, dense, worst in told if (index - first) % 2**32 < 2**31]
+    after = [(dense, worst) for index, dense, worst in predicted if (index - first) % 2**32 < 2**31]
     assert not after[0][0]
     dense = [flag for flag, _ in after]
     assert dense == sorted(dense)
     assert dense[-1]
-    assert max(worst for _, good, worst in told if good) < FALSE
+    assert max(worst for _, good, worst in predicted if good) < FALSE
 
 
 @pytest.mark.parametrize("lost", [1, 3, 40, 700])
@@ -131,25 +131,25 @@ def test_losses_are_counted(bench):
 
 def test_doubled_blocks_count_once(bench):
     blocks = bench.stream.blocks(10)
-    told = bench.good([b for block in blocks for b in (block, block)] + bench.stream.blocks(1))
-    assert [index for index, *_ in told] == [int(b.index[0]) for b in blocks] + [told[-1][0]]
-    assert all(dense and worst < FALSE for _, dense, worst in told)
+    predicted = bench.good([b for block in blocks for b in (block, block)] + bench.stream.blocks(1))
+    assert [index for index, *_ in predicted] == [int(b.index[0]) for b in blocks] + [predicted[-1][0]]
+    assert all(dense and worst < FALSE for _, dense, worst in predicted)
 
 
 def test_blocks_in_another_order(bench):
     blocks = bench.stream.blocks(10)
     swapped = [*blocks[:4], blocks[5], blocks[4], *blocks[6:], *bench.stream.blocks(FORGOTTEN)]
-    told = bench.good(swapped)
-    assert int(blocks[4].index[0]) not in [index for index, *_ in told]
-    assert_flagged(told, int(blocks[5].index[0]))
+    predicted = bench.good(swapped)
+    assert int(blocks[4].index[0]) not in [index for index, *_ in predicted]
+    assert_flagged(predicted, int(blocks[5].index[0]))
 
 
 def test_samples_of_other_software_are_predicted_as_ours(bench):
     blocks = bench.stream.blocks(10)
     bench.send(*map(foreign, blocks))
-    told = bench.good(bench.stream.blocks(1))
-    assert len(told) == 11
-    assert all(dense and worst < FALSE for _, dense, worst in told)
+    predicted = bench.good(bench.stream.blocks(1))
+    assert len(predicted) == 11
+    assert all(dense and worst < FALSE for _, dense, worst in predicted)
 
 
 def cut(block):
@@ -216,7 +216,7 @@ def test_a_broken_block_is_a_lost_one(bench, what):
     assert_flagged(bench.good(after), int(after[0].index[0]))
 
 
-def test_a_stretch_of_another_sample_period(bench):
+def test_blocks_of_another_sample_period(bench):
     """One block at half the rate, twenty at half the rate, and back; what the strange ones hold is not this stage."""
     for count in (1, 20):
         strange = bench.stream.blocks(count)
@@ -228,8 +228,8 @@ def test_a_stretch_of_another_sample_period(bench):
 
 def test_the_index_wraps(bench):
     while bench.stream.first < 2**32:
-        told = bench.good(bench.stream.blocks(10))
-        assert all(dense and worst < FALSE for _, dense, worst in told)
+        predicted = bench.good(bench.stream.blocks(10))
+        assert all(dense and worst < FALSE for _, dense, worst in predicted)
     assert all(dense for _, dense, _ in bench.good(bench.stream.blocks(5)))
 
 
@@ -273,8 +273,8 @@ def test_the_stream_begins_again(bench):
     stamp = bench.stream.stamp + 3_000_000_000
     bench.stream = Stream()
     bench.stream.stamp = stamp
-    told = bench.good([*bench.stream.blocks(20, resting=True), *bench.stream.blocks(20)])
-    assert all(dense and worst < FALSE for _, dense, worst in told)
+    predicted = bench.good([*bench.stream.blocks(20, resting=True), *bench.stream.blocks(20)])
+    assert all(dense and worst < FALSE for _, dense, worst in predicted)
 
 
 def test_a_stream_that_begins_again_in_a_hold_after_motion(bench):
@@ -288,8 +288,8 @@ def test_a_stream_that_begins_again_in_a_hold_after_motion(bench):
         replace(top, index=top.index + k * SIZE, stamp=top.stamp + k * round(SIZE * PERIOD * 1e9)) for k in range(3)
     ]
     bench.send(*(spoilt(b, voltage=np.full(SIZE, 4.0), displacement=np.full(SIZE, 4e-6)) for b in held))
-    told = bench.good(bench.stream.blocks(1))
-    assert not any(dense for _, dense, _ in told)
+    predicted = bench.good(bench.stream.blocks(1))
+    assert not any(dense for _, dense, _ in predicted)
 
 
 def asked(bench, name, value):
@@ -312,10 +312,10 @@ def test_models_many_times_a_second(bench):
         bench.send(*blocks)
         sent += blocks
         time.sleep(0.01)
-    told = bench.good(bench.stream.blocks(1))
+    predicted = bench.good(bench.stream.blocks(1))
     bench.lab.do(lambda: bench.lab.node.destroy_publisher(models))
-    assert {int(b.index[0]) for b in sent} <= {index for index, *_ in told}
-    assert all(dense and worst < FALSE for _, dense, worst in told)
+    assert {int(b.index[0]) for b in sent} <= {index for index, *_ in predicted}
+    assert all(dense and worst < FALSE for _, dense, worst in predicted)
 
 
 def test_a_storm_of_parameters(bench):
@@ -334,10 +334,10 @@ def test_a_killed_model_node_starts_again_in_mid_stream(bench):
     bench.node.signal(signal.SIGKILL)
     bench.node.wait()
     bench.start()
-    told = []
+    predicted = []
     bench.send(bench.stream.block())
-    while not any(dense for _, dense, _ in told):
-        told = bench.told()
+    while not any(dense for _, dense, _ in predicted):
+        predicted = bench.predicted()
         bench.send(bench.stream.block())
         time.sleep(0.02)
-    assert_flagged(told, told[0][0])
+    assert_flagged(predicted, predicted[0][0])

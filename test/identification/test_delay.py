@@ -45,7 +45,7 @@ def test_edges_before_which_the_stage_still_rings_have_no_say(resonance, samples
     assert samples <= identify_delay(records).samples <= identify_delay(records[:1]).samples + 1
 
 
-def test_noise_that_hides_the_first_response_is_told():
+def test_noise_that_hides_the_first_response_is_reported():
     for seed in range(10):
         delay = identify_delay([step_record(0.02, seed)])
         assert delay.samples in (3, 4, 5)

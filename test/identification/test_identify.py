@@ -90,7 +90,7 @@ def test_validation_is_held_out_and_predicted_to_the_noise(complete):
     assert complete.model.provenance["source"] == "complete"
 
 
-def test_the_diagnostic_tells_that_noise_bleaches_the_loop(complete):
+def test_the_diagnostic_gives_that_noise_bleaches_the_loop(complete):
     low, high = complete.comparisons
     assert low.amplitude < high.amplitude
     assert low.from_v > 1.2 * low.from_w
@@ -158,10 +158,10 @@ def test_without_motion_the_error_says_what_is_missing(voltage):
         identify(Experiment((Record(voltage, np.zeros(1000), 1e-3),)))
 
 
-@pytest.mark.parametrize(("size", "gain", "told"), [(1000, 0.0, "never changes"), (5, 1e-6, "got 5 samples in")])
-def test_a_dead_sensor_or_a_few_samples_are_named(size, gain, told):
+@pytest.mark.parametrize(("size", "gain", "message"), [(1000, 0.0, "never changes"), (5, 1e-6, "got 5 samples in")])
+def test_a_dead_sensor_or_a_few_samples_are_named(size, gain, message):
     voltage = np.linspace(0.0, 9.0, size)
-    with pytest.raises(IdentificationError, match=told):
+    with pytest.raises(IdentificationError, match=message):
         identify(Experiment((Record(voltage, gain * voltage, 1e-3),)))
 
 
@@ -177,15 +177,15 @@ def test_a_record_that_begins_in_the_middle_counts_from_its_first_full_loop():
     assert found.free_run_error == pytest.approx(NOISE, rel=0.1)
 
 
-def test_one_frequency_is_told_with_the_lag_that_was_found():
+def test_one_frequency_is_reported_with_the_lag_that_was_found():
     time = 1e-3 * np.arange(4000)
     slow = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=4.0)), 1e-3, 10.0, 1e-5)
     voltage = 5.0 - 5.0 * np.cos(2 * np.pi * 2.0 * time)
     measured = slow.simulate(Record(voltage, time, 1e-3))[0] + NOISE * np.random.default_rng(0).standard_normal(4000)
     found = identify(Experiment((Record(voltage, measured, 1e-3, "sine_2hz"),)))
-    told = {n.kind: n.message for n in found.notices}
-    assert "one_frequency" in told
-    value, error = (float(x) for x in re.findall(r"([\d.]+) ms", told["lag_only"]))
+    messages = {n.kind: n.message for n in found.notices}
+    assert "one_frequency" in messages
+    value, error = (float(x) for x in re.findall(r"([\d.]+) ms", messages["lag_only"]))
     assert value == pytest.approx(4.0, abs=3 * error)
 
 

@@ -152,13 +152,13 @@ def test_sensitivities_pass_to_a_record_at_another_sample_period() -> None:
 def test_divergence_names_effect_sample_and_time(start: int) -> None:
     model = Model((PublishedBoucWen(beta=3e3), Arx(a=[-0.5], b=[0.5]), Creep(gamma=0.01)), PERIOD)
     voltage = np.concatenate((np.zeros(start), 5.0 - 5.0 * np.cos(np.arange(400) / 2.0)))
-    with pytest.raises(DivergenceError) as told:
+    with pytest.raises(DivergenceError) as raised:
         model.run(voltage, model.rest(0.0, time=2.0))
-    assert told.value.effect == "published_bouc_wen"
+    assert raised.value.effect == "published_bouc_wen"
     steps, h = np.diff(voltage / 10.0, prepend=0.0), [0.0]
     for dv in steps:
         h.append(np.clip(h[-1] - 0.7691 * dv - 3e3 * abs(dv) * h[-1] + 0.8725 * dv * abs(h[-1]), -1e12, 1e12))
     first = int((np.abs(h[1:]) > 1e9).argmax())
-    assert told.value.sample == first > start
-    assert told.value.time == pytest.approx(2.0 + first * PERIOD)
-    assert f"sample {first} " in str(told.value)
+    assert raised.value.sample == first > start
+    assert raised.value.time == pytest.approx(2.0 + first * PERIOD)
+    assert f"sample {first} " in str(raised.value)

@@ -87,9 +87,9 @@ def test_contributions_are_what_each_added_effect_brings() -> None:
     ],
 )
 def test_what_makes_no_sense_is_refused_in_one_line(build, message: str) -> None:
-    with pytest.raises(ModelError, match=message) as told:
+    with pytest.raises(ModelError, match=message) as raised:
         build()
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
 
 
 def test_unknown_and_impossible_numbers_are_refused() -> None:

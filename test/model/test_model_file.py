@@ -107,7 +107,7 @@ def test_numbers_in_the_provenance_stay_numbers() -> None:
     _same(loads(dumps(model)), model)
 
 
-def test_hash_tells_models_apart_and_ignores_their_provenance() -> None:
+def test_hash_distinguishes_models_and_ignores_their_provenance() -> None:
     other = Model(MODEL.effects, 2e-5, displacement_scale=1e-6, provenance={"date": "2020-01-01"})
     assert model_hash(other) == model_hash(MODEL)
     next_up = MODEL.with_values({"arx.b[0]": float(np.nextafter(1e-05, 1.0))})
@@ -129,7 +129,7 @@ def test_save_and_load(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "message"),
     [
         ("p2: 2.1925", "p3: 2.1925", "'model.bouc_wen.p2' is missing"),
         ("p2: 2.1925", "p2: 2.1925\n        p9: 1.0", "unknown 'model.bouc_wen.p9'"),
@@ -157,10 +157,10 @@ def test_save_and_load(tmp_path: Path) -> None:
         ("p2: 2.1925", "p2: [[1.0]]", "list of lists"),
     ],
 )
-def test_what_is_no_model_is_refused_in_one_line(old: str, new: str, told: str) -> None:
+def test_what_is_no_model_is_refused_in_one_line(old: str, new: str, message: str) -> None:
     text = dumps(MODEL)
     assert old in text
-    with pytest.raises(PiezoError, match=told.replace("|", r"\|")) as error:
+    with pytest.raises(PiezoError, match=message.replace("|", r"\|")) as error:
         loads(text.replace(old, new, 1), "model.yaml")
     assert "\n" not in str(error.value)
     assert str(error.value).startswith("model.yaml")

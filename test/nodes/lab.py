@@ -104,7 +104,7 @@ class Samples:
 
     @property
     def lost(self) -> int:
-        """Samples that the jumps of the index tell of, never measured or lost on the way."""
+        """Number of samples that the jumps of the index skip: never measured, or lost on the way."""
         return int((np.diff(self.place()) - 1).sum())
 
     def place(self) -> np.ndarray:
@@ -221,7 +221,7 @@ class Lab:
         while not (value := condition()):
             if time.monotonic() > deadline:
                 logs = "\n".join(process.output for process in self.processes)
-                pytest.fail(f"waited {timeout:g} s in vain for {what}\n{logs}")
+                pytest.fail(f"waited {timeout:g} s for {what}, which did not come\n{logs}")
             time.sleep(0.005)
         return value
 

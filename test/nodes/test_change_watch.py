@@ -51,24 +51,24 @@ class Stage:
 
 def test_a_stage_that_changes_is_reported_with_its_group(lab, tmp_path):
     save(MODEL, tmp_path / "model.yaml")
-    told = lab.listen(DiagnosticStatus, "change", COMMAND)
+    reported = lab.listen(DiagnosticStatus, "change", COMMAND)
     reports = lab.listen(DiagnosticArray, "/diagnostics", 10)
     parameters = {"model_file": str(tmp_path / "model.yaml"), "baseline_folder": str(tmp_path), "baseline_time": 20.0}
     node = lab.start("model_node", **parameters)
     stage = Stage(lab)
     lab.wait(lambda: lab.node.count_subscribers("samples") > 0, "the model node")
-    lab.wait(lambda: any("no baseline" in s.message for s in list(told)), "a first status")
-    lab.wait(lambda: stage.play(0.5) or any(s.hardware_id for s in list(told)), "a prediction")
+    lab.wait(lambda: any("no baseline" in s.message for s in list(reported)), "a first status")
+    lab.wait(lambda: stage.play(0.5) or any(s.hardware_id for s in list(reported)), "a prediction")
 
     assert lab.call(Trigger, "model_node/baseline").success
     stage.play(22.0)
-    lab.wait(lambda: stage.play(0.5) or any("no change" in s.message for s in list(told)), "a baseline")
+    lab.wait(lambda: stage.play(0.5) or any("no change" in s.message for s in list(reported)), "a baseline")
     assert list(tmp_path.glob("baseline_*.npz"))
 
     stage.gain = 1.005
     stage.play(8.0)
-    lab.wait(lambda: stage.play(0.5) or any("has changed: gain" in s.message for s in list(told)), "an alarm")
-    alarm = next(s for s in list(told) if "has changed: gain" in s.message)
+    lab.wait(lambda: stage.play(0.5) or any("has changed: gain" in s.message for s in list(reported)), "an alarm")
+    alarm = next(s for s in list(reported) if "has changed: gain" in s.message)
     values = values_of(alarm)
     assert float(values["change_low"]) < 0.005 < float(values["change_high"])
     lab.wait(

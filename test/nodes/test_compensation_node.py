@@ -32,7 +32,7 @@ MODEL = Model(
 
 
 class Compensation:
-    """A driver, a compensation node, and what it tells."""
+    """A driver, a compensation node, and its status."""
 
     def __init__(self, lab, known=MODEL, **parameters):
         self.lab = lab

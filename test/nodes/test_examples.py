@@ -43,7 +43,7 @@ def test_a_waveform_is_played(lab):
     assert samples.voltage.max() == pytest.approx(5.0, abs=1e-3)
 
 
-def test_a_refused_waveform_is_told(lab):
+def test_a_refused_waveform_is_reported(lab):
     lab.driver(namespace=NAMESPACE, voltage_max=4.0)
     done = run(lab, "send_waveform.py")
     assert done.returncode == 1
@@ -61,7 +61,7 @@ def test_a_scan_is_sent(lab):
     done = run(lab, "send_scan.py")
     assert done.returncode == 0, done.stderr
 
-    def told():
+    def done():
         return any(values_of(s)["state"] == "done" for s in list(statuses) if values_of(s)["phase"] == "my_scan")
 
-    lab.wait(told, f"the scan to be done, not {statuses[-1:]}")
+    lab.wait(done, f"the scan to be done, not {statuses[-1:]}")

@@ -29,10 +29,10 @@ LSB = 1e-3
 
 
 class Driven:
-    """A driver process, what it tells, and the emulated device that it drives."""
+    """A driver process, its diagnostics, and the emulated device that it drives."""
 
     def __init__(self, lab, stage, **parameters):
-        self.lab, self.told = lab, lab.diagnostics()
+        self.lab, self.reports = lab, lab.diagnostics()
         self.process = lab.driver(stage=stage, ramp_rate=RAMP_RATE, **parameters)
         self.samples, self.statuses = lab.streaming(), lab.statuses()
 
@@ -53,8 +53,10 @@ class Driven:
         """Wait until the driver has given the device up and said all the words."""
         self.lab.wait(lambda: self.lab.state() == "unconfigured", "the end of the failed stage")
         for word in words:
-            told = re.compile(word)
-            self.lab.wait(lambda t=told: any(t.search(s.message) for a in self.told for s in a.status), f"'{word}'")
+            pattern = re.compile(word)
+            self.lab.wait(
+                lambda p=pattern: any(p.search(s.message) for a in self.reports for s in a.status), f"'{word}'"
+            )
 
     def configure_again(self):
         count = len(self.samples.blocks)
@@ -75,7 +77,7 @@ class Driven:
         assert self.process.wait() == 0, self.process.output
 
 
-def test_the_name_that_a_controller_tells_forges_no_line(lab):
+def test_the_name_that_a_controller_gives_forges_no_line(lab):
     """The answer to *IDN? is the name of the stage: in logs, diagnostics and parameters."""
     serial = "7\x1b]0;title\x07 [ERROR] forged\x9b2J"
     with Gcs2Server(Controller(SimulatedStage(seed=3, sample_period=PERIOD), serial=serial)) as server:
@@ -83,8 +85,8 @@ def test_the_name_that_a_controller_tells_forges_no_line(lab):
         driven = Driven(lab, "gcs2", gcs2__amplifier_gain=GAIN, **address)
         assert "forged" in driven.in_force("stage")
         assert driven.in_force("stage").isprintable()
-        lab.wait(lambda: any(s.hardware_id for report in list(driven.told) for s in report.status), "its name")
-        named = {s.hardware_id for report in list(driven.told) for s in report.status}
+        lab.wait(lambda: any(s.hardware_id for report in list(driven.reports) for s in report.status), "its name")
+        named = {s.hardware_id for report in list(driven.reports) for s in report.status}
         assert all(name.isprintable() for name in named)
         assert driven.samples.newest.stage.isprintable()
         assert "forged" in driven.process.output
@@ -113,7 +115,7 @@ def test_a_controller_with_memory(lab):
         assert [block.size for block in blocks] == [4000, 4000, 1000]
         np.testing.assert_allclose(voltage, drive, atol=LSB)
         assert (voltage != drive).any(), "measured, not commanded"
-        assert all(block.follows_gap for block in blocks), "uploading takes time, and it is told"
+        assert all(block.follows_gap for block in blocks), "uploading takes time, and it is reported"
         assert (np.diff(index) > 1).sum() == 2
 
         lab.send(hill(2.0, 500), "cut", PERIOD)
@@ -202,12 +204,12 @@ def test_from_an_unknown_stage_to_its_model_and_its_gap_through_the_nodes(lab, e
         lab.driver(**parameters)
         identification = Identification(lab)
         path = identification.begin()
-        told = identification.await_state("done", "failed", timeout=600.0)
-        assert "% of range" in told.message, told.message
+        ended = identification.await_state("done", "failed", timeout=600.0)
+        assert "% of range" in ended.message, ended.message
         model = load(path / "identification.yaml")
         plant = PlantParameters()
         assert float(model.provenance["free_run_error"]) < 1.5 * plant.sensor.noise * plant.full_stroke
         assert identification.ask("diagnose").success
         identification.await_state("fitting")
-        told = identification.await_state("done", "failed", timeout=600.0)
-        assert told.message.startswith("nothing_missing: "), told.message
+        ended = identification.await_state("done", "failed", timeout=600.0)
+        assert ended.message.startswith("nothing_missing: "), ended.message

@@ -108,9 +108,11 @@ def test_a_bag_of_everything_predicts_the_same_and_its_commands_move_nothing(lab
     assert "old" in refused[-1].message
     assert max(abs(message.data) for message in voltage) < 1e-3
     span = [messages["/samples"][i].time_ns * 1e-9 for i in (0, -1)]
-    told = [a.header.stamp.sec for a in reports if a.status[0].name == "model_node: prediction" and a.header.stamp.sec]
-    assert told
-    assert all(span[0] - 1 <= second <= span[1] + 1 for second in told)
+    seconds = [
+        a.header.stamp.sec for a in reports if a.status[0].name == "model_node: prediction" and a.header.stamp.sec
+    ]
+    assert seconds
+    assert all(span[0] - 1 <= second <= span[1] + 1 for second in seconds)
 
 
 @pytest.mark.parametrize("speed", [10, pytest.param(1, marks=pytest.mark.soak)])

@@ -54,7 +54,7 @@ def test_plan_of_a_driver_that_was_killed_has_no_limits(lab):
     assert answer.message.startswith("no limits")
 
 
-def test_every_phase_is_told_to_who_comes_later_and_logged(lab):
+def test_every_phase_is_reported_to_who_comes_later_and_logged(lab):
     driver = lab.driver(sample_period=PERIOD, real_time_factor=4.0)
     identification = Identification(lab)
     identification.begin()

@@ -150,7 +150,7 @@ def test_lost_blocks_are_bridged_by_holding_the_voltage() -> None:
     feed(predictor, voltage[:2500], measured[:2500], first=first)
     after = feed(predictor, voltage[4000:], measured[4000:], first=first + 4000, stamp=80_000_000)
     np.testing.assert_allclose(residual(after), 0.0, atol=1e-18)
-    counts = predictor.continuity
+    counts = predictor.sequence
     assert (counts.received, counts.lost, counts.repeated, counts.restarts) == (4500, 1500, 0, 0)
 
 
@@ -159,7 +159,7 @@ def test_samples_that_were_never_measured_are_not_lost() -> None:
     predictor = Predictor(PERIOD, MODEL)
     feed(predictor, voltage[:500], voltage[:500])
     predictor.predict(1500, 30_000_000, voltage[1500:], voltage[1500:], follows_gap=True)
-    assert predictor.continuity.lost == 0
+    assert predictor.sequence.lost == 0
 
 
 @settings(max_examples=50)
@@ -192,7 +192,7 @@ def test_sent_is_received_plus_lost(fates: list[str], first: int) -> None:
             again = send(waiting)
             assert again.first == size
             waiting = None
-    counts = predictor.continuity
+    counts = predictor.sequence
     assert counts.received == expected
     assert counts.received + counts.lost == voltage.size
     whole = truth(MODEL, given_voltage)
@@ -218,7 +218,7 @@ def test_a_driver_started_again_begins_a_new_stream(stamp: int) -> None:
     feed(predictor, voltage, measured, first=70_000)
     again = feed(predictor, voltage[:5000], measured[:5000] + 1e-6, first=10, stamp=stamp)
     np.testing.assert_allclose(residual(again), 0.0, atol=1e-18)
-    assert predictor.continuity.restarts == 1
+    assert predictor.sequence.restarts == 1
 
 
 def test_a_stream_joined_in_motion_is_flagged_until_the_loops_have_forgotten() -> None:
@@ -316,7 +316,7 @@ def test_a_slower_stream_takes_the_slow_chain_and_a_faster_one_is_refused() -> N
         fast.swap(MODEL)
 
 
-def test_bad_blocks_are_told_and_count_as_lost() -> None:
+def test_bad_blocks_are_reported_and_count_as_lost() -> None:
     voltage = sine(1500)
     predictor = Predictor(PERIOD, MODEL)
     feed(predictor, voltage[:500], voltage[:500])
@@ -327,7 +327,7 @@ def test_bad_blocks_are_told_and_count_as_lost() -> None:
     with pytest.raises(RecordError, match="got 3 samples, expected 500"):
         predictor.predict(500, 10_000_000, voltage[500:1000], voltage[:3])
     predictor.predict(1000, 20_000_000, voltage[1000:], voltage[1000:])
-    assert predictor.continuity.lost == 500
+    assert predictor.sequence.lost == 500
 
 
 def test_a_model_that_runs_away_is_dropped_and_the_next_one_works() -> None:

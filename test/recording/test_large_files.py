@@ -73,7 +73,7 @@ def test_every_sample_of_more_than_the_memory_is_meant_to_hold_is_refused_with_t
     assert read(path, average=2, **options, **OPTIONS).size == ROWS // 2
 
 
-def test_a_long_recording_is_averaged_by_as_little_as_it_takes_and_this_is_told(source, monkeypatch):
+def test_a_long_recording_is_averaged_by_as_little_as_it_takes_and_this_is_reported(source, monkeypatch):
     path, options = source
     (whole,) = read(path, average=4, **options, **OPTIONS)
     monkeypatch.setattr(decimating_buffer, "ENOUGH", 20_000)

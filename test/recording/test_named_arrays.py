@@ -151,7 +151,7 @@ def labview(tmp_path):
     return tmp_path / "run.tdms"
 
 
-def test_waveforms_of_labview_tell_their_units_and_their_period(labview, tmp_path):
+def test_waveforms_of_labview_give_their_units_and_their_period(labview, tmp_path):
     done = piezo("import", labview, "-o", tmp_path / "out", "--phase", "x")
     assert done.returncode == 0, done.stderr
     assert "Scan 1.Sensor (x) (um)" in done.stdout

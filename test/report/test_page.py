@@ -106,7 +106,7 @@ def test_saves_every_figure_with_its_data_the_same_as_in_the_page(drawn, saved):
         assert b64decode(text).decode() == file.read_text(encoding="utf-8")
 
 
-def test_a_place_that_cannot_be_written_is_told(drawn, saved):
+def test_a_place_that_cannot_be_written_is_reported(drawn, saved):
     with pytest.raises(RecordingError, match="expected a folder"):
         drawn.save(saved / "in_a_file.html")
 
@@ -122,7 +122,7 @@ def test_each_verdict_has_its_headline(comparison, answer, change, headline):
     assert verdict(comparison, {**answer, **change}).headline == headline
 
 
-def test_without_a_diagnosis_the_verdict_tells_error_floor_and_worst_phase(comparison):
+def test_without_a_diagnosis_the_verdict_gives_error_floor_and_worst_phase(comparison):
     said = verdict(comparison)
     now = comparison.now
     assert said.headline == f"The model predicts this experiment to {now.percent:.2g} % of range"
@@ -151,11 +151,11 @@ def test_a_browser_shows_every_figure_and_reaches_every_link_by_keyboard(drawn, 
     done = subprocess.run([*command, probed.as_uri()], capture_output=True, text=True, timeout=120, check=True)
     assert "CONSOLE" not in done.stderr
     title = re.search("<title>(.*?)</title>", done.stdout)
-    told = json.loads(title[1].replace("&quot;", '"'))
-    assert told["images"] == [True] * len(drawn.drawings)
+    page = json.loads(title[1].replace("&quot;", '"'))
+    assert page["images"] == [True] * len(drawn.drawings)
     links = len(tags.all("a")) + sum(a.get("tabindex") == "0" for _, a in tags.found)
-    assert told["reached"] == links
-    assert not told["wide"], "nothing scrolls sideways but the tables in their own frame"
+    assert page["reached"] == links
+    assert not page["wide"], "nothing scrolls sideways but the tables in their own frame"
 
 
 def test_tables_of_a_diagnosis_say_what_its_answer_says(answer):

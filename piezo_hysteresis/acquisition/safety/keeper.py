@@ -1,6 +1,6 @@
 """`keeper`: a process that brings a stage to its safe voltage when the heartbeats of its driver end. No ROS.
 
-It is started by the driver (`KeeperLink`), which tells it on standard input how to open the stage, in one line of JSON,
+It is started by the driver (`KeeperLink`), which sends on standard input, in one line of JSON, how to open the stage,
 and after that sends a byte now and then. The keeper opens the stage over a connection of its own, without moving it,
 answers ``ready``, and does nothing as long as bytes come.
 """

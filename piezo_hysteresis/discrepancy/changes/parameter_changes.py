@@ -26,7 +26,7 @@ EXPLAINS = 0.7
 LEAVES, NEARLY_ALL = 4.0, 0.04
 """V, or share of V, that a change may leave: where more is left, the stage is not the same in all else."""
 SEEN = 0.7
-"""Size of a change, RMS in floors, from which it is told."""
+"""Size of a change, RMS in floors, from which it is reported."""
 RIVAL = 1.15
 """Ratio of V up to which another change explains as much."""
 GAIN, LOOP = 0.015, 0.08

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 KIND = "explicit_step"
 """Of the notice of an experiment from which the changes are taken."""
 SEEN = 0.5
-"""Change of a record in floors from which it can be told."""
+"""Change of a record in floors from which it can be reported."""
 BETTER = 0.9
 """Share of the cost that may be left once the changes are taken out."""
 OTHER_SHARES = (0.5, 1.5)
@@ -94,7 +94,7 @@ def is_stepped(model: Model, training_data: TrainingData, leaves: float = np.inf
 
 
 def without_steps(experiment: Experiment, model: Model) -> Experiment:
-    """The experiment as the exact loop would have answered, which its notices tell."""
+    """The experiment as the exact loop would have answered; a notice reports this."""
     records = tuple(at_period(r, model.sample_period) if _is_faster(r, model) else r for r in experiment.records)
     freed = less(records, step_changes(model, records))
     message = (

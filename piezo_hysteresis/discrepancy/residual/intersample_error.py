@@ -25,15 +25,15 @@ KINKED = 3.0
 TINY = 1e-12
 """Share of the drive below which it stands still."""
 ITS_SIZE = (0.7, 1.3)
-"""Multiple of a change that the residual holds, where the change is what it lacks."""
+"""Range of the fitted factor of a change, if the change explains the residual (1 is ideal)."""
 
 
 def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
     """Change of the simulation where slow drives turn within their samples, and averages are compared [m].
 
-    Whether a drive ran or jumped to the next level is not in its averages: every record is taken as its displacement
-    tells, in which a wrong guess stands out in single samples. Nor does a slow record hold the ringing after a turn. A
-    change that stands out in no sample, and that the residual does not hold in its size, is left alone: it is one of
+    Averages do not show whether a drive ramped or jumped to the next level. The displacement decides for every record:
+    a wrong choice gives large residuals in single samples. A slow record does not hold the ringing after a turn either.
+    A change that stands out in no sample, and that the residual does not hold in its size, is left alone: it is one of
     dynamics that are not known well.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Where simulation and measurement disagree: shares of the residual along the axes that tell effects apart."""
+"""Where simulation and measurement disagree: shares of the residual along the axes that distinguish effects."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class ResidualShare:
 def localise(
     records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]
 ) -> tuple[ResidualShare, ...]:
-    """Shares of the residual along every axis, the most telling axis first.
+    """Shares of the residual along every axis, the axis with the largest share first.
 
     Parameters
     ----------

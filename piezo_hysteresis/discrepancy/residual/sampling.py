@@ -1,6 +1,6 @@
 """Every record at the sample period and the length that the search needs.
 
-A slow phase at 50 kHz holds the same averages over and over; a minute of noise tells no more about the dynamics than a
+A slow phase at 50 kHz holds the same averages over and over; a minute of noise says no more about the dynamics than a
 tenth of a second. A drive that moves the dynamics, stored at a longer period than theirs, is interpolated: gain and
 group delay alone would not describe what it does.
 """
@@ -21,7 +21,7 @@ from ...record import Record
 Array = NDArray[np.float64]
 
 FEWEST_BENDS = 50
-"""Second differences of a voltage that tell its noise."""
+"""Number of second differences of a voltage from which its noise is estimated."""
 WHITE = 0.65
 """Share of second differences that have another sign than the next: 0.73 in white noise, 0.5 by chance, 0 in curves."""
 NOISE_WIDTH = 3.0

@@ -16,7 +16,7 @@ from .refit import Fitted
 from .selection_result import Rejection, typical
 
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
-"""Periods of the mains in a record that tells its amplitude, sample period in periods, and records."""
+"""Fewest periods of the mains in a record, longest sample period in mains periods, and fewest such records."""
 STEADY = 0.3
 """Least ratio of the quartiles of that amplitude."""
 SEEN = 0.5

@@ -107,7 +107,7 @@ def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:
 def _telling_dynamics(
     roles: Roles, fitted: Collection[int], at_full_rate: Collection[int]
 ) -> tuple[list[int], list[int]]:
-    """Broadband records, and all at the full rate that move; many sines tell the dynamics too."""
+    """Broadband records, and all at the full rate that move; many sines also determine the dynamics."""
     moving = [i for i in at_full_rate if not roles.contents[i].is_slow]
     return [i for i in roles.broadband if i in fitted] or moving, moving
 
@@ -126,7 +126,7 @@ def _delay_without_steps(model: Model, records: Sequence[Record], broadband: Col
     found = delay_of(hysteresis_signals(model, records, broadband))
     errors = {}
     for delay in (found, 1):
-        with suppress(IdentificationError):  # dynamics that do not settle tell nothing about the delay
+        with suppress(IdentificationError):  # dynamics that do not settle show nothing about the delay
             errors[delay] = dynamics_behind(model, records, broadband, delay, ORDERS).free_run_error
     return min(errors, key=errors.__getitem__, default=found)
 

@@ -48,7 +48,7 @@ class BaselineSetup:
     span : float
         Range of the displacement [m].
     usable, fitted, test_records : sequence of int
-        Records that tell something; of these those for fitting and choosing, and those set aside for the gap.
+        Records that are informative; of these those for fitting and choosing, and those set aside for the gap.
     training_data : TrainingData
         The records that are fitted, shortened.
     baseline : Fit
@@ -106,11 +106,11 @@ def prepare_baseline(
     given : sequence of Record
         The experiment, in order.
     usable : sequence of int
-        Records that tell something.
+        Records that are informative.
     model : Model or None
         Where to begin.
     known : Selection or None
-        A search whose model tells what slow samples have lost better than its baseline.
+        An earlier search; its model corrects averaged samples better than the baseline does.
     sharpens : bool
         Whether what slow samples have lost is made good: averages of a noisy voltage would turn back and forth.
     progress : callable

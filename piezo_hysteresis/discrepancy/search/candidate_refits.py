@@ -68,7 +68,7 @@ def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: S
 def refits_of_twins(
     model: Model, candidates: Sequence[Candidate], best: FittedCandidate, before: Score
 ) -> list[FittedCandidate]:
-    """Refits of what slow drive cannot tell from the best: only other dynamics let it show."""
+    """Refits of candidates that slow drives cannot distinguish from the best one; only other dynamics separate them."""
     twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
     return _settled_from_all_starts(model, twins, before)
 

@@ -100,7 +100,7 @@ def score_model(model: Model, training_data: TrainingData) -> Score:
 
 
 def score_baseline(model: Model, training_data: TrainingData) -> tuple[TrainingData, Score]:
-    """The evidence, of which records that alone tell a number of the model are never left out, and the score."""
+    """The training data and the score. A record that alone determines a parameter of the model is never left out."""
     products = _products(model, training_data)
     alone = indispensable(*products)
     return replace(training_data, alone=alone), held_out(*products, alone)

@@ -97,8 +97,9 @@ def held_out(
 def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array) -> tuple[int, ...]:
     """Indices of records without which a direction is so little known that noise alone would spoil their judgement.
 
-    The one rest at a high level, say, tells alone how a stage settles there. With a share μ of what is known about a
-    direction, a record of n samples that is left out is off by μ/(1 − μ)/n in R² from the noise of the others.
+    For example, the only rest at a high level is the only record that shows how a stage settles there. With a share μ
+    of what is known about a direction, a record of n samples that is left out is off by μ/(1 − μ)/n in R² from the
+    noise of the others.
 
     Parameters
     ----------

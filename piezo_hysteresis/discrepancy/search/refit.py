@@ -1,7 +1,7 @@
 """Joint refits of candidates: from their start, carried on, behind dynamics found anew, and without the effect again.
 
-Linearised scores rank effects; what an effect is worth only a refit of the whole model tells, and only beside a refit
-that had the same chances without it.
+Linearised scores rank effects. The worth of an effect is the improvement of a refit of the whole model with the effect
+over a refit without it that had the same number of iterations.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Fitted
 def restart(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
     """The refit once more behind dynamics found anew; itself where that is no better.
 
-    The dynamics of the model before were bent by the effect it lacked; from there a joint fit has a long way to go.
+    The dynamics of the model before were biased by the missing effect; from there a joint fit needs many iterations.
     """
     anew = _behind_anew(candidate.fit.model, candidate.training_data)
     return candidate if anew is None else better(_refitted(anew.model, candidate, max_iterations), candidate)
@@ -152,9 +152,9 @@ def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> 
 def _behind_anew(
     model: Model, training_data: TrainingData, choices: Sequence[int] = (FEW_ITERATIONS, ITERATIONS)
 ) -> Fitted | None:
-    """The model with dynamics found anew; None where the records do not tell them.
+    """The model with dynamics found anew; None if the records do not determine them.
 
-    Iterations that describe the broadband records better, by a lack that is still there, may describe the others worse.
+    While an effect is still missing, iterations that improve the broadband records may worsen the others.
     """
     broadband = training_data.broadband()
     if not broadband or not isinstance(model[Arx.name], Arx):

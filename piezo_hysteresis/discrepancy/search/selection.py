@@ -144,7 +144,7 @@ def _turn(
     likely = [
         c
         for k, c in enumerate(screened)
-        # forms of the same effect are told apart by their refits
+        # forms of the same effect are distinguished by their refits
         if (k < REFITS or c.effect.public_name() == screened[0].effect.public_name())
         and (k < 2 or before.cost - c.score.cost > HOPELESS)
     ]
@@ -194,7 +194,7 @@ def _others(screened: list[Candidate], refits: list[FittedCandidate]) -> list[Ca
 
 
 def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Rejection | None:
-    """Objection to an effect whose twin is left out of the library: none of the two can be told from the other."""
+    """Objection to an effect whose twin is left out of the library: the data cannot distinguish the two."""
     twins = {e.public_name() for e in CATALOGUE if effect.twin == e.name or e.twin == effect.name}
     untried = sorted(twins - {e.public_name() for e in effects})
     if not untried:

@@ -36,7 +36,7 @@ class Step:
     accepted : bool
         Whether it was added.
     rivals : tuple of FittedCandidate
-        Refits that records left out cannot tell from the best.
+        Refits that cross-validation cannot distinguish from the best.
     rejected : tuple of Rejection
         All others.
     renewed : Fitted or None

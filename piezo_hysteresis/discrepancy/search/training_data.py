@@ -38,7 +38,7 @@ class TrainingData:
     extent : Extent
         What the records span.
     alone : tuple of int
-        Records whose kind has no other, or that alone tell a number; they are never left out.
+        Records whose kind has no other, or that alone determine a parameter; they are never left out.
     """
 
     records: tuple[Record, ...]
@@ -49,7 +49,10 @@ class TrainingData:
 
     @property
     def begins_at_levels(self) -> bool:
-        """Whether the stage had settled at more than one level: what it does there beyond a constant can be told."""
+        """Whether the stage had settled at more than one level.
+
+        What it does there beyond a constant can be determined.
+        """
         levels = [r.settled_voltage for r in self.records if not r.continues]
         return bool(levels) and max(levels) - min(levels) > LEVELS_APART * self.extent.span
 

@@ -36,7 +36,10 @@ class Backlash(Effect):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        """Off, and of several widths: a play wider than the steps of a noise does not act as its slope at 0 tells."""
+        """Off, and several widths.
+
+        The slope at width 0 does not predict a play that is wider than the noise of the drive.
+        """
         return cls(), *(cls(b=share * extent.span) for share in FOUND_BY)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:

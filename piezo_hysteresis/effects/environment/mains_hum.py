@@ -28,7 +28,7 @@ class MainsHum(Effect):
     Notes
     -----
     t counts from the start of the record, or of the first of those that continue one another, so that amplitude, phase
-    and frequency of short records can be told apart. In block-averaged records they are those after averaging.
+    and frequency of short records can be distinguished. In block-averaged records they are those after averaging.
     """
 
     name = "mains_hum"

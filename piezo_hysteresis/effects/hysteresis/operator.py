@@ -186,12 +186,12 @@ def range_of(loops: Sequence[Loop]) -> float:
 
 def thinned(loop: Loop, points: int) -> Loop:
     """Fewer points, the extremes of v in every segment among them, so that no turning point is lost."""
-    stretch = -(-3 * loop.v.size // points)
-    if stretch < 4:
+    per_bin = -(-3 * loop.v.size // points)
+    if per_bin < 4:
         return loop
-    whole = loop.v.size // stretch
-    rows = loop.v[: whole * stretch].reshape(whole, stretch)
-    first = stretch * np.arange(whole)
+    whole = loop.v.size // per_bin
+    rows = loop.v[: whole * per_bin].reshape(whole, per_bin)
+    first = per_bin * np.arange(whole)
     keep = np.unique(
         np.concatenate((first, first + rows.argmin(axis=1), first + rows.argmax(axis=1), [loop.v.size - 1]))
     )

@@ -29,7 +29,7 @@ class RateDependentHysteresis(Term):
     -----
     v̇ = Δv/Ts is the speed of the drive between two samples and v0 = 1 normalised unit per second. Speeds below
     1e-4 per second count as that, so that the law stays finite at rest. A change of v by more than 0.05 in one sample
-    of a slow record may be a jump or part of a ramp, which that record cannot tell: `jumps` is for both.
+    of a slow record may be a jump or part of a ramp, and the record does not show which: `jumps` covers both.
     """
 
     name = "rate_dependent_hysteresis"

@@ -23,7 +23,8 @@ class Offset(Effect):
     Notes
     -----
     How far creep and hysteresis had settled before a record begins depends on what was done for minutes or days before,
-    which no record tells. The ratio r keeps that out of the effects that are sought: the same for all records.
+    which no record shows. The ratio r absorbs it, so that it is not taken for another effect. r is the same for all
+    records.
 
     Examples
     --------

@@ -36,7 +36,7 @@ _NO_REGENERATION = (-200077, "Regeneration is not emulated; set out_stream.regen
 
 @dataclass(slots=True)
 class Task:
-    """What was told to a task."""
+    """The configuration of a task."""
 
     kind: int = 0
     channels: list[str] = field(default_factory=list)
@@ -162,7 +162,7 @@ class Calls:
         elif wanted < 0:
             wanted = task.samples
         if task.rate:
-            self._wait(lambda: self._card.lacking(wanted), request.timeout, _TIMEOUT)
+            self._wait(lambda: self._card.remaining(wanted), request.timeout, _TIMEOUT)
         with self._turn:
             values = self._card.read(task.channels, wanted) if task.rate else self._card.look(task.channels)
         count = values.shape[1]
@@ -180,8 +180,8 @@ class Calls:
         return {"value": _VERSION.get(request.attribute_raw, 0)}
 
     def GetTaskAttributeString(self, request: Any) -> dict[str, Any]:
-        told = {_NAME_OF_TASK: request.task.name, _CHANNELS_OF_TASK: self._listed(request)}
-        return {"value": told.get(request.attribute_raw, "")}
+        attributes = {_NAME_OF_TASK: request.task.name, _CHANNELS_OF_TASK: self._listed(request)}
+        return {"value": attributes.get(request.attribute_raw, "")}
 
     def GetTaskAttributeUInt32(self, request: Any) -> dict[str, Any]:
         return {"value": len(self._task(request).channels)}
@@ -210,12 +210,12 @@ class Calls:
         task.channels.append(channel)
         return {}
 
-    def _wait(self, lacking: Callable[[], float], timeout: float, error: tuple[int, str]) -> None:
-        """Wait until nothing lacks, without keeping other calls waiting."""
+    def _wait(self, remaining: Callable[[], float], timeout: float, error: tuple[int, str]) -> None:
+        """Wait until `remaining` is 0 s, without blocking other calls."""
         due = time.monotonic() + timeout if timeout >= 0 else float("inf")
         while True:
             with self._turn:
-                left = lacking()
+                left = remaining()
             if left <= 0:
                 return
             if time.monotonic() + left > due or self._ended.is_set():

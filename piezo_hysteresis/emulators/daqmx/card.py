@@ -123,11 +123,11 @@ class Card:
 
     def look(self, channels: Sequence[str]) -> Samples:
         """One reading of each channel [V], without a clock; shape (channels, 1)."""
-        with suppress(CardError):  # an empty buffer is told to who writes
+        with suppress(CardError):  # the writer gets the error of an empty buffer
             self._advance()
         return self._chosen(self._run(np.full(1, self.voltage)), channels)
 
-    def lacking(self, count: int) -> float:
+    def remaining(self, count: int) -> float:
         """Time until `count` samples can be read [s]; infinite where they never can."""
         if not self.is_running and not self._is_finite:
             raise CardError(NOT_RUNNING, "The specified task is not running.")

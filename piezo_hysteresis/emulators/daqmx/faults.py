@@ -21,7 +21,7 @@ FAULTS = FaultCatalogue(
         "garbled": (_IN_A_STREAM, "one sample is no number"),
     },
     lasting={
-        "wrong_clock": "samples at half the rate asked for, and tells so",
+        "wrong_clock": "samples at half the requested rate, and reports that rate",
         "saturated": "the amplifier ends at half of the voltage range",
         "stale": "readings of the sensor stand still",
         "swapped": "the inputs of sensor and monitor are exchanged",

@@ -52,10 +52,10 @@ def positive(word: str) -> int:
 
 
 def of_axis(value: Callable[[], float | str]) -> Command:
-    """The command that tells a value of the axis."""
+    """The query of a value of the axis."""
     return lambda arguments: items(dict.fromkeys(axes(arguments), value()))
 
 
 def of_channel(value: Callable[[], float | str]) -> Command:
-    """The command that tells a value of the output channel or generator."""
+    """The query of a value of the output channel or generator."""
     return lambda arguments: items(dict.fromkeys(channels(arguments), value()))

@@ -119,8 +119,8 @@ class Controller:
             self._error = int(struck["error"])
             return Reply(None, struck)
         if name == "ERR?":
-            self._error, told = 0, self._error
-            return Reply([str(told)], struck)
+            self._error, number = 0, self._error
+            return Reply([str(number)], struck)
         try:
             if name not in self._commands:
                 raise Refusal(UNKNOWN_COMMAND)

@@ -15,7 +15,7 @@ FAULTS = FaultCatalogue(
     },
     lasting={
         "short_record": "the recorder stops at four fifths of its waveform",
-        "wrong_servo_time": "runs at twice the servo time that SPA? tells",
+        "wrong_servo_time": "runs at twice the servo time that SPA? reports",
         "saturated": "the amplifier ends at half of the voltage range",
         "stale": "position readings stand still",
         "duplicated": "a block of recorded samples comes twice",

@@ -40,7 +40,7 @@ class Motion:
         if faults.lasts("wrong_servo_time"):
             stage.configure(2 * self.servo_time)
         self._waveform: Samples = np.empty(0)
-        self._told = time.monotonic()
+        self._updated = time.monotonic()
         self.command = stage.voltage
         self._position = 0.0
         self.advance()
@@ -62,7 +62,7 @@ class Motion:
 
     @property
     def position(self) -> float:
-        """Position [m] as the sensor tells it now."""
+        """Position [m] as the sensor reports it now."""
         self._run(np.full(1, self.command))
         return self._position
 
@@ -72,9 +72,9 @@ class Motion:
         if math.isinf(self._speed):
             cycles = self._waveform.size
         else:
-            cycles = int((now - self._told) * self._speed / self.cycle)
-            now = self._told + cycles * self.cycle / self._speed
-        self._told = now
+            cycles = int((now - self._updated) * self._speed / self.cycle)
+            now = self._updated + cycles * self.cycle / self._speed
+        self._updated = now
         played, self._waveform = self._waveform[:cycles], self._waveform[cycles:]
         if played.size:
             self._run(played)
@@ -88,7 +88,7 @@ class Motion:
 
     def play(self, waveform: Samples) -> None:
         """Play drive voltages [V], one per servo cycle, from now on."""
-        self._told, self._waveform = time.monotonic(), waveform
+        self._updated, self._waveform = time.monotonic(), waveform
         self.advance()
 
     def stop(self) -> None:

@@ -13,7 +13,7 @@ from .refusal import Refusal
 
 
 class RecorderCommands:
-    """What a user can ask of and tell a recorder.
+    """The commands of a data recorder: settings and queries.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ class Gcs2Server:
     ----------
     controller : Controller
     host : str
-        Address to listen at; the loop-back device unless told otherwise.
+        Address to listen at; the loop-back device unless stated otherwise.
     port : int
         TCP port; 0 for any free one.
 

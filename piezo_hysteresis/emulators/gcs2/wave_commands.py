@@ -15,7 +15,7 @@ from .wave import WaveGenerator
 
 
 class WaveCommands:
-    """What a user can ask of and tell a wave generator.
+    """The commands of a wave generator: settings and queries.
 
     Parameters
     ----------

@@ -200,7 +200,7 @@ def fit(
         damping = max(damping / 10.0, 1e-12)
         total = weighted(current, sizes)
         iterations += 1
-        converged = decrease < tolerance and damping < TRUSTED  # a step that was held back tells nothing
+        converged = decrease < tolerance and damping < TRUSTED  # a step that was held back shows nothing
         if progress is not None:
             progress("joint fit", iterations / max_iterations)
     return Fit(

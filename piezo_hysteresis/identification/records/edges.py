@@ -1,4 +1,4 @@
-"""`Edge`: a jump of the drive between two quiet stretches."""
+"""`Edge`: a jump of the drive between two quiet intervals."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The jump with which a record begins: a step experiment within a slow one, that shows delay and lag.
 
-At one frequency a lag and a narrow play turn the loop alike. Only the first moments behind a jump tell them apart, and
+At one frequency a lag and a narrow play turn the loop alike. Only the first moments behind a jump distinguish them, and
 they are few: as a block of their own they keep the weight that they deserve.
 """
 

@@ -10,7 +10,7 @@ from ...record import Experiment
 from .excitation_content import ExcitationContent, excitation_content
 
 HELD_OUT = ("validation",)
-"""Phases that are not fitted, unless told otherwise."""
+"""Phases that are not fitted, unless stated otherwise."""
 CARRYING = ("conditioning",)
 """Phases that bring the stage into a known state; what happened before them is not known."""
 LARGE = 0.5

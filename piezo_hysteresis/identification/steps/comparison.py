@@ -22,7 +22,7 @@ from .three_steps import voltage_signals
 LOW, HIGH = 20.0, 500.0
 """Frequencies [Hz] between which the shape of G is compared."""
 TOLERANCE = 0.05
-"""Relative difference from which it is told."""
+"""Relative difference from which it is reported."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 At 50 kHz the poles of a mode at 500 Hz lie within 0.06 of z = 1. Coefficients of A(z) then depend on one another to
 the last digits, and noise at high frequencies outweighs the modes. A sum of sections of second order has neither
-trouble; where it begins, dynamics found at a lower rate tell, with their poles carried back by z → z^(1/q).
+problem. Its starting values are the poles of dynamics that were found at a lower rate, mapped back by z → z^(1/q).
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def identify_modes(
     Raises
     ------
     IdentificationError
-        On other orders, if no record is long enough or tells a mode, or if poles crowd so much that rounded
+        On other orders, if no record is long enough or shows a mode, or if poles crowd so much that rounded
         coefficients do not hold them.
 
     Notes
@@ -74,7 +74,7 @@ def identify_modes(
             residual = _projected(sections, few)[1]
             found.append((float(residual @ residual), sections))
     if not found:
-        raise IdentificationError(f"modes: got no record that tells any, expected {SHORTEST * max(FACTORS)} samples")
+        raise IdentificationError(f"modes: got no record that shows one, expected {SHORTEST * max(FACTORS)} samples")
     _, sections = min(found, key=lambda f: f[0])
     a, b = _polynomials(*_fitted(sections, few))
     arx = settling(a, b, delay)

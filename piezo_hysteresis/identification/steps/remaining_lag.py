@@ -33,7 +33,7 @@ def lag(fit: Fit) -> tuple[float, float]:
 
 
 def lag_notices(fit: Fit, contents: Sequence[ExcitationContent]) -> tuple[Notice, ...]:
-    """Notices ``lag_only``, and ``one_frequency`` where lag and hysteresis cannot be told apart.
+    """Notices ``lag_only``, and ``one_frequency`` where lag and hysteresis cannot be distinguished.
 
     Parameters
     ----------

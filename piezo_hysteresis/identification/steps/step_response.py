@@ -69,7 +69,7 @@ def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
     Raises
     ------
     IdentificationError
-        If there is no edge with a quiet stretch before it.
+        If there is no edge with a quiet interval before it.
     """
     edges = [(record, edge) for record in records for edge in find_edges(record.voltage, 8 * every, 4 * every)]
     if not edges:
@@ -170,7 +170,7 @@ def _foretold(base: Samples) -> tuple[float, float]:
     Returns
     -------
     float
-        Measured minus foretold [m].
+        Measured minus predicted [m].
     float
         Its variance for white noise of variance 1.
     """

@@ -113,7 +113,7 @@ def _cut(record: Record, index: int, largest: float) -> list[RecordPiece]:
 
 
 def _loops(record: Record, u: Samples, largest: float) -> list[tuple[int, int, int]]:
-    """Ends of the stretches of one rate and one amplitude, with the classes of both."""
+    """Ends of the sections of one rate and one amplitude, with the classes of both."""
     if not u.size:
         return []
     turns = np.empty(u.size, np.int64)
@@ -142,7 +142,7 @@ def _loops(record: Record, u: Samples, largest: float) -> list[tuple[int, int, i
 
 
 def _with_parts(found: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
-    """A stretch longer than all others together in equal parts."""
+    """A section longer than all others together, cut into equal parts."""
     parts, begin = list[tuple[int, int, int]](), 0
     for end, rate, size in found:
         count = EQUAL if end - begin > found[-1][0] / 2 and end - begin >= EQUAL * FEWEST else 1

@@ -101,12 +101,12 @@ def choose_structure(
     progress("structure: fit", 0.7)
     final = _fit(_reduced(full.model, chosen), pieces, sizes)
     progress("structure: rival", 0.85)
-    told = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in judged[:3])
+    described = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in judged[:3])
     notices.append(
         Notice(
             "structure",
             f"chosen on rates, amplitudes and records left out: {_words(chosen.structure)}; "
-            f"error there in floors: {told}",
+            f"error there in floors: {described}",
         )
     )
     rival, lead = _rival(start, final, chosen, pieces, sizes)
@@ -151,8 +151,8 @@ def _dynamics(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[floa
         if _behind_steps(rings, pieces) < RINGING_STAYS * _behind_steps(best, pieces) and rings.cost < best.cost:
             best = rings
             mode = rings.model[ExtraResonance.name]
-            told = f"a mode at {mode['f0']:.4g} Hz with a damping ratio of {mode['zeta']:.2g}"
-            notices.append(Notice("ringing", f"the stage rings behind the step: {told}"))
+            described = f"a mode at {mode['f0']:.4g} Hz with a damping ratio of {mode['zeta']:.2g}"
+            notices.append(Notice("ringing", f"the stage rings behind the step: {described}"))
     poles = []
     for pole in (0.3, 0.8):
         arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=best.model[Arx.name]["delay"])

@@ -33,7 +33,7 @@ class PathRuns:
     driver : DriverClient
         Plays the drive.
     status : CompensationStatus
-        Where every step is told.
+        Where every step is reported.
     values : mapping of str to object
         Parameters of the node.
     applied : callable
@@ -92,9 +92,9 @@ class PathRuns:
             self._status.show("planned", described(found), name, expected=found.expected.total)
             return
         tracking = yield from self._play(name, found)
-        self._told(name, tracking)
+        self._report_result(name, tracking)
 
-    def _told(self, name: str, tracking: Tracking) -> None:
+    def _report_result(self, name: str, tracking: Tracking) -> None:
         rms, expected = tracking.rms or 0.0, tracking.plan.expected.total
         reason = f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm"
         self._status.show("done", reason, name, rms=rms, expected=expected)

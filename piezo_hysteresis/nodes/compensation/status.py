@@ -41,13 +41,13 @@ class CompensationStatus:
             send(self._publisher, status)
 
     def refuse(self, phase: str, reason: str) -> None:
-        """Tell that nothing moves, and why."""
+        """Report that nothing moves, and why."""
         self.refused += 1
         self._node.get_logger().warning(f"refused '{phase}': {reason}", throttle_duration_sec=0.1)
         self.show("refused", reason, phase, DiagnosticStatus.WARN)
 
     def failed(self, phase: str, reason: str) -> None:
-        """Tell what went wrong after something had moved."""
+        """Report what went wrong after something had moved."""
         self._node.get_logger().error(f"'{phase}': {reason}")
         self.show("failed", reason, phase, DiagnosticStatus.ERROR)
 

@@ -23,12 +23,12 @@ class Tracking:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.first: int | None = None
-        """Index of the first sample of the drive, once the driver has told it."""
+        """Index of the first sample of the drive, once the driver has reported it."""
         self._measured = np.full(plan.voltage.size, np.nan)
         self._early: list[SampleBlock] = []
 
     def begin(self, first: int) -> None:
-        """The drive begins at this index; blocks that came before the driver told so are taken in."""
+        """The drive begins at this index; blocks that arrived before the driver reported it are added."""
         self.first = first
         early, self._early = self._early, []
         for block in early:

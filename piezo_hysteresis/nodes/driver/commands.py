@@ -31,7 +31,7 @@ _SET_POINT_INTERVAL = 1.0
 
 
 class DriverCommands:
-    """Passes commands to the attached stage, or refuses them whole; every refusal is told with its reason.
+    """Passes commands to the attached stage, or refuses them whole; every refusal is reported with its reason.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ class DriverCommands:
     """
 
     def __init__(
-        self, node: GuardedNode, diagnostics: DriverDiagnostics, latch: StopLatch, tell_latch: Callable[[], None]
+        self, node: GuardedNode, diagnostics: DriverDiagnostics, latch: StopLatch, publish_latch: Callable[[], None]
     ) -> None:
-        self._node, self._diagnostics, self._latch, self._tell_latch = node, diagnostics, latch, tell_latch
+        self._node, self._diagnostics, self._latch, self._publish_latch = node, diagnostics, latch, publish_latch
         self._attached: tuple[DriverSession, DriverTopics] | None = None
         self._claim = diagnostics.claim
         self._claims = DriverClaims(node, self._claim, lambda: self._stage()[0].streaming, self._refuse)
@@ -88,8 +88,8 @@ class DriverCommands:
         except PiezoError as error:
             self._refuse(name, stamp, error)
         else:
-            told = f"playing {phase}: {waveform.size * session.sample_period:g} s"
-            self._node.get_logger().info(told, throttle_duration_sec=_LOG_INTERVAL)
+            message = f"playing {phase}: {waveform.size * session.sample_period:g} s"
+            self._node.get_logger().info(message, throttle_duration_sec=_LOG_INTERVAL)
 
     def _on_set_voltage(self, message: Float64) -> None:
         try:
@@ -102,7 +102,7 @@ class DriverCommands:
     def _stop(self) -> str:
         """Go to the safe voltage, and let nothing move until the stop is released."""
         self._latch.set()
-        self._tell_latch()
+        self._publish_latch()
         return f"{self._go_to_safety(latch=True)}; nothing moves until ~/release"
 
     def _cancel(self) -> str:
@@ -111,7 +111,7 @@ class DriverCommands:
 
     def _release(self) -> str:
         was_set = self._latch.release()
-        self._tell_latch()
+        self._publish_latch()
         return "the driver accepts commands again" if was_set else "the driver was not stopped"
 
     def _go_to_safety(self, latch: bool) -> str:
@@ -123,16 +123,16 @@ class DriverCommands:
             return f"{error}; it was left at its safe voltage"
         if not was_playing:
             topics.stopped(phase)
-        told = f"on the way to the safe voltage, {session.limits.safe_voltage:g} V"
-        self._node.get_logger().info(f"stopped {phase}: {told}", throttle_duration_sec=_LOG_INTERVAL)
-        return told
+        message = f"on the way to the safe voltage, {session.limits.safe_voltage:g} V"
+        self._node.get_logger().info(f"stopped {phase}: {message}", throttle_duration_sec=_LOG_INTERVAL)
+        return message
 
     def _refuse(self, name: str, stamp: int, reason: PiezoError) -> None:
         self._diagnostics.refused += 1
-        told = f"refused '{name}': {reason}"
+        message = f"refused '{name}': {reason}"
         if name == "set_voltage":  # each line of code has an interval of its own
-            self._node.get_logger().warning(told, throttle_duration_sec=_SET_POINT_INTERVAL)
+            self._node.get_logger().warning(message, throttle_duration_sec=_SET_POINT_INTERVAL)
         else:
-            self._node.get_logger().warning(told, throttle_duration_sec=_LOG_INTERVAL)
+            self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
         if self._attached is not None:
             self._attached[1].refused(name, stamp, str(reason))

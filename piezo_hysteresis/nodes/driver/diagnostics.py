@@ -47,12 +47,12 @@ class DriverDiagnostics:
         node.create_timer(1.0, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def state(self, level: bytes, message: str, stage: str = "") -> None:
-        """Tell a state of the driver from now on."""
+        """Report a state of the driver from now on."""
         self._state = (level, message, stage)
         self.publish()
 
     def watch(self, acquisition: StreamingAcquisition | None, rate: float = 0.0) -> None:
-        """Tell the figures of an acquisition that shall reach a rate [samples per s]; None ends it."""
+        """Report the figures of an acquisition that shall reach a rate [samples per s]; None ends it."""
         self._acquisition, self._target = acquisition, rate
         self._seen = (time.monotonic(), 0, 0.0, 0.0)
 

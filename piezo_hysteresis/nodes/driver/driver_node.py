@@ -84,7 +84,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         self._commands.end()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Open the stage; on failure the node stays unconfigured and tells why."""
+        """Open the stage; on failure the node stays unconfigured and logs the reason."""
         try:
             settings = DriverSettings.from_values(read(self, DRIVER))
             values = read(self, BACK_ENDS[settings.stage].rows, f"{settings.stage}.")
@@ -96,10 +96,10 @@ class DriverNode(GuardedNode, LifecycleNode):
                 session.close()
                 raise
         except Exception as error:  # rclpy would end the transition without a word
-            self._tell_failure(error)
+            self._report_failure(error)
             return TransitionCallbackReturn.FAILURE
         name = session.limits.name
-        self._tell_in_force(session.in_force())
+        self._publish_in_force(session.in_force())
         self._session = session
         self._topics = DriverTopics(self, name, session.sample_period, settings.live_rate)
         self._commands.attach(session, self._topics)
@@ -158,11 +158,11 @@ class DriverNode(GuardedNode, LifecycleNode):
             try:
                 self._session.make_safe()
             except Exception as error:
-                self._tell_failure(error)
+                self._report_failure(error)
 
     def _release(self) -> None:
         self._commands.detach()
-        self._tell_in_force({row.name: row.value for row in IN_FORCE} | {"stopped": self._latch.is_set})
+        self._publish_in_force({row.name: row.value for row in IN_FORCE} | {"stopped": self._latch.is_set})
         session, self._session = self._session, None
         topics, self._topics = self._topics, None
         if topics is not None:
@@ -171,12 +171,12 @@ class DriverNode(GuardedNode, LifecycleNode):
             try:
                 session.close()
             except Exception as error:
-                self._tell_failure(error)
+                self._report_failure(error)
 
     def _fail(self, error: PiezoError) -> None:
         """The acquisition has ended by itself, in its thread: leave the active state from the executor's."""
         self._failure = error
-        self._tell_failure(error)
+        self._report_failure(error)
         self.executor.create_task(self.guarded(self._give_up))
 
     def _give_up(self) -> None:
@@ -184,20 +184,20 @@ class DriverNode(GuardedNode, LifecycleNode):
             self.trigger_deactivate()
 
     def _latch_changed(self) -> None:
-        """The driver was stopped or released, in a thread of its own: tell it from the executor's."""
+        """The driver was stopped or released, in a thread of its own: show it from the executor's."""
         if self.executor is not None:
-            self.executor.create_task(self.guarded(self._tell_latch))
+            self.executor.create_task(self.guarded(self._publish_latch))
 
-    def _tell_latch(self) -> None:
-        self._tell_in_force({"stopped": self._latch.is_set})
+    def _publish_latch(self) -> None:
+        self._publish_in_force({"stopped": self._latch.is_set})
         self._diagnostics.publish()
 
-    def _tell_failure(self, error: Exception) -> None:
+    def _report_failure(self, error: Exception) -> None:
         reason = reason_of(error)
         self.get_logger().error(reason)
         self._diagnostics.state(DiagnosticStatus.ERROR, reason)
 
-    def _tell_in_force(self, values: Mapping[str, object]) -> None:
+    def _publish_in_force(self, values: Mapping[str, object]) -> None:
         self._telling = True
         self.set_parameters([Parameter(f"in_force.{name}", value=value) for name, value in values.items()])
         self._telling = False

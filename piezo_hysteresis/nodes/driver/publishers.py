@@ -63,41 +63,41 @@ class DriverTopics:
 
     def deliver(self, delivery: Delivery) -> None:
         """Publish a block: phases that begin in it first, commands that end in it last."""
-        begun = [e for e in delivery.events if e.happening is EventKind.BEGAN]
-        ended = [e for e in delivery.events if e.happening is not EventKind.BEGAN]
+        begun = [e for e in delivery.events if e.kind is EventKind.BEGAN]
+        ended = [e for e in delivery.events if e.kind is not EventKind.BEGAN]
         for event in begun:
             send(self._phase, String(data=str(event.phase)))
-            self._tell(event, delivery.first)
+            self._publish_event(event, delivery.first)
         if not send(self._samples, self._writer.write(delivery.block)):
-            told = f"the middleware did not accept a block of {delivery.block.size} samples; the block is lost"
-            self._node.get_logger().warning(told)
+            message = f"the middleware did not accept a block of {delivery.block.size} samples; the block is lost"
+            self._node.get_logger().warning(message)
         for event in ended:
-            self._tell(event, delivery.first)
+            self._publish_event(event, delivery.first)
         last = delivery.first + delivery.block.size - 1
         if last >= self._next_live:
             self._next_live = (last // self._live_step + 1) * self._live_step
             self._publish_live(delivery.block)
 
     def accepted(self, phase: Phase, size: int) -> None:
-        """Tell that a command of so many samples will be played."""
+        """Report that a command of so many samples will be played."""
         self._publish_status(DiagnosticStatus.OK, phase.name, f"{size} samples", "accepted", phase.stamp, phase.number)
 
     def refused(self, name: str, stamp: int, reason: str) -> None:
-        """Tell that a command will not be played, and why."""
+        """Report that a command will not be played, and why."""
         self._publish_status(DiagnosticStatus.WARN, name, reason, "refused", stamp)
 
     def stopped(self, phase: Phase) -> None:
-        """Tell that the stage was asked to stop when no command was playing."""
+        """Report that the stage was asked to stop when no command was playing."""
         self._publish_status(DiagnosticStatus.WARN, phase.name, "stop", "stopped", phase.stamp, phase.number)
 
-    def _tell(self, event: Event, first: int) -> None:
+    def _publish_event(self, event: Event, first: int) -> None:
         phase = event.phase
         if not phase.commanded:
             return
-        if event.happening is EventKind.BEGAN:
+        if event.kind is EventKind.BEGAN:
             self._first = {phase.number: first + event.offset}
-        level = DiagnosticStatus.WARN if event.happening is EventKind.STOPPED else DiagnosticStatus.OK
-        state = _STATES[event.happening]
+        level = DiagnosticStatus.WARN if event.kind is EventKind.STOPPED else DiagnosticStatus.OK
+        state = _STATES[event.kind]
         began = self._first.get(phase.number, first + event.offset)
         self._publish_status(level, phase.name, state, state, phase.stamp, phase.number, began)
 

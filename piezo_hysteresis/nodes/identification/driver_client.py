@@ -31,7 +31,7 @@ _POLL_INTERVAL = 0.5
 """Time between two questions to the driver [s]."""
 
 _FRESH = 3.0
-"""Age of an answer of the driver that still tells what it is [s]."""
+"""Greatest age of a status of the driver that still counts as its present state [s]."""
 
 _CLAIM_INTERVAL = 0.5
 """Time between repetitions of a claim [s]."""

@@ -52,7 +52,7 @@ def identification(path: Path, model: str, report: Report) -> Outcome:
 
 
 def diagnosis(path: Path, model: str, report: Report) -> Outcome:
-    """Find what the model so far lacks, or a new one where there is none, and extend it; writes ``answer.json``."""
+    """Diagnose the present model, or a new one if there is none, and extend it; writes ``answer.json``."""
     found = diagnose(read(path), loads(model) if model else None, progress=report)
     folder = path if path.is_dir() else path.parent
     model_file = "" if found.model is None else str(folder / "diagnosis.yaml")

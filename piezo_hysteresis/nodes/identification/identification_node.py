@@ -30,7 +30,7 @@ from ..runtime.sending import send
 from ..topics import advertise
 from .driver_client import DriverClient
 from .fit_process import FitProcess, Job, diagnosis, identification
-from .protocol_runner import Progress, campaign
+from .protocol_runner import Progress, run_protocol
 from .served_model import ServedModel
 from .status import IdentificationStatus
 
@@ -181,7 +181,7 @@ class IdentificationNode(GuardedNode):
         self._moves = True
         self._status.experiment = str(path)
         self._status.owner = self._driver.owner
-        yield from campaign(self, self._driver, plan, path)
+        yield from run_protocol(self, self._driver, plan, path)
         save_decimation(path, {phase.name: phase.stored_every for phase in planned[0]})
         self._last = path
         yield from self._fit(identification, path)

@@ -1,4 +1,4 @@
-"""`campaign`: a protocol played to the stage phase by phase, while everything is recorded."""
+"""`run_protocol`: a protocol is played to the stage phase by phase, while everything is recorded."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Progress:
     phase: str = ""
 
 
-def campaign(
+def run_protocol(
     node: GuardedNode, driver: DriverClient, plan: Callable[[DriveLimits], Protocol], path: Path
 ) -> Generator[Progress]:
     """Play and record a protocol; to be resumed at short intervals until it ends.
@@ -81,10 +81,10 @@ def campaign(
     protocol = plan(driver.limits)
     recorder = BagRecorder(node, path)
     try:
-        for told in _all_phases(driver, recorder, protocol, path):
+        for progress in _all_phases(driver, recorder, protocol, path):
             if recorder.failure is not None:
                 raise recorder.failure
-            yield told
+            yield progress
     except BaseException as error:  # that the iterator was closed, too
         driver.stop()
         driver.release()
@@ -95,7 +95,7 @@ def campaign(
 
 
 def _close_after(error: BaseException, recorder: BagRecorder) -> None:
-    """End the recording of a campaign that failed; where that fails too, both are told."""
+    """End the recording of a protocol that failed; if that fails too, both errors are reported."""
     try:
         recorder.close()
     except RecordingError as lost:
@@ -117,11 +117,11 @@ def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol,
         yield from _until(lambda: driver.is_safe, lambda: "the safe voltage")
     done = 0.0
     for number, phase in enumerate(protocol, 1):
-        told = Progress(
+        progress = Progress(
             "running", str(path), done / protocol.summary.duration, f"{number} of {len(protocol)} {phase.name}"
         )
-        yield from _reach(driver, phase, told)
-        yield from _play(driver, recorder, phase, told)
+        yield from _go_to_start(driver, phase, progress)
+        yield from _play(driver, recorder, phase, progress)
         done += phase.duration
     # what is written lags behind the status while the computer is busy
     end = driver.first_index + protocol.phases[-1].voltage.size
@@ -143,7 +143,7 @@ def _require_claim(driver: DriverClient) -> None:
         raise StageError("the claim on the stage has ended: this node stood still, or the driver was started again")
 
 
-def _reach(driver: DriverClient, phase: ProtocolPhase, told: Progress) -> Generator[Progress]:
+def _go_to_start(driver: DriverClient, phase: ProtocolPhase, progress: Progress) -> Generator[Progress]:
     """What is known of the voltage is a moment old: newer ones are waited for before a phase is sent."""
     seen, deadline = driver.voltages, time.monotonic() + _SETTLING
     while True:
@@ -153,10 +153,10 @@ def _reach(driver: DriverClient, phase: ProtocolPhase, told: Progress) -> Genera
         if time.monotonic() > deadline:
             why = f"{reason}; the stage was moved by somebody else" if reason else "'voltage' is silent"
             raise StageError(f"phase '{phase.name}': {why}")
-        yield told
+        yield progress
 
 
-def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, told: Progress) -> Generator[Progress]:
+def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, progress: Progress) -> Generator[Progress]:
     driver.send(phase)
     # a device that plays from its memory is silent meanwhile
     longest_silence = PATIENCE + 2.0 * phase.duration
@@ -181,4 +181,4 @@ def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, tol
                 f"phase '{phase.name}' was played, but the driver did not report its end; check whether "
                 "others send many commands"
             )
-        yield told
+        yield progress

@@ -45,24 +45,24 @@ class IdentificationStatus:
         return "" if self._shown is None else values_of(self._shown)["state"]
 
     def progress(self, progress: Progress) -> None:
-        """Tell where the job under way stands; every new state and phase in the log, too."""
+        """Report where the job under way stands; every new state and phase in the log, too."""
         if (stage := (progress.state, progress.phase)) != self._logged:
             self._logged = stage
             self._node.get_logger().info(f"{progress.state}: {progress.phase or progress.reason}")
         self._show(DiagnosticStatus.OK, progress.state, progress.reason, progress.phase, progress.fraction)
 
     def done(self, verdict: str) -> None:
-        """Tell the result."""
+        """Report the result."""
         self._node.get_logger().info(f"done: {verdict}")
         self._show(DiagnosticStatus.OK, "done", verdict, fraction=1.0)
 
     def failed(self, reason: str) -> None:
-        """Tell what went wrong."""
+        """Report what went wrong."""
         self._node.get_logger().error(reason)
         self._show(DiagnosticStatus.ERROR, "failed", reason)
 
     def aborted(self, reason: str) -> None:
-        """Tell that the job was given up."""
+        """Report that the job was given up."""
         self._node.get_logger().warning(f"aborted: {reason}")
         self._show(DiagnosticStatus.WARN, "aborted", reason)
 

@@ -68,7 +68,7 @@ class CloudWriter:
         self._common: tuple[int, str] | None = None
 
     def write(self, columns: Mapping[str, ArrayLike], stamp: Time, frame_id: str = "", *, dense: bool = True) -> bytes:
-        """Serialised cloud; parameters as for `to_cloud`, where the first column tells how many points there are."""
+        """Serialised cloud; parameters as for `to_cloud`; the first column gives the number of points."""
         common = np.size(next(iter(columns.values()))), frame_id
         if common != self._common:
             self._begin(*common)

@@ -28,7 +28,7 @@ def phase_name(frame_id: str) -> str:
 
 
 def phase_and_owner(frame_id: str) -> tuple[str, str]:
-    """Name and owner of a commanded phase, from ``"<name>@<owner>"``; the owner is empty where none is told.
+    """Name and owner of a commanded phase, from ``"<name>@<owner>"``; the owner is empty if none is given.
 
     Raises
     ------

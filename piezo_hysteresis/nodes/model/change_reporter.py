@@ -82,7 +82,7 @@ class ChangeReporter:
         try:
             completed = self._watch.add(np.ascontiguousarray(block.voltage), answer, predictor, stamp)
         except PiezoError as error:
-            self._tell(f"the change watch has stopped: {error}")
+            self._report_problem(f"the change watch has stopped: {error}")
             return
         if completed:
             self._save()
@@ -101,7 +101,7 @@ class ChangeReporter:
         try:
             baseline = Baseline.load(path) if path.is_file() else None
         except PiezoError as error:
-            self._tell(str(error))
+            self._report_problem(str(error))
         self._watch, self._alarms = ChangeWatch(self._interval, baseline), 0
 
     def _save(self) -> None:
@@ -112,12 +112,14 @@ class ChangeReporter:
             self._folder.mkdir(parents=True, exist_ok=True)
             self._watch.baseline.save(path)
         except OSError as error:
-            self._tell(f"{path}: the baseline cannot be written ({error.strerror}); it holds until the node ends")
+            self._report_problem(
+                f"{path}: the baseline cannot be written ({error.strerror}); it holds until the node ends"
+            )
         else:
             self._problem = ""
             self._node.get_logger().info(f"baseline of the change watch taken and kept in {path}")
 
-    def _tell(self, problem: str) -> None:
+    def _report_problem(self, problem: str) -> None:
         self._problem = problem
         self._node.get_logger().warning(problem, throttle_duration_sec=1.0)
 

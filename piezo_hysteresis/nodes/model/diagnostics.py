@@ -19,7 +19,7 @@ from ..topics import DIAGNOSTICS, advertise
 from .change_reporter import ChangeReporter
 
 _LONGEST_REASON = 500
-"""Characters of a reason that are told again every second."""
+"""Characters of a reason that are reported again every second."""
 
 _LOG_INTERVAL = 0.1
 """Shortest time between two lines of one kind in the log [s]: no stream of faults fills a disk."""
@@ -54,30 +54,30 @@ class ModelDiagnostics:
         node.create_timer(1.0, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def problem(self, message: str) -> None:
-        """Tell one line of what went wrong, now and in the next report."""
+        """Report one line of what went wrong, now and in the next report."""
         if message[:_LONGEST_REASON] != self._problem:
             self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
         self._problem = message[:_LONGEST_REASON]
         self._problems += 1
 
     def refused(self, message: str) -> None:
-        """Tell why a model was not taken, until another one is."""
+        """Report why a model was not taken, until another one is."""
         self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
         self._refused = message[:_LONGEST_REASON]
         self._problems += 1
 
     def model(self, model: Model) -> None:
-        """Tell the model that is followed from now on."""
+        """Report the model that is followed from now on."""
         self._model, self._refused = model, ""
         try:
             self._promised = float(model.provenance["free_run_error"])
         except (KeyError, ValueError):
             self._promised = None
-        told = f"model {model_hash(model)}: {', '.join(e.name for e in model.effects)}"
-        self._node.get_logger().info(told, throttle_duration_sec=_LOG_INTERVAL)
+        message = f"model {model_hash(model)}: {', '.join(e.name for e in model.effects)}"
+        self._node.get_logger().info(message, throttle_duration_sec=_LOG_INTERVAL)
 
     def follow(self, predictor: Predictor) -> None:
-        """Tell the figures of a predictor from now on."""
+        """Report the figures of a predictor from now on."""
         self._predictor = predictor
         self._seen = (time.monotonic(), 0, 0, 0)
 
@@ -93,7 +93,7 @@ class ModelDiagnostics:
         predictor, received = self._predictor, False
         lost = repeated = 0
         if predictor is not None:
-            counts, now = predictor.continuity, time.monotonic()
+            counts, now = predictor.sequence, time.monotonic()
             then, received_then, lost_then, repeated_then = self._seen
             self._seen = (now, counts.received, counts.lost, counts.repeated)
             received = counts.received > received_then
@@ -126,8 +126,8 @@ class ModelDiagnostics:
         clock = self._node.get_clock()
         if clock.ros_time_is_active and clock.now().nanoseconds == 0:
             yield DiagnosticStatus.WARN, "use_sim_time is true, and nothing comes on /clock"
-        for told in filter(None, (self._refused, self._problem, self._node.recent_fault)):
-            yield DiagnosticStatus.ERROR, told
+        for message in filter(None, (self._refused, self._problem, self._node.recent_fault)):
+            yield DiagnosticStatus.ERROR, message
         if predictor is None or not received:
             yield DiagnosticStatus.STALE, "no samples"
             return

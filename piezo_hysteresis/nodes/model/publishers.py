@@ -44,12 +44,12 @@ class ModelTopics:
         assert answer.model is not None
         if self._named is None or self._named[0] is not answer.model:
             self._named = (answer.model, hash_number(answer.model))
-        told = self._writer.write(
+        message = self._writer.write(
             block, answer.prediction, answer.residual, self._named[1], valid=not answer.warming_up
         )
-        send(self._samples, told)
+        send(self._samples, message)
         step = max(1, round(1.0 / (self._live_rate * predictor.sample_period)))
-        received = predictor.continuity.received
+        received = predictor.sequence.received
         if received >= self._next_live or received < self._next_live - step:
             self._next_live = (received // step + 1) * step
             self._publish_live(block, answer, predictor.residual_rms)

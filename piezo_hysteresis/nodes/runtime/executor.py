@@ -28,7 +28,7 @@ def make_executor() -> Executor:
 def spin_until(executor: Executor, done: Future, node: GuardedNode) -> None:
     """Serve the callbacks of a node until `done`, which may be set from any thread.
 
-    What is raised on the way, by the executor itself too, is told by the node, and the serving goes on.
+    The node reports every exception, also one of the executor itself, and goes on serving.
     """
     while not done.done():
         try:

@@ -42,7 +42,7 @@ class GuardedNode(Node):
         return self._newest_fault if time.monotonic() - self._fault_time < _REMEMBERED else ""
 
     def fault(self, error: Exception) -> None:
-        """Count an exception that left a callback, and tell it with the place where it was raised."""
+        """Count an exception that left a callback, and show it with the place where it was raised."""
         places = traceback.extract_tb(error.__traceback__)
         place = f" ({places[-1].filename}:{places[-1].lineno})" if places else ""
         self.faults += 1

@@ -42,7 +42,7 @@ def run(
 
     The handlers of rclpy would invalidate the context before anything can be done about it: here both signals only end
     the spinning, further ones are ignored, and `end` still publishes and serves. No exception out of a callback ends
-    the node: it is told, and the node goes on.
+    the node: it is reported, and the node goes on.
 
     Parameters
     ----------

@@ -12,7 +12,10 @@ LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability
 """`phase`, `model`, `claimed_by`: a late joiner gets the last one."""
 
 STATUS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""`status`: every phase of an experiment is told also to who was busy; a late joiner of depth 1 gets the last one."""
+"""`status`: a subscriber that was busy still gets every phase of an experiment.
+
+A late joiner of depth 1 gets the last one.
+"""
 
 COMMAND_STATUS = QoSProfile(
     depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL

@@ -122,7 +122,7 @@ class Baseline:
 
     @classmethod
     def of(cls, scores: Sequence[ChangeScore], model: str = "") -> Baseline:
-        """Baseline of a stretch of scores; classes with too few of them are left out.
+        """Baseline of a series of scores; classes with too few of them are left out.
 
         Raises
         ------

@@ -19,7 +19,7 @@ from .threshold import WINDOW, threshold
 Array = NDArray[np.float64]
 
 ALIKE = 0.97
-"""Cosine of two groups' directions from which the present drive cannot tell them apart."""
+"""Cosine of two groups' directions from which the present drive cannot distinguish them."""
 
 
 RECENTRED = 50
@@ -38,8 +38,8 @@ class Change:
     statistic : float
         Largest statistic over its threshold; above 1 the stage has changed.
     groups : tuple of str
-        Group that explains it best, and those that the present drive cannot tell from it; empty where nothing can be
-        said.
+        Group that explains it best, and those that the present drive cannot distinguish from it; empty where nothing
+        can be said.
     estimate, deviation : float
         Change of the first group and its standard deviation, in the unit of `UNITS`.
     onset : int

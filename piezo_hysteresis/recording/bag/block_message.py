@@ -25,7 +25,7 @@ _REQUIRED = {"voltage": "f8", "displacement": "f8"}
 """Fields without which a block is none."""
 
 _OPTIONAL = {name: FIELDS[name] for name in ("time", "index", "phase")}
-"""Fields that a block may lack."""
+"""Fields that a block need not have."""
 
 
 @functools.cache

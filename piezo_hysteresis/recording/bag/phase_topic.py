@@ -12,7 +12,7 @@ STRING = "std_msgs/msg/String"
 
 
 class PhaseNames:
-    """Names of phase numbers; numbers start again with the driver, so the time of reception tells them apart."""
+    """Names of phase numbers; numbers start again with the driver, so the time of reception distinguishes them."""
 
     def __init__(self) -> None:
         self._names: dict[int, list[tuple[int, str]]] = {}

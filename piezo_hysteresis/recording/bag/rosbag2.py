@@ -238,7 +238,7 @@ def _travel(segment: Segment) -> float:
 
 
 def _name(segment: Segment, names: PhaseNames, notices: list[Notice]) -> str:
-    """Recorded name of a stretch, or a proposed one."""
+    """Recorded name of a segment, or a proposed one."""
     name = names.at(segment.phase, segment.received_ns) or (IDLE if segment.phase == 0 else "")
     if not name:
         name = phase_name(segment.channels["voltage"], segment.sample_period)

@@ -1,4 +1,4 @@
-"""`SampleStream`: blocks of the topic `samples`, in the order of arrival, become stretches of one phase each."""
+"""`SampleStream`: blocks of the topic `samples`, in the order of arrival, become segments of one phase each."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PERIOD_TOLERANCE = 0.01
 """Blocks whose sample periods differ by more than this share do not belong together."""
 
 UNEVEN = 0.1
-"""Deviation of a step in the times of a block from their mean, as a share of it, above which it is told."""
+"""Deviation of a step in the times of a block from their mean, as a share of it, above which it is reported."""
 
 LONGEST_SILENCE = 60.0
 """An index that runs ahead of the clock by more than this is no gap but another start of the driver [s]."""
@@ -103,14 +103,14 @@ class SampleStream:
 
         Returns
         -------
-        segments : list of Stretch
+        segments : list of Segment
         notices : list of Notice
-            Repeated and reordered samples, and new starts of the driver; losses are told by the segments.
+            Repeated and reordered samples, and new starts of the driver; losses are reported by the segments.
 
         Raises
         ------
         RecordError
-            If nothing tells the sample period.
+            If the sample period cannot be determined.
         """
         segments: list[Segment] = []
         notices: list[Notice] = []
@@ -186,7 +186,7 @@ class SampleStream:
             )
         starts = [start for start, _, _ in pieces]
         lost = [0] + [start - _end(earlier) for start, earlier in zip(starts[1:], pieces, strict=False)]
-        pausing = self._after_pause if self._tells_pauses(pieces) else set()
+        pausing = self._after_pause if self._marks_pauses(pieces) else set()
         offsets = [0, *accumulate(b - a for _, a, b in pieces)]
         channels = {name: _gathered(column.array(), pieces) for name, column in self._channels.items()}
         phase = _gathered(self._phase.array(), pieces)
@@ -210,7 +210,7 @@ class SampleStream:
                 run.first and i == 0,
             )
 
-    def _tells_pauses(self, pieces: list[tuple[int, int, int]]) -> bool:
+    def _marks_pauses(self, pieces: list[tuple[int, int, int]]) -> bool:
         """False where blocks are said to follow a pause though nothing is missing: that mark means something else."""
         begin, end = pieces[0][1], max(b for _, _, b in pieces)
         announced = {start for start in self._after_pause if begin < start < end}

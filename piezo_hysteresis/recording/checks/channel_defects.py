@@ -9,7 +9,7 @@ from ...record import Notice, Record, Samples
 from .split_at_gaps import segments
 
 FEWEST_LEVELS = 1000
-"""Quantisation is told where a channel uses fewer levels than this; below a sixteenth of it nothing rests on it."""
+"""Quantisation is reported where a channel uses fewer levels than this; below a sixteenth of it nothing rests on it."""
 
 _DRIVE_MOVES = 0.05
 """Share of the range by which the drive must move for a constant displacement to be a defect."""
@@ -90,7 +90,7 @@ def _clipped_voltage(record: Record) -> list[Notice]:
             way = sign * direction * _means(y[a:b])
             rise = way - np.linspace(way[0], way[-1], way.size)
             # a stage that rings after a step also goes on and comes back, but ends far from where it was, or swings
-            # about its level; a turning point that the recording lacks is one arc over the whole run
+            # about its level; a turning point that is not in the recording gives one arc over the whole run
             returns = way.max() - max(way[0], way[-1]) > max(returned, abs(way[0] - way[-1]))
             arc = np.sin(np.linspace(0.0, np.pi, way.size))
             likeness = float(rise @ arc) / max(float(np.sqrt((rise @ rise) * (arc @ arc))), 1e-300)

@@ -64,7 +64,7 @@ def is_within_its_loop(record: Record) -> bool:
     return bool(width > 10.0 * noise and off < _ON_BRANCH * width and not starts)
 
 
-def onset(record: Record) -> list[Notice]:
+def not_at_rest(record: Record) -> list[Notice]:
     """Notice ``not_at_rest`` where the displacement moves at the start although the drive hardly does.
 
     A record that continues another one, or whose beginning is missing, claims no rest and is not judged; nor is one

@@ -1,4 +1,4 @@
-"""What is wrong with the data of an experiment, told before anything rests on them."""
+"""Checks of the data of an experiment; the findings are reported before the data are used."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from ...record import Experiment, Notice, Record, Samples
 from ..segmentation.waveform import phase_name
 from .channel_defects import channel_defects
-from .initial_condition_check import onset, origins
+from .initial_condition_check import not_at_rest, origins
 from .lag import lag_notices, lag_of
 
 DISPLACEMENT_RANGE = (1e-9, 2e-3)
@@ -57,7 +57,7 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
     notices += late
     notices += [n for n in _polarity_and_lead(moving) if n.kind not in {notice.kind for notice in late}]
     for record in experiment:
-        notices += onset(record)
+        notices += not_at_rest(record)
     return (*notices, *origins(experiment))
 
 

@@ -1,4 +1,4 @@
-"""Records from channels with holes: split at every hole, told, never interpolated."""
+"""Records from channels with holes: split at every hole; each hole is reported, and nothing is interpolated."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _ROWS = 1 << 15
 """Rows that are written in one go."""
 _LOOK = 1 << 12
-"""Bytes by which a text is told from other files."""
+"""Bytes by which a text is distinguished from other files."""
 _EPOCH = 1e8
 """A clock that shows more [s] counts from an epoch, not from the start of the experiment."""
 

@@ -142,7 +142,7 @@ def _phase(file: Path, options: ReadOptions, average: int, end: float) -> tuple[
 def _time_base(
     values: NpzMembers, place: dict[str, str], options: ReadOptions, times: Callable[[], Samples], average: int
 ) -> tuple[float, dict[int, int], list[Notice]]:
-    """Sample period [s] from wherever the file tells it; missing samples, where it holds times; what to tell."""
+    """Sample period [s] from the file; the missing samples, if the file holds times; notices."""
     if options.sample_period is not None:
         if place["time"] in values and values.size(place["time"]) > average:
             TimeColumn.of(times()).require(options.sample_period * average)

@@ -1,4 +1,4 @@
-"""Phases of a long record: where the drive rests, steps, and moves, told and overridable."""
+"""Phases of a long record: where the drive rests, steps and moves. The result is reported and can be overridden."""
 
 from __future__ import annotations
 

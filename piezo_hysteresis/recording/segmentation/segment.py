@@ -30,7 +30,7 @@ class Segment:
     pauses: dict[int, int]
     """Sample before which others were never measured while the voltage was held, to their number."""
     first: bool
-    """True for the first stretch since a start of the driver, or of the recording."""
+    """True for the first segment since a start of the driver, or of the recording."""
 
     @property
     def size(self) -> int:

@@ -1,4 +1,7 @@
-"""Which column of a foreign file is which channel, where its titles leave no doubt; told, and overridable."""
+"""Which column of a foreign file is which channel, if its titles are clear.
+
+The result is reported and can be overridden.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`ReadOptions`: how a recording is to be read, as far as the file itself does not tell."""
+"""`ReadOptions`: how a recording is to be read, where the file itself does not say."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...record import Samples
 from .units import si_factor
 
 CHANNELS = ("time", "voltage", "displacement")
-"""What a recording must hold, unless its sample period is given; `is_channel` tells what it may hold besides."""
+"""What a recording must hold, unless its sample period is given; `is_channel` decides what else it may hold."""
 
 LONGEST_PERIOD = 60.0
 """Sample period that may be given by hand [s]; a larger number is a rate in Hz."""
@@ -149,5 +149,5 @@ class ReadOptions:
         return bool(self.from_the_beginning[0]) and self.initial_voltage is None
 
     def with_period(self, sample_period: float | None) -> ReadOptions:
-        """The same layout with a sample period [s] that the file tells."""
+        """The same options with the sample period [s] that the file gives."""
         return replace(self, sample_period=sample_period)

@@ -11,7 +11,7 @@ from ...errors import RecordError, RecordingError
 from ...record import Notice, Samples
 
 JITTER = 0.02
-"""Deviation of the steps from their mean, in sample periods (rms), above which it is told."""
+"""Deviation of the steps from their mean, in sample periods (rms), above which it is reported."""
 
 
 LARGEST_CONTRADICTION = 0.05
@@ -72,7 +72,7 @@ class TimeColumn:
             raise RecordError(
                 "time: got times that do not grow or are not finite, expected seconds or dates; give `sample_period`"
             )
-        # times written with few digits stand still between their steps: then only the mean step tells
+        # times written with few digits stand still between their steps: then the mean step is used
         usual = float(np.median(steps[steps >= 0]))
         longest = 1.5 * usual if usual > 0 else 3.0 * float(np.min(forward))
         broken = (steps < 0) | (steps > longest)

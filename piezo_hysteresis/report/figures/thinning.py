@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 
 def thinned(values: NDArray[np.float64], points: int = 1200) -> NDArray[np.intp]:
-    """Indices to draw: the smallest and the largest sample of every stretch, and both ends.
+    """Indices to draw: the smallest and the largest sample of every bin, and both ends.
 
     Parameters
     ----------
@@ -24,11 +24,11 @@ def thinned(values: NDArray[np.float64], points: int = 1200) -> NDArray[np.intp]
     """
     if values.size <= points:
         return np.arange(values.size)
-    stretch = -(-2 * values.size // (points - 4))
-    whole = values.size // stretch
-    rows = values[: whole * stretch].reshape(whole, stretch)
-    first = stretch * np.arange(whole)
-    rest = values[whole * stretch :]
-    tail = whole * stretch + np.array([rest.argmin(), rest.argmax()]) if rest.size else np.empty(0, dtype=np.intp)
+    per_bin = -(-2 * values.size // (points - 4))
+    whole = values.size // per_bin
+    rows = values[: whole * per_bin].reshape(whole, per_bin)
+    first = per_bin * np.arange(whole)
+    rest = values[whole * per_bin :]
+    tail = whole * per_bin + np.array([rest.argmin(), rest.argmax()]) if rest.size else np.empty(0, dtype=np.intp)
     ends = np.array([0, values.size - 1])
     return np.unique(np.concatenate((ends, first + rows.argmin(axis=1), first + rows.argmax(axis=1), tail)))

@@ -29,8 +29,8 @@ TURNS = 16
 def window(record: Record, residual: Array | None) -> slice:
     """The part of a record to draw.
 
-    All of it, or as many turning points of the drive as can be told apart: in the middle half of the record, where the
-    drive is not on its way from or to rest, around the largest residual.
+    All of it, or as many turning points of the drive as can be distinguished: in the middle half of the record, where
+    the drive is not on its way from or to rest, around the largest residual.
     """
     quarter = record.size // 4
     middle = slice(quarter, record.size - quarter)

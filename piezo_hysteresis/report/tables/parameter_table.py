@@ -8,7 +8,7 @@ from ...model.model import Model
 from .table import Table
 
 ALIKE = 0.95
-"""Correlation from which two numbers are hard to tell apart."""
+"""Correlation from which two numbers are hard to distinguish."""
 
 
 def parameter_table(model: Model, fit: Fit | None = None) -> Table:

@@ -26,7 +26,11 @@ PARAMETERS: tuple[Row, ...] = (
     Parameter("voltage_max", "u_max", "V", _DAQMX.voltage_max, -10.0, 10.0, "highest drive voltage", "rig"),
     Parameter("max_slew_rate", "S", "V/s", 0.0, 0.0, 1e12, "steepest drive; has to be given", "rig"),
     Parameter("safe_voltage", "u_s", "V", 0.0, -10.0, 10.0, "drive voltage of the stage at rest", "rig"),
-    Setting("assume_safe", _DAQMX.assume_safe, "true: at safe_voltage at the start, where nothing tells the output"),
+    Setting(
+        "assume_safe",
+        _DAQMX.assume_safe,
+        "true: take the output to be at safe_voltage at the start if neither the card nor a monitor can report it",
+    ),
     Parameter(
         "amplifier_gain", "G_a", "V/V", _DAQMX.amplifier_gain, -1e4, 1e4, "piezo voltage over drive voltage", "rig"
     ),

@@ -38,7 +38,7 @@ class DaqmxSetup:
     safe_voltage : float
         Drive voltage of the stage at rest [V].
     assume_safe : bool
-        True to take the output to be at its safe voltage at the start, where neither the card nor a monitor tells.
+        True to take the output to be at its safe voltage at the start, if neither the card nor a monitor can report it.
     amplifier_gain : float
         Piezo voltage over drive voltage [V/V].
     monitor_gain : float

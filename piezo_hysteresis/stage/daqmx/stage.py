@@ -52,7 +52,7 @@ class DaqmxStage:
             found = self._found(readings)
             if found is None and not setup.assume_safe:
                 raise StageError(
-                    f"{self._description.name}: nothing tells the voltage at the output, expected a card that reads it "
+                    f"{self._description.name}: the voltage at the output is unknown, expected a card that reads it "
                     "back or a monitor; wire one (voltage_input), or see to it that the output is at its safe voltage "
                     "and set nidaqmx.assume_safe"
                 )
@@ -166,7 +166,7 @@ class DaqmxStage:
         return np.asarray(readings[1] / (self._setup.monitor_gain * self._setup.amplifier_gain))
 
     def _found(self, readings: Samples) -> float | None:
-        """Drive voltage at which the output stands [V]; None where neither card nor monitor tells."""
+        """Drive voltage at which the output stands [V]; None if neither card nor monitor reports it."""
         found, uncertainty = self._tasks.output(), _READ_BACK_ERROR
         if found is None:
             if not self._setup.voltage_input:

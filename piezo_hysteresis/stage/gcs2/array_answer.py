@@ -56,12 +56,12 @@ class ArrayAnswer:
 
     @property
     def sample_time(self) -> float | None:
-        """Time between rows [s]; None where the header does not tell one that can be."""
+        """Time between rows [s]; None if the header gives no valid one."""
         try:
-            told = float(self.header["SAMPLE_TIME"])
+            period = float(self.header["SAMPLE_TIME"])
         except (KeyError, ValueError):
             return None
-        return told if 0 < told < math.inf else None
+        return period if 0 < period < math.inf else None
 
 
 def _separator(code: str) -> str | None:

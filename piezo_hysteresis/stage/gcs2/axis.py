@@ -1,4 +1,4 @@
-"""`Axis`: what one axis of a GCS 2.0 controller can be asked and told, in drive volts and metres."""
+"""`Axis`: the commands and queries of one axis of a GCS 2.0 controller, in drive volts and metres."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Axis:
         Raises
         ------
         Gcs2Error
-            If it lacks a command or the axis, or answers what cannot be.
+            If a command or the axis is missing, or an answer is impossible.
         """
         s, client = self.setup, self.client
         name = client.value("*IDN?")
@@ -84,10 +84,10 @@ class Axis:
             measured_voltage=True,
         )
 
-    def _longest_block(self, tells_wave_memory: bool) -> int:
+    def _longest_block(self, reports_wave_memory: bool) -> int:
         s, client = self.setup, self.client
         recorded = client.whole(f"SPA? {s.axis} 0x{s.recorder_parameter:08X}") // max(client.whole("TNR?"), 1)
-        if s.longest_wave or not tells_wave_memory:
+        if s.longest_wave or not reports_wave_memory:
             played = s.longest_wave or recorded
         else:
             played = client.whole(f"WMS? {s.wave_table}")
@@ -208,9 +208,11 @@ class Axis:
                 raise Gcs2Error(f"{place}: recorder table {table} holds {held} samples, expected {count}")
         parts: list[Samples] = []
         for array in self.waves.arrays("DRR?", count, tables):
-            told = array.sample_time
-            if told is None or abs(told / sample_period - 1) > _SAMPLE_TIME_TOLERANCE:
-                raise Gcs2Error(f"{place}: recorded every {told} s, expected {sample_period:g} s; check the servo time")
+            period = array.sample_time
+            if period is None or abs(period / sample_period - 1) > _SAMPLE_TIME_TOLERANCE:
+                raise Gcs2Error(
+                    f"{place}: recorded every {period} s, expected {sample_period:g} s; check the servo time"
+                )
             if parts and np.array_equal(array.values, parts[-1]) and np.ptp(array.values[:, 1]) > 0:
                 raise Gcs2Error(f"{place}: got the same {len(parts[-1])} recorded samples twice; read again")
             parts.append(array.values)

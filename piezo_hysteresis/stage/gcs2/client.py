@@ -106,7 +106,10 @@ class Client:
         return int(words, 16)
 
     def stop(self) -> None:
-        """Stop all motion at once; the error that tells so is read and forgotten."""
+        """Stop all motion at once.
+
+        The controller then reports error 10 ("stopped by command"), which is read and ignored.
+        """
         self._send(f"{_STOP}ERR?\n")
         number = self._error("#24")
         if number != STOPPED_BY_COMMAND:

@@ -24,8 +24,8 @@ class NoAnswerError(Gcs2Error):
 class Connection:
     """A TCP link that is opened when it is needed and closed as soon as it can be out of step.
 
-    After a time-out or half an answer nobody can tell what the next bytes belong to; the link is then closed, and the
-    next `send` opens a new one.
+    After a time-out or half an answer it is unknown to which query the next bytes belong; the link is then closed, and
+    the next `send` opens a new one.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ MEANING = {
     TOO_FEW_RECORDED: "the recorder holds fewer samples",
     SERVO_IS_ON: "open-loop moves are refused while the servo is on",
 }
-"""Numbers that can come up here; every other one is told by its number."""
+"""Numbers that can come up here; every other one is reported by its number."""
 
 
 def meaning(number: int) -> str:

@@ -55,7 +55,7 @@ class Gcs2Stage:
 
     @property
     def description(self) -> Description:
-        """Identity and limits as the controller told them."""
+        """Identity and limits as the controller reported them."""
         return self._description
 
     @property

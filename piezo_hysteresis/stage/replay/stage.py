@@ -16,7 +16,7 @@ from .resampled import ResampledRecord
 class ReplayStage:
     """Plays records one after the other, as a streaming stage of one sample period.
 
-    The drive asked for is not played: `Description.ignores_drive` tells so, and what comes back is the recorded voltage
+    The drive asked for is not played: `Description.ignores_drive` is true, and what comes back is the recorded voltage
     with the recorded displacement. After the last record the last sample is held, or everything begins again.
 
     Parameters

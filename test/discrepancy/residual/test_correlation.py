@@ -64,8 +64,8 @@ def test_constant_or_short_signals_are_refused(e, u):
 
 @pytest.mark.parametrize("phase", ["staircase", "minor_loops"])
 @pytest.mark.parametrize("gamma", [0.0, 0.015])
-def test_a_model_that_lacks_creep_fails_on_slow_drives_too(phase, gamma):
-    """The drive is slow and so is what is missing: only their innovations can tell that the one follows the other."""
+def test_a_model_without_creep_fails_on_slow_drives_too(phase, gamma):
+    """The drive is slow and so is what is missing: only their innovations show that the one follows the other."""
     drive = {
         "staircase": np.repeat([0.0, 2.0, 5.0, 8.0, 5.0, 2.0, 0.0], 300),
         "minor_loops": np.interp(

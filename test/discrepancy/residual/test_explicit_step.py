@@ -55,7 +55,7 @@ def test_slow_records_have_many_steps_behind_every_sample():
     assert not step_changes(model(BoucWen), records)[0].any()
 
 
-def test_data_of_an_explicit_step_are_told_from_others():
+def test_data_of_an_explicit_step_are_recognised():
     assert is_stepped(model(BoucWen), training_data(answered(PublishedBoucWen)))
     assert not is_stepped(model(BoucWen), training_data(answered(BoucWen)))
 

@@ -33,7 +33,7 @@ RECORDS = (triangle(0.0), staircase(10.0), triangle(45.0), staircase(55.0))
 
 
 def places(residual):
-    """Places by axis, and the most telling axis."""
+    """Places by axis, and the axis with the largest share."""
     left = [np.asarray(residual(r), float) for r in RECORDS]
     found = localise(RECORDS, left, [1e-8] * len(RECORDS))
     return {p.axis: p for p in found}, found[0].axis

@@ -41,7 +41,7 @@ def test_scatter_between_periods_is_the_noise(frequency):
 
 def test_scatter_holds_noise_that_is_slower_than_the_top_of_the_spectrum():
     found = []
-    for _ in range(20):  # four hundred levels tell their scatter to a tenth
+    for _ in range(20):  # the scatter of four hundred levels is known to a tenth
         slow = np.repeat(RANDOM.normal(size=400), 50) * 5 * SIGMA
         record = sine(100.0, 2e-5, 0.4, added=slow)
         assert white_noise(record) < 2 * SIGMA

@@ -88,5 +88,5 @@ def test_a_record_faster_than_the_model_is_refused():
 
 
 @pytest.mark.parametrize(("phase", "frequency"), [("sine_400hz", 400.0), ("sine_0.5hz", 0.5), ("triangle", None)])
-def test_the_name_of_a_sine_tells_its_frequency(phase, frequency):
+def test_the_name_of_a_sine_gives_its_frequency(phase, frequency):
     assert drive_frequency(Record([0.0], [0.0], 1.0, phase=phase)) == frequency

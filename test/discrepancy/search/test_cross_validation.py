@@ -56,10 +56,12 @@ def test_a_direction_that_the_other_records_do_not_see_stays_where_it_is(problem
     assert with_it.ratios[0] == pytest.approx(without.ratios[0], rel=1e-9)
 
 
-def test_the_one_record_that_tells_a_number_is_indispensable(problem):
+def test_the_one_record_that_gives_a_number_is_indispensable(problem):
     designs, measured = problem
-    for tell, wanted in ((range(4), ()), ((2, 3), ()), ((2,), (2,))):
-        seen = [np.column_stack((x, float(i in tell) * RANDOM.normal(size=len(x)))) for i, x in enumerate(designs)]
+    for informative, wanted in ((range(4), ()), ((2, 3), ()), ((2,), (2,))):
+        seen = [
+            np.column_stack((x, float(i in informative) * RANDOM.normal(size=len(x)))) for i, x in enumerate(designs)
+        ]
         columns = np.vstack((np.eye(4), np.zeros((1, 4))))
         assert indispensable(products(seen, measured), FLOORS, columns) == wanted
 

@@ -1,4 +1,4 @@
-"""What the records of a diagnosis can tell, and what is therefore free."""
+"""Which parameters the records of a diagnosis determine, and which are therefore free."""
 
 import numpy as np
 import pytest
@@ -13,9 +13,9 @@ from piezo_hysteresis.record import Record
 STAGE = Model((BoucWen(A=-0.2, beta=3.0), Arx(a=(-0.5,), b=(0.5,)), Offset()), 1e-4, 50.0, 1e-5)
 
 
-@pytest.mark.parametrize(("begins", "told"), [((0.0, 0.0), False), ((0.0, 0.01), False), ((0.0, 45.0), True)])
-def test_settling_is_free_only_where_records_begin_at_different_levels(begins, told):
+@pytest.mark.parametrize(("begins", "free"), [((0.0, 0.0), False), ((0.0, 0.01), False), ((0.0, 45.0), True)])
+def test_settling_is_free_only_where_records_begin_at_different_levels(begins, free):
     records = tuple(Record(u + np.linspace(0.0, 50.0, 100), np.zeros(100), 1e-4) for u in begins)
     training_data = TrainingData(records, np.ones(2), Nuisance(), extent_of(records, STAGE))
-    assert ("offset.settling" in free_numbers(STAGE, training_data)) is told
+    assert ("offset.settling" in free_numbers(STAGE, training_data)) is free
     assert "offset.y0" in free_numbers(STAGE, training_data)

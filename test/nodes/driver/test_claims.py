@@ -1,4 +1,7 @@
-"""Whoever runs a campaign alone moves the stage; the others are told so, and its death gives the stage free."""
+"""Only the node that runs a protocol moves the stage.
+
+Others get the reason of the refusal, and its death frees the stage.
+"""
 
 import signal
 import threading
@@ -44,7 +47,7 @@ class Axis:
         self.lab.wait(lambda: abs(self.samples.newest.voltage[-1] - voltage) < 1e-6, f"{voltage:g} V")
 
 
-def test_foreign_motion_is_kept_out_of_a_campaign(lab):
+def test_foreign_motion_is_kept_out_of_a_protocol(lab):
     """A set-point a hundred times a second, before and during an identification: none gets in between two phases."""
     axis, ended = Axis(lab, real_time_factor=4.0), threading.Event()
 
@@ -58,8 +61,8 @@ def test_foreign_motion_is_kept_out_of_a_campaign(lab):
     try:
         axis.at(8.0)
         assert lab.wait(lambda: identification.ask("identify").success, "the start")
-        told = identification.await_state("running", "failed")
-        owner = values_of(told)["owner"]
+        reported = identification.await_state("running", "failed")
+        owner = values_of(reported)["owner"]
         assert axis.holders[-1].data == owner != ""
         reports = lab.diagnostics()
         lab.wait(
@@ -129,7 +132,7 @@ def test_a_claim_that_ends_brings_the_stage_to_its_safe_voltage(lab):
 
 
 @pytest.mark.soak
-def test_an_owner_that_stood_still_is_told_that_its_claim_has_ended(lab):
+def test_an_owner_that_stood_still_is_informed_that_its_claim_has_ended(lab):
     axis = Axis(lab)
     identification = Identification(lab)
     identification.begin()

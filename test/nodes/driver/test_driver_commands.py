@@ -33,7 +33,7 @@ def driven(streaming_lab):
     streaming_lab.forget()
 
 
-def test_every_sample_of_a_command_arrives_or_is_told_lost(driven):
+def test_every_sample_of_a_command_arrives_or_is_reported_lost(driven):
     samples, statuses, phases = driven.streaming(), driven.statuses(), driven.phases()
     seconds = 30.0
     wave = np.concatenate(([0.0], np.random.default_rng(1).uniform(0, 7, round(seconds / PERIOD)), [0.0]))
@@ -116,7 +116,7 @@ def test_stop_ramps_a_playing_waveform_down(driven):
     driven.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
     assert driven.states(statuses, "long") == ["accepted", "playing", "stopped"]
     assert samples.steepest(PERIOD) <= RAMP_RATE * (1 + 1e-6)
-    told = driven.diagnostics()
+    reported = driven.diagnostics()
     ask = driven.publisher(Float64, "set_voltage")
     driven.send(np.zeros(10), "too_early")
     ask.publish(Float64(data=1.0))
@@ -125,7 +125,9 @@ def test_stop_ramps_a_playing_waveform_down(driven):
             lambda name=name: any(s.name == name and "call ~/release" in s.message for s in list(statuses)),
             f"the refusal of {name}",
         )
-    driven.wait(lambda: any("until ~/release" in s.message for a in list(told) for s in a.status), "the diagnostics")
+    driven.wait(
+        lambda: any("until ~/release" in s.message for a in list(reported) for s in a.status), "the diagnostics"
+    )
     assert not samples.voltage[-10:].any()
     assert driven.call(Trigger, "driver_node/release").message == "the driver accepts commands again"
     driven.send(np.zeros(10), "next")

@@ -1,4 +1,7 @@
-"""The driver as a process: nothing is lost untold, nothing leaves the limits, and its end leaves the stage safe."""
+"""The driver as a process.
+
+No sample is lost unreported, nothing leaves the limits, and its end leaves the stage safe.
+"""
 
 import signal
 from pathlib import Path
@@ -76,12 +79,14 @@ def test_deactivate_ramps_down_and_activate_streams_again(lab):
 @pytest.mark.parametrize("same_machine", [True, False])
 def test_a_second_driver_refuses_until_the_first_is_gone(lab, same_machine, tmp_path):
     first = lab.driver(**IDEAL)
-    samples, told = lab.streaming(), lab.diagnostics()
+    samples, reported = lab.streaming(), lab.diagnostics()
     other = tmp_path / "other_machine"
     other.mkdir()
     environment = {} if same_machine else {"XDG_RUNTIME_DIR": str(other)}
     second = lab.driver("-r", "__node:=second", environment=environment, discovery_time=10.0, **IDEAL)
-    lab.wait(lambda: any(s.name == "second: stage" and s.level == b"\x02" for a in told for s in a.status), "an error")
+    lab.wait(
+        lambda: any(s.name == "second: stage" and s.level == b"\x02" for a in reported for s in a.status), "an error"
+    )
     assert ("is held by process" if same_machine else "published by another driver") in second.output
     assert lab.state("second") == "unconfigured"
     first.signal(signal.SIGINT)
@@ -127,10 +132,10 @@ def _set(**values):
     return request
 
 
-def test_a_failed_configure_tells_why_and_can_be_tried_again(lab):
+def test_a_failed_configure_gives_why_and_can_be_tried_again(lab):
     driver = lab.driver(stage="replay")
-    told = lab.diagnostics()
-    lab.wait(lambda: any(s.level == b"\x02" for a in told for s in a.status), "an error")
+    reported = lab.diagnostics()
+    lab.wait(lambda: any(s.level == b"\x02" for a in reported for s in a.status), "an error")
     assert "replay.experiment" in driver.output
     assert lab.state() == "unconfigured"
     assert lab.call(
@@ -148,17 +153,17 @@ def test_a_failed_configure_tells_why_and_can_be_tried_again(lab):
     lab.streaming()
 
 
-def test_a_failing_stage_is_made_safe_told_and_can_be_tried_again(lab, monkeypatch):
+def test_a_failing_stage_is_made_safe_reported_and_can_be_tried_again(lab, monkeypatch):
     """In the process of the test, since no real stage fails when asked to."""
     stages = [Witness(1e-3, 100.0, fails_at=5), Witness(1e-3, 100.0)]
     opened = iter(stages)
     monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", back_ends.BackEnd((), lambda *_: next(opened), True))
-    told = lab.diagnostics()
+    reported = lab.diagnostics()
     node = lab.add(DriverNode, discovery_time=0.0, ramp_rate=50.0)
     node.begin()
     lab.wait(lambda: lab.state() == "unconfigured", "the end of the failed stage")
     assert (stages[0].made_safe, stages[0].closed) == (1, 1)
-    lab.wait(lambda: any("link lost" in s.message for a in told for s in a.status), "the reason")
+    lab.wait(lambda: any("link lost" in s.message for a in reported for s in a.status), "the reason")
     assert lab.transition("configure")
     assert lab.transition("activate")
     lab.streaming()
@@ -194,7 +199,7 @@ def test_a_recording_is_replayed_sample_by_sample(lab, tmp_path):
     assert [p.data for p in phases][-3:] == ["1 rest", "2 triangle", "3 hold"]
 
 
-def test_a_stage_with_memory_plays_blocks_and_tells_the_dead_time(lab):
+def test_a_stage_with_memory_plays_blocks_and_gives_the_dead_time(lab):
     lab.driver(**IDEAL, simulated__memory=True, simulated__longest_block=10_000, simulated__dead_time=0.02)
     samples, statuses = lab.streaming(), lab.statuses()
     wave = np.sin(np.linspace(0, np.pi, 25_000)) * 5

@@ -55,7 +55,7 @@ def test_the_outcome_is_that_of_the_same_fit_here(experiment):
     assert fit.progress[1] > 0.0
 
 
-def test_a_fault_of_the_program_is_told_as_one(tmp_path):
+def test_a_fault_of_the_program_is_reported_as_one(tmp_path):
     fit = FitProcess(operator.not_, tmp_path)  # takes one argument
     with pytest.raises(IdentificationError, match="fault of the fit: TypeError"):
         outcome(fit)
@@ -70,7 +70,7 @@ def test_a_failure_is_one_line(tmp_path):
     assert "\n" not in str(error.value)
 
 
-def test_a_death_is_told_and_an_end_is_an_end(experiment):
+def test_a_death_is_reported_and_an_end_is_an_end(experiment):
     fit = FitProcess(identification, experiment)
     os.kill(fit.pid, signal.SIGKILL)
     with pytest.raises(IdentificationError, match="ended without a result"):

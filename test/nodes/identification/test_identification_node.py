@@ -34,7 +34,7 @@ NOISE = PLANT.sensor.noise * PLANT.full_stroke
 
 
 class Identification:
-    """An identification node, and what it tells."""
+    """An identification node, and its status."""
 
     def __init__(self, lab, *arguments, **parameters):
         self.lab = lab
@@ -138,8 +138,8 @@ def test_from_an_unknown_stage_to_a_live_model(lab):
 
     assert identification.ask("diagnose").message == f"diagnosing {path}"
     identification.await_state("fitting")
-    told = identification.await_state("done", "failed", timeout=240.0)
-    assert told.message.startswith("nothing_missing: "), told.message
+    reported = identification.await_state("done", "failed", timeout=240.0)
+    assert reported.message.startswith("nothing_missing: "), reported.message
     assert dumps(load(path / "diagnosis.yaml")) == dumps(from_parameters(identification.served())) == models[-1].data
     answer = read_json(str(path / "answer.json"))
     assert (answer["verdict"], answer["model"]) == ("nothing_missing", str(path / "diagnosis.yaml"))

@@ -48,7 +48,7 @@ BYTES = {
 }
 
 
-def told(columns):
+def readable(columns):
     values = {name: (values.dtype, values.tolist()) for name, values in columns.values.items()}
     return columns.stamp, columns.frame_id, columns.dense, values
 
@@ -59,7 +59,7 @@ def test_whatever_came_before(first, second):
     reader = CloudReader(LAYOUT)
     for name in (first, second, first):
         expected = read_cloud(deserialize_message(BYTES[name], PointCloud2), LAYOUT)
-        assert told(reader.read(BYTES[name])) == told(expected)
+        assert readable(reader.read(BYTES[name])) == readable(expected)
 
 
 @pytest.mark.parametrize("size", range(0, 60, 7))
@@ -69,7 +69,7 @@ def test_a_message_that_is_cut_is_refused(size):
     for cut in (BYTES["ours"][:size], BYTES["ours"][:-2]):
         with pytest.raises(RecordError, match="something else"):
             reader.read(cut)
-    assert told(reader.read(BYTES["ours"])) == told(CloudReader(LAYOUT).read(BYTES["ours"]))
+    assert readable(reader.read(BYTES["ours"])) == readable(CloudReader(LAYOUT).read(BYTES["ours"]))
 
 
 def test_bytes_are_not_changed_by_the_next_block():
@@ -77,4 +77,4 @@ def test_bytes_are_not_changed_by_the_next_block():
     columns = {"x": np.zeros(2), "n": np.zeros(2, np.uint32)}
     first = writer.write(columns, Time())
     writer.write({"x": np.ones(2), "n": 5}, Time(sec=1))
-    assert told(CloudReader(LAYOUT).read(first))[3]["x"][1] == [0.0, 0.0]
+    assert readable(CloudReader(LAYOUT).read(first))[3]["x"][1] == [0.0, 0.0]

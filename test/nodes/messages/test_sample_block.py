@@ -47,8 +47,8 @@ def read(message):
     fresh, running = SampleReader(), SampleReader()
     running.read(SampleWriter().write(block_of(10)))
     raw = serialize_message(message)
-    told = [outcome(samples_from_cloud, message), *(outcome(one.read, raw) for one in (fresh, running, fresh))]
-    assert told[1:] == told[:-1]
+    outcomes = [outcome(samples_from_cloud, message), *(outcome(one.read, raw) for one in (fresh, running, fresh))]
+    assert outcomes[1:] == outcomes[:-1]
     return samples_from_cloud(message)
 
 

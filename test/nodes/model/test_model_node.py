@@ -76,7 +76,7 @@ class Bench:
         """Nothing counts before both have found each other."""
         self.samples.publish(PointCloud2())
         time.sleep(0.1)
-        return bool(self._told("got no points"))
+        return bool(self._reported("got no points"))
 
     def send(self, blocks: list[SampleBlock]) -> None:
         for block in blocks:
@@ -89,17 +89,17 @@ class Bench:
     def report(self, what: str) -> dict[str, str]:
         """Values of the first diagnostic status whose message contains `what`."""
 
-        return values_of(self.lab.wait(lambda: self._told(what), f"a diagnostic '{what}'")[0])
+        return values_of(self.lab.wait(lambda: self._reported(what), f"a diagnostic '{what}'")[0])
 
     def figures(self, received: int) -> dict[str, str]:
         """Values of the first status after so many samples."""
 
         def found():
-            return [s for s in self._told("") if values_of(s).get("received") == str(received)]
+            return [s for s in self._reported("") if values_of(s).get("received") == str(received)]
 
         return values_of(self.lab.wait(found, f"a diagnostic after {received} samples")[0])
 
-    def _told(self, what: str) -> list[DiagnosticStatus]:
+    def _reported(self, what: str) -> list[DiagnosticStatus]:
         statuses = [s for array in list(self.reports) for s in array.status]
         return [s for s in statuses if s.name == "model_node: prediction" and what in s.message]
 
@@ -124,10 +124,10 @@ def test_predictions_are_those_of_the_core_bit_for_bit(lab, tmp_path):
     bench.report("samples were lost")
     # 10 nm of noise and a bridged gap against the 1 nm that the model file promises
     bench.report("times the free-run error of the model")
-    told = bench.figures(received=7800)
-    assert (told["lost"], told["repeated"]) == ("200", "200")
-    assert float(told["residual_rms"]) == pytest.approx(predictor.residual_rms, rel=1e-5)
-    assert told["model"] == model_hash(MODEL)
+    values = bench.figures(received=7800)
+    assert (values["lost"], values["repeated"]) == ("200", "200")
+    assert float(values["residual_rms"]) == pytest.approx(predictor.residual_rms, rel=1e-5)
+    assert values["model"] == model_hash(MODEL)
     lab.wait(lambda: live and rms, "live values")
     assert list(live[-1].name) == ["voltage", "displacement", "prediction", "residual"]
     assert live[-1].position[1] - live[-1].position[2] == pytest.approx(live[-1].position[3], abs=1e-15)
@@ -161,7 +161,7 @@ def test_a_model_on_the_topic_takes_over_between_two_blocks(lab, tmp_path):
     assert np.abs(np.concatenate([got["residual"] for got in predicted[20:]])).max() < 6e-8
 
 
-def test_bad_blocks_and_bad_parameters_are_told_and_the_node_runs_on(lab, tmp_path):
+def test_bad_blocks_and_bad_parameters_are_reported_and_the_node_runs_on(lab, tmp_path):
     bench = Bench(lab, model_file=str(tmp_path / "absent.yaml"))
     bench.report("No such file")
 

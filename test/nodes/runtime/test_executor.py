@@ -62,11 +62,11 @@ def test_a_stop_said_before_is_heard(executor):
 def test_no_exception_ends_the_serving(executor):
     """Raised by a timer, a subscription, a service, a task, and where a future is done: each is counted, all go on."""
     node, stop, served = GuardedNode("faulty"), Future(), []
-    told = "\x1b[2J\nforged line"
+    text = "\x1b[2J\nforged line"
 
     def fail(name, *_):
         served.append(name)
-        raise ValueError(told)
+        raise ValueError(text)
 
     node.create_timer(0.05, partial(fail, "timer"), clock=Clock(clock_type=ClockType.STEADY_TIME))
     node.create_subscription(String, "anything", partial(fail, "subscription"), 10)
@@ -100,7 +100,7 @@ def test_no_exception_ends_the_serving(executor):
     node.destroy_node()
 
 
-def test_a_fault_of_the_executor_itself_is_told(executor):
+def test_a_fault_of_the_executor_itself_is_reported(executor):
     node, stop = GuardedNode("odd"), Future()
 
     class Odd:

@@ -20,7 +20,7 @@ from piezo_hysteresis.recording.bag.phase_topic import STRING, PhaseNames
 ROOT = Path(__file__).parents[3]
 
 
-def test_metadata_tell_topics_counts_times_and_quality_of_service(tmp_path):
+def test_metadata_give_topics_counts_times_and_quality_of_service(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         bag.add_topic("/stage_x/phase", STRING, depth=1, transient_local=True).add_topic(
             "/best", STRING, reliable=False

@@ -1,4 +1,4 @@
-"""Bags: what the driver sends comes back sample by sample; what is missing, cut or doubled is told."""
+"""Bags: what the driver sends comes back sample by sample; what is missing, cut or doubled is reported."""
 
 from dataclasses import replace
 
@@ -189,7 +189,7 @@ def test_a_pause_of_a_device_that_reads_its_memory_is_no_loss(tmp_path, always):
     assert any(n.severe for n in experiment.notices) is always
 
 
-def test_repeated_and_reordered_blocks_are_put_right_and_told(tmp_path):
+def test_repeated_and_reordered_blocks_are_put_right_and_reported(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         driver = Driver(bag)
         driver.phase(0, "idle")
@@ -274,7 +274,7 @@ def test_a_hold_in_which_the_drive_moves_is_part_of_the_history(tmp_path):
     ]
 
 
-def test_a_bag_that_starts_in_a_hold_tells_what_it_does_not_know(tmp_path):
+def test_a_bag_that_starts_in_a_hold_gives_what_it_does_not_know(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         driver = Driver(bag, index=777)
         driver.phase(8, "hold")
@@ -287,7 +287,7 @@ def test_a_bag_that_starts_in_a_hold_tells_what_it_does_not_know(tmp_path):
     assert {"history", "moved"} <= kinds(experiment)
 
 
-def test_uneven_times_and_undecodable_blocks_are_told(tmp_path):
+def test_uneven_times_and_undecodable_blocks_are_reported(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         driver = Driver(bag)
         driver.phase(0, "idle")

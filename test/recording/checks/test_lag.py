@@ -29,7 +29,7 @@ def loop(voltage, slope, loss, reversal, bend, slant):
     return states
 
 
-def told(voltage, displacement, period=PERIOD, phase="triangle"):
+def kinds(voltage, displacement, period=PERIOD, phase="triangle"):
     noise = 1e-9 * np.random.default_rng(0).normal(size=voltage.size)
     return {n.kind for n in inspect(Experiment((Record(voltage, displacement + noise, period, phase),)))}
 
@@ -41,14 +41,14 @@ def told(voltage, displacement, period=PERIOD, phase="triangle"):
 def test_loops_that_bend_are_no_shifted_channel(amplitudes, terms):
     voltage = triangle(amplitudes)
     displacement = 1e-5 * (1.2 * voltage + loop(voltage, *terms))
-    assert not {"leads", "late"} & told(10.0 * voltage, displacement)
+    assert not {"leads", "late"} & kinds(10.0 * voltage, displacement)
 
 
 @pytest.mark.parametrize("shift", [60, 120])
-def test_a_channel_that_is_shifted_by_more_than_its_loops_bend_is_told(shift):
+def test_a_channel_that_is_shifted_by_more_than_its_loops_bend_is_reported(shift):
     voltage = triangle((0.9, 0.9))
     displacement = 1e-5 * (1.2 * voltage + loop(voltage, -0.5, 3.0, 0.5, 0.0, 0.0))
-    assert "leads" in told(10.0 * voltage[:-shift], displacement[shift:])
+    assert "leads" in kinds(10.0 * voltage[:-shift], displacement[shift:])
 
 
 @pytest.mark.parametrize(("shift", "is_late"), [(0, False), (60, True)])
@@ -68,9 +68,9 @@ def test_a_drive_above_the_resonance_does_not_lead():
     mode = np.real(np.poly([pole, np.conj(pole)]))
     voltage = 4.0 * np.sin(2 * np.pi * 400.0 * np.arange(4000) * period)
     displacement = 1e-6 * lfilter([mode.sum()], mode, np.roll(voltage, 3))
-    assert "leads" not in told(voltage[400:], displacement[400:], period, "sine_400hz")
+    assert "leads" not in kinds(voltage[400:], displacement[400:], period, "sine_400hz")
 
 
 def test_a_staircase_of_block_averages_does_not_lead():
     voltage = np.repeat([0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0, 5.0, 9.0, 0.0], 200)
-    assert "leads" not in told(voltage, 1e-6 * voltage, 0.1, "staircase")
+    assert "leads" not in kinds(voltage, 1e-6 * voltage, 0.1, "staircase")

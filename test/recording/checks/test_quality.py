@@ -80,7 +80,7 @@ def test_the_simulated_stage_gives_good_data(seed):
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e6, 1e9, 1e-6, 1e-9])
-def test_a_displacement_in_another_unit_is_told_with_the_power_of_ten(factor):
+def test_a_displacement_in_another_unit_is_reported_with_the_power_of_ten(factor):
     wrong = [Record(r.voltage, r.displacement * factor, PERIOD, r.phase) for r in clean()]
     if 1e-9 < 7.5e-6 * factor < 2e-3:
         pytest.skip("still a displacement that a stage can have")
@@ -88,7 +88,7 @@ def test_a_displacement_in_another_unit_is_told_with_the_power_of_ten(factor):
     assert notice.severe and "1e" in notice.message
 
 
-def test_a_voltage_in_another_unit_is_told():
+def test_a_voltage_in_another_unit_is_reported():
     wrong = [Record(r.voltage * 1e3, r.displacement, PERIOD, r.phase) for r in clean()]
     assert found("units", *wrong)[0].severe
     wrong = [Record(r.voltage * 1e-6, r.displacement, PERIOD, r.phase) for r in clean()]
@@ -96,7 +96,7 @@ def test_a_voltage_in_another_unit_is_told():
 
 
 @pytest.mark.parametrize("power", [-6, -3, 3, 6])
-def test_one_phase_in_another_unit_is_told_against_the_others(power):
+def test_one_phase_in_another_unit_is_compared_with_the_others(power):
     records = list(clean().records)
     records[2] = Record(records[2].voltage, records[2].displacement * 10.0**power, PERIOD, "sine_5hz", 4.0)
     notices = found("scale", *records)
@@ -106,7 +106,7 @@ def test_one_phase_in_another_unit_is_told_against_the_others(power):
 
 
 @pytest.mark.parametrize(("channel", "severe"), [("voltage", True), ("displacement", True)])
-def test_a_channel_that_never_changes_is_told(channel, severe):
+def test_a_channel_that_never_changes_is_reported(channel, severe):
     drive = sine()
     still = Record(
         np.zeros(drive.size) if channel == "voltage" else drive,
@@ -124,8 +124,8 @@ def test_a_displacement_at_its_rail_is_clipped(share, top):
     rail = np.quantile(y, 1 - share if top else share)
     cut = np.minimum(y, rail) if top else np.maximum(y, rail)
     (notice,) = found("clipped", Record(drive, cut, PERIOD, "sine_5hz"))
-    told = int(notice.message.split(" samples")[0].split()[-1])
-    assert told == pytest.approx(np.count_nonzero(cut == rail), rel=0.01)
+    reported = int(notice.message.split(" samples")[0].split()[-1])
+    assert reported == pytest.approx(np.count_nonzero(cut == rail), rel=0.01)
     assert notice.severe
 
 
@@ -182,8 +182,8 @@ def test_drop_outs_are_counted(length):
     assert f"{3 * length} samples" in notice.message
 
 
-@pytest.mark.parametrize(("bits", "told", "severe"), [(16, False, False), (8, True, False), (5, True, True)])
-def test_coarse_quantisation_is_told_with_its_step(bits, told, severe):
+@pytest.mark.parametrize(("bits", "reported", "severe"), [(16, False, False), (8, True, False), (5, True, True)])
+def test_coarse_quantisation_is_reported_with_its_step(bits, reported, severe):
     drive = sine()
     y = stage(drive)
     step = np.ptp(y) / 2**bits
@@ -192,12 +192,12 @@ def test_coarse_quantisation_is_told_with_its_step(bits, told, severe):
         for n in inspect(Experiment((Record(drive, np.round(y / step) * step, PERIOD, "x"),)))
         if n.kind == "quantisation"
     ]
-    assert bool(notices) == told
+    assert bool(notices) == reported
     assert any(n.severe for n in notices) == severe
     assert all(f"{step:.3g}" in n.message for n in notices)
 
 
-def test_columns_shifted_against_each_other_are_told():
+def test_columns_shifted_against_each_other_are_reported():
     drive = sine()
     y = stage(drive)
     assert "leads" not in kinds(Record(drive, y, PERIOD, "sine_5hz"))
@@ -205,7 +205,7 @@ def test_columns_shifted_against_each_other_are_told():
     assert found("leads", early)[0].severe
 
 
-def test_a_stage_that_moves_against_its_drive_is_told():
+def test_a_stage_that_moves_against_its_drive_is_reported():
     drive = sine()
     assert kinds(Record(drive, -stage(drive), PERIOD, "sine_5hz")) == {"polarity"}
 
@@ -216,7 +216,7 @@ def test_a_wrong_sample_period_shows_in_the_name_of_a_sine():
     assert "0.5 Hz" in notice.message
 
 
-def test_phases_that_overlap_in_time_are_told():
+def test_phases_that_overlap_in_time_are_reported():
     drive = sine()
     record = Record(drive, stage(drive), PERIOD, "sine_5hz")
     later = Record(drive, stage(drive), PERIOD, "sine_5hz", start_time=0.4)
@@ -267,11 +267,11 @@ def test_a_slow_ramp_from_rest_is_followed_from_its_first_sample(tmp_path):
     write(Experiment((plant.play(np.zeros(2000), phase="rest"), slow)), tmp_path / "run")
     experiment = read(tmp_path / "run")
     assert experiment.named("staircase")[0].settled_voltage == 0.0
-    (told,) = [n for n in experiment.notices if n.kind == "in_motion"]
-    assert "staircase" in told.message and "0 V" in told.message
+    (reported,) = [n for n in experiment.notices if n.kind == "in_motion"]
+    assert "staircase" in reported.message and "0 V" in reported.message
 
 
-def test_records_that_begin_alike_at_different_displacements_are_told():
+def test_records_that_begin_alike_at_different_displacements_are_reported():
     drive = sine()
     y = stage(drive)
     first, again = (Record(drive, y + zero, PERIOD, "x") for zero in (0.0, 0.02 * np.ptp(y)))
@@ -299,7 +299,7 @@ def test_the_lag_of_a_stage_is_no_late_channel():
         assert not {"late", "leads"} & kinds(Record(drive, stage(drive), PERIOD, f"sine_{frequency:g}hz"))
 
 
-def test_a_displacement_per_volt_that_no_stage_has_is_told():
+def test_a_displacement_per_volt_that_no_stage_has_is_reported():
     drive = sine()
     y = stage(drive, noise=5e-10)
     assert "units" in kinds(Record(drive * 1e-3, y, PERIOD, "x")), "kilovolts taken for volts"

@@ -1,4 +1,4 @@
-"""NPZ folders: exact round trips, holes told, no pickle, no allocation beyond the file."""
+"""NPZ folders: exact round trips, holes reported, no pickle, no allocation beyond the file."""
 
 import io
 import pickle
@@ -59,7 +59,7 @@ def test_what_is_no_phase_is_one_line_that_names_the_file(tmp_path, changes, say
     assert "01_bad.npz" in str(error.value) and "\n" not in str(error.value)
 
 
-def test_non_finite_samples_split_the_phase_and_are_told(tmp_path):
+def test_non_finite_samples_split_the_phase_and_are_reported(tmp_path):
     displacement = np.arange(100.0) * 1e-6
     displacement[[40, 41]] = np.nan, np.inf
     np.savez(tmp_path / "01_x.npz", **keys(voltage=np.arange(100.0), displacement=displacement))

@@ -22,7 +22,7 @@ def test_slow_phases_are_averaged_on_reading(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["- 1", "triangle: 0", "triangle: ten", "[", "\xff"])
-def test_a_broken_file_is_told(tmp_path, text):
+def test_a_broken_file_is_reported(tmp_path, text):
     (tmp_path / FILE).write_text(text, encoding="latin-1")
     with pytest.raises(RecordingError, match="expected phase names and whole numbers"):
         load_decimation(tmp_path)

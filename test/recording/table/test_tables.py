@@ -38,7 +38,7 @@ def text(delimiter, header="", comma=False, number="{:.9g}"):
         text(",", "time_s,voltage_V,displacement_um\n").replace("\n", "\r\n"),
     ],
 )
-def test_titles_tell_channels_and_units(tmp_path, content):
+def test_titles_give_channels_and_units(tmp_path, content):
     (tmp_path / "table.csv").write_text(content, encoding="utf-8", newline="")
     (record,) = read(tmp_path / "table.csv", phases="sine_1hz")
     np.testing.assert_allclose(record.voltage, VOLTAGE, rtol=1e-8)

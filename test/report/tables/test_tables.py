@@ -50,14 +50,14 @@ def test_parameters_show_intervals_bounds_hit_and_correlations(models):
     assert correlation_table(fitted(model, names, np.diag(np.diag(covariance)))) is None
 
 
-def test_the_data_are_told_as_they_are(experiment, comparison):
+def test_the_data_are_reported_as_they_are(experiment, comparison):
     table = record_table(experiment, comparison.noise)
     assert [row[0] for row in table.rows] == [r.phase for r in experiment]
     assert table.rows[3][2] == "200 µs"
     truncated = dataclasses.replace(experiment[0], truncated=True)
-    told = Experiment((truncated,), notices=(Notice("minor", "a"), Notice("gap", "b", "step", severe=True)))
-    assert record_table(told, comparison.noise[:1]).rows[0][-1] == "truncated"
-    assert [row[0] for row in notice_table(told).rows] == ["gap", "minor"], "the severe first"
+    data = Experiment((truncated,), notices=(Notice("minor", "a"), Notice("gap", "b", "step", severe=True)))
+    assert record_table(data, comparison.noise[:1]).rows[0][-1] == "truncated"
+    assert [row[0] for row in notice_table(data).rows] == ["gap", "minor"], "the severe first"
     assert notice_table(Experiment((truncated,))) is None
 
 

@@ -39,7 +39,7 @@ def test_a_link_lost_at_any_step_ends_at_the_safe_voltage(rig, streamed, step):
 
 
 @pytest.mark.parametrize("step", ["CreateTask", "CreateAIVoltageChan", "ReadAnalogF64", "ClearTask"])
-def test_a_link_lost_while_opening_is_told_and_moves_nothing(rig, step):
+def test_a_link_lost_while_opening_is_reported_and_moves_nothing(rig, step):
     r = rig(f"link_lost@{step}", opened=False)
     r.card.set(4.0)
     with pytest.raises(StageError, match="Failed to connect to server"):
@@ -67,11 +67,11 @@ def test_a_link_lost_while_opening_is_told_and_moves_nothing(rig, step):
         ("swapped", "channels exchanged"),
     ],
 )
-def test_every_failure_is_told_clearly_and_ends_safe(rig, streamed, fault, message):
+def test_every_failure_is_reported_clearly_and_ends_safe(rig, streamed, fault, message):
     r = rig(fault, timeout=0.8 if "slow" in fault else 5.0)
-    with pytest.raises(StageError, match=rf"{message}.*safe voltage, 0 V") as told:
+    with pytest.raises(StageError, match=rf"{message}.*safe voltage, 0 V") as raised:
         work(r.stage, streamed)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
     assert r.card.voltage == 0.0
     r.stage.close()
 

@@ -84,7 +84,7 @@ def test_what_breaks_a_limit_is_not_put_out(opened):
     stage.close()
 
 
-def test_a_block_that_comes_too_late_is_told_and_ends_safe(opened):
+def test_a_block_that_comes_too_late_is_reported_and_ends_safe(opened):
     card, stage = opened(speed=1.0, lead=0.5)
     stage.exchange(np.full(100, 2.0))
     time.sleep(0.7)
@@ -112,7 +112,7 @@ def test_an_input_that_hears_nothing_has_no_delay(opened):
     stage.close()
 
 
-def test_a_machine_without_the_package_is_told_what_to_install(monkeypatch):
+def test_a_machine_without_the_package_learns_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "nidaqmx", None)
     with pytest.raises(StageError, match=r"pip install 'nidaqmx\[grpc\]'"):
         DaqmxStage(DaqmxSetup("Dev1", max_slew_rate=1e3))

@@ -22,7 +22,7 @@ GAIN = 20.0
 
 
 class Listening(Controller):
-    """An emulated controller that keeps what it was told."""
+    """An emulated controller that keeps the commands it received."""
 
     def __init__(self, *arguments, **options):
         super().__init__(*arguments, **options)

@@ -1,4 +1,4 @@
-"""Whatever a controller answers, and whatever an emulated one is told: a value that makes sense or one clear error."""
+"""Any bytes to or from a controller give a value that makes sense or one clear error."""
 
 import math
 import socket
@@ -87,7 +87,7 @@ def test_an_array_comes_back_as_it_was_written(values, sample_time):
 
 @contextmanager
 def babbling(said):
-    """A host that answers the first bytes with what it was told to, and then closes the link."""
+    """A host that answers the first bytes with a given reply, and then closes the link."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
 
         def serve():

@@ -64,17 +64,17 @@ def test_a_link_that_does_not_come_back_leaves_the_voltage_unknown_and_says_so(b
         ("servo_on@WGO", "servo of axis 1 is on after the run"),
     ],
 )
-def test_every_failure_is_told_clearly_and_ends_safe(bench, play, fault, message):
+def test_every_failure_is_reported_clearly_and_ends_safe(bench, play, fault, message):
     b = bench(fault, rows_per_answer=500, timeout=1.0 if "answer" in message else 5.0)
-    with pytest.raises(StageError, match=message) as told:
+    with pytest.raises(StageError, match=message) as raised:
         work(b.stage, play)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
     if fault.startswith("servo_on"):
-        assert "voltage of the stage is unknown" in str(told.value), (
+        assert "voltage of the stage is unknown" in str(raised.value), (
             "an open-loop move is refused while the servo is on"
         )
     else:
-        assert "brought to its safe voltage, 0 V" in str(told.value)
+        assert "brought to its safe voltage, 0 V" in str(raised.value)
         assert b.voltage == 0.0
 
 
@@ -109,7 +109,7 @@ def test_every_fault_can_be_named_and_nothing_else():
 
 
 @pytest.mark.parametrize("step", ["*IDN?", "HLP?", "SAI?", "SPA?", "VMI?", "TNR?", "WMS?", "VOL?", "ERR?:4"])
-def test_a_link_lost_while_opening_is_told_and_moves_nothing(bench, step):
+def test_a_link_lost_while_opening_is_reported_and_moves_nothing(bench, step):
     b = bench(f"link_lost@{step}", opened=False)
     b.controller.carry_out("SVA 1 60")
     b.controller.heard.clear()

@@ -168,7 +168,7 @@ def test_the_error_an_earlier_user_left_is_nobodys_now(bench):
     b.stage.set_voltage(1.0)
 
 
-def test_a_controller_that_lacks_what_is_needed_is_named(bench):
+def test_a_controller_without_what_is_needed_is_named(bench):
     b = bench(opened=False)
     for word in ("WGO", "DRR?"):
         del b.controller._commands[word]

@@ -1,4 +1,4 @@
-"""A stage that fails in mid-phase ends the campaign at once, with a recording that can be read."""
+"""A stage that fails in mid-phase ends the protocol at once, with a recording that can be read."""
 
 import time
 
@@ -10,7 +10,7 @@ from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.identification.protocol.protocol import Protocol, ProtocolPhase
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.nodes.identification.driver_client import DriverClient
-from piezo_hysteresis.nodes.identification.protocol_runner import campaign
+from piezo_hysteresis.nodes.identification.protocol_runner import run_protocol
 from piezo_hysteresis.recording import read
 
 from ...acquisition.witness import Witness
@@ -29,14 +29,14 @@ def stage(monkeypatch):
 
 
 def begun(lab, voltage, before=lambda link: None, phases=1):
-    """The campaign of one phase with a driver, as a function that calls `before`, carries it on and returns its end."""
+    """The protocol of one phase with a driver, as a function that calls `before`, carries it on and returns its end."""
     node = lab.add(DriverNode, discovery_time=0.0)
     lab.do(node.begin)
     lab.driver_node = node
     link = lab.do(lambda: DriverClient(lab.node, "driver_node"))
     lab.wait(lambda: not link.missing, "the driver")
     phase, path = ProtocolPhase("long", voltage, PERIOD), lab.folder / "run"
-    job = campaign(lab.node, link, lambda limits: Protocol("long", limits, (phase,) * phases), path)
+    job = run_protocol(lab.node, link, lambda limits: Protocol("long", limits, (phase,) * phases), path)
 
     def step():
         before(link)
@@ -47,13 +47,13 @@ def begun(lab, voltage, before=lambda link: None, phases=1):
 
     def carry_on():
         time.sleep(0.02)
-        told = lab.do(step)
-        return told if isinstance(told, Exception) else None
+        ended_with = lab.do(step)
+        return ended_with if isinstance(ended_with, Exception) else None
 
     return carry_on
 
 
-def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, stage):
+def test_a_driver_that_gives_its_stage_up_ends_the_protocol(lab, stage):
     samples = lab.samples()
     carry_on = begun(lab, np.concatenate((np.zeros(100), np.full(60_000, 0.1), np.zeros(100))))
 
@@ -62,8 +62,8 @@ def test_a_driver_that_gives_its_stage_up_ends_the_campaign(lab, stage):
             stage.exchange = lambda block: 1 / 0
         return carry_on()
 
-    told = lab.wait(ended, "the end of the campaign")
-    assert "phase 'long': a configured 'driver_node' in / has gone" in str(told)
+    ended_with = lab.wait(ended, "the end of the protocol")
+    assert "phase 'long': a configured 'driver_node' in / has gone" in str(ended_with)
     assert stage.made_safe == 1
     assert {record.phase for record in read(lab.folder / "run")} == {"long"}
 
@@ -75,12 +75,12 @@ def test_a_word_that_is_lost_is_not_waited_for_without_limit(lab, stage, monkeyp
         if link.state == "done":
             link.state = "playing"  # as where a flood of others' refusals has pushed the word out
 
-    told = lab.wait(begun(lab, np.zeros(200), unheard), "the end of the campaign")
-    assert "did not report its end" in str(told)
+    ended_with = lab.wait(begun(lab, np.zeros(200), unheard), "the end of the protocol")
+    assert "did not report its end" in str(ended_with)
     assert {record.phase for record in read(lab.folder / "run")} == {"long"}
 
 
-def test_a_stage_that_was_moved_between_two_phases_ends_the_campaign(lab, stage, monkeypatch):
+def test_a_stage_that_was_moved_between_two_phases_ends_the_protocol(lab, stage, monkeypatch):
     """By what no claim keeps out: the device itself."""
     monkeypatch.setattr("piezo_hysteresis.nodes.identification.protocol_runner._SETTLING", 0.5)
     moved = []
@@ -90,6 +90,6 @@ def test_a_stage_that_was_moved_between_two_phases_ends_the_campaign(lab, stage,
             moved.append(True)
             lab.driver_node._session.streaming.ramp_to(3.0)
 
-    told = lab.wait(begun(lab, np.zeros(200), push, phases=2), "the end of the campaign")
-    assert "begins at 0 V, and the stage is at" in str(told)
-    assert "moved by somebody else" in str(told)
+    ended_with = lab.wait(begun(lab, np.zeros(200), push, phases=2), "the end of the protocol")
+    assert "begins at 0 V, and the stage is at" in str(ended_with)
+    assert "moved by somebody else" in str(ended_with)
