@@ -24,6 +24,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("-o", "--output", metavar="FILE", help="write the extended model to this file")
     parser.add_argument("--report", metavar="FILE", help="write the HTML page, and its figures beside it")
     parser.add_argument("--json", metavar="FILE", help="write the answer as JSON")
+    parser.add_argument(
+        "--explicit-step",
+        action="store_true",
+        help="the data come from a simulation with the explicit step of Eq. (7); no real stage needs this",
+    )
     parser.set_defaults(run=run)
 
 
@@ -38,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     start = None if args.model is None else model_file.load(args.model)
     experiment = reading.read(args)
     with progress("diagnose") as report_progress:
-        found = diagnose(experiment, start, progress=report_progress)
+        found = diagnose(experiment, start, progress=report_progress, explicit_step=args.explicit_step)
     path = ""
     if args.output is not None and found.model is not None:
         path = str(model_file.save(found.model, args.output))

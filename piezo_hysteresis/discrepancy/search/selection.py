@@ -5,7 +5,7 @@ Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 20
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -56,7 +56,6 @@ def select(
     null: float,
     effects: Collection[type[Effect]] = CATALOGUE,
     progress: Progress | None = None,
-    gains_nothing: Callable[[Model, TrainingData], bool] = lambda model, training_data: False,
 ) -> Selection:
     """Add effects while records left out ask for them.
 
@@ -74,8 +73,6 @@ def select(
         The library to choose from.
     progress : callable, optional
         Called with a word and the fraction done.
-    gains_nothing : callable, optional
-        Asked after every effect that leaves a gap: whether to stop, for the data must be treated first.
     """
     report = progress or (lambda word, fraction: None)
     baseline, steps, accepted = model, list[Step](), 0
@@ -87,8 +84,6 @@ def select(
         if step.accepted:
             model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
             accepted += 1
-            if score.excess > ADEQUATE and gains_nothing(model, training_data):
-                return Selection(baseline, model, score, tuple(steps), null)
         elif step.renewed is not None:
             model, score = step.renewed.model, step.renewed.score
         else:

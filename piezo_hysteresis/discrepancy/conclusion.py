@@ -1,0 +1,95 @@
+"""From the search to the answer: the last fits, the gap on records set aside, and what follows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..identification.fit.fit import Fit, Progress
+from ..identification.fit.normal_equations import Nuisance
+from ..record import Experiment
+from .diagnosis import Diagnosis
+from .excitation_check import missing_excitation
+from .form_uncertainty import with_form_uncertainty
+from .gap import Gap, measure_gap
+from .next_experiment import decide
+from .residual.localise import ResidualShare
+from .search.baseline_setup import BaselineSetup
+from .search.refit import LAST, PRECISE, joint, restart
+from .search.selection_result import Selection
+from .search.training_data import TrainingData
+from .verdict import is_explained, is_makeshift, verdict_of
+
+NOISY, WORTHWHILE = 1.1, 0.95
+"""Cost over that of noise from which it is begun anew, and share of it that may be left for another time."""
+
+
+def concluded(
+    experiment: Experiment,
+    setup: BaselineSetup,
+    where: tuple[ResidualShare, ...],
+    selection: Selection,
+    progress: Progress,
+) -> Diagnosis:
+    """The last fits, the gap on records set aside, the verdict, and what to record next.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As it was compared.
+    setup : BaselineSetup
+        Floors, records and baseline.
+    where : tuple of ResidualShare
+        Where the baseline disagrees with the measurement.
+    selection : Selection
+        Outcome of the search.
+    progress : callable
+        Called with a word and the fraction done.
+    """
+    records, least, training_data = setup.records, setup.least, setup.training_data
+    progress("gap", 0.85)
+    named = is_explained(selection) and not is_makeshift(selection)
+    whole = setup.whole
+    plain = selection.baseline if selection.accepted else selection.model  # the search may have found better dynamics
+    first = joint(plain, replace(training_data, records=whole), LAST, PRECISE)
+    final_training_data = selection.accepted[-1].best.training_data if named else training_data
+    final = _finished(selection, replace(final_training_data, records=whole), setup.null) if named else first
+    chosen = setup.test_records or tuple(setup.fitted)
+
+    def gap_of(last: Fit, nuisance: Nuisance) -> Gap:
+        models, nuisances = (first.model, last.model), (training_data.nuisance, nuisance)
+        unseen = bool(setup.test_records)
+        return measure_gap(models, records, chosen, least.tolist(), setup.span, nuisances, unseen)
+
+    gap = gap_of(final, final_training_data.nuisance)
+    falls = not named or gap.falls
+    if named and not falls:
+        named, final, final_training_data = False, first, training_data
+        gap = gap_of(first, training_data.nuisance)
+    fitted = replace(final_training_data, records=whole)
+    final = with_form_uncertainty(final, fitted, setup.whole_noise, setup.span)
+    progress("next experiment", 0.95)
+    verdict, reason = verdict_of(selection, named, falls, gap)
+    return Diagnosis(
+        verdict=verdict,
+        reason=reason,
+        model=final.model,
+        baseline=first.model,
+        selection=selection,
+        fit=final,
+        where=where,
+        gap=gap,
+        next_experiment=decide(selection, training_data),
+        experiment=experiment.noting(*missing_excitation([records[i] for i in setup.usable])),
+    )
+
+
+def _finished(selection: Selection, training_data: TrainingData, null: float) -> Fit:
+    """The last fit, on all samples, begun anew behind new dynamics while that helps."""
+    final = joint(selection.model, training_data, LAST, PRECISE)
+    last = selection.accepted[-1].best
+    while final.cost > NOISY * null:
+        anew = restart(replace(last, effect=final.model[last.name], training_data=training_data, fit=final), LAST).fit
+        if anew.cost > WORTHWHILE * final.cost:
+            break
+        final = anew
+    return final

@@ -1,0 +1,234 @@
+"""The passes of a diagnosis: each takes what is known so far, and adds to it or ends with the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects import Effect
+from ..errors import IdentificationError
+from ..identification.fit.fit import Progress
+from ..identification.fit.normal_equations import residuals
+from ..identification.records.roles import CARRYING
+from ..model.model import Model
+from ..record import Experiment, Notice
+from .changes.same_stage import same_stage
+from .conclusion import concluded
+from .diagnosis import Diagnosis, Verdict
+from .residual.explicit_step import KIND, is_stepped, without_steps
+from .residual.localise import ResidualShare, localise
+from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
+from .search.baseline_setup import BaselineSetup, prepare_baseline
+from .search.cross_validation import ADEQUATE
+from .search.selection import select
+from .search.selection_result import Selection
+from .search.single_record import diagnose_few
+from .verdict import FEWEST
+
+Array = NDArray[np.float64]
+
+VOLTAGE_NOISE = "voltage_noise"
+"""Kind of the notice of an experiment whose voltage is followed but for its noise."""
+IDLE = ("idle", "hold", *CARRYING)
+"""Phases that only bring the stage from one state to another."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DiagnosisState:
+    """What is known between two passes of a diagnosis.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As it is compared with models.
+    model : Model or None
+        Where the search begins; None where it has to be identified.
+    effects : collection of Effect classes
+        The library to choose from.
+    progress : callable
+        Called with a word and the fraction done.
+    setup : BaselineSetup or None
+        Floors, records, and the baseline that was fitted to them.
+    where : tuple of ResidualShare
+        Where the baseline disagrees with the measurement.
+    selection : Selection or None
+        Outcome of the search.
+    """
+
+    experiment: Experiment
+    model: Model | None
+    effects: Collection[type[Effect]]
+    progress: Progress
+    setup: BaselineSetup | None = None
+    where: tuple[ResidualShare, ...] = ()
+    selection: Selection | None = None
+
+    @property
+    def usable(self) -> list[int]:
+        """Indices of the records that may be compared with a model."""
+        return [i for i, r in enumerate(self.experiment) if r.phase not in IDLE and not r.truncated]
+
+    @property
+    def moving(self) -> list[int]:
+        """Those of them in which the drive moves."""
+        return [i for i in self.usable if _moves(self.experiment, i)]
+
+    @property
+    def sharpens(self) -> bool:
+        """Whether what slow samples have lost is made good: averages of a noisy voltage would turn back and forth."""
+        return all(n.kind != VOLTAGE_NOISE for n in self.experiment.notices)
+
+    @property
+    def fitted(self) -> BaselineSetup:
+        """The baseline setup, which an earlier pass has made."""
+        if self.setup is None:
+            raise IdentificationError("diagnose: got no baseline, expected the pass fit_baseline before this one")
+        return self.setup
+
+    @property
+    def searched(self) -> Selection:
+        """The outcome of the search, which an earlier pass has made."""
+        if self.selection is None:
+            raise IdentificationError("diagnose: got no search, expected the pass search_effects before this one")
+        return self.selection
+
+
+Pass = Callable[[DiagnosisState], DiagnosisState | Diagnosis]
+"""Takes what is known; returns more of it, or the answer, with which the diagnosis ends."""
+
+
+def quiet_voltage(state: DiagnosisState) -> DiagnosisState:
+    """Follows a voltage that was measured only where it moves by more than its noise."""
+    experiment = state.experiment
+    noise = voltage_noise(experiment.records)
+    if not noise.any():
+        return state
+    message = (
+        f"the voltage was measured with {noise.max():.2g} V of noise; voltage changes smaller than "
+        f"{NOISE_WIDTH:g} times that were treated as noise"
+    )
+    records = tuple(quieted(r, n) for r, n in zip(experiment.records, noise.tolist(), strict=True))
+    return replace(state, experiment=replace(experiment, records=records).noting(Notice(VOLTAGE_NOISE, message)))
+
+
+def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
+    """Ends with "unknown" where the data are damaged.
+
+    Raises
+    ------
+    IdentificationError
+        If nothing in the experiment moves.
+    """
+    experiment, model = state.experiment, state.model
+    if not any(_moves(experiment, i) for i in range(len(experiment.records))):
+        raise IdentificationError("diagnose: the drive does not move in any record; expected loops, steps or noise")
+    severe = [n for n in experiment.notices if n.severe]
+    if not severe:
+        return state
+    reason = f"No verdict is possible, because of the data: {severe[0].message}."
+    return Diagnosis(Verdict.UNKNOWN, reason, model, model, None, None, (), None, None, experiment)
+
+
+def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosis:
+    """Ends with the parameter that has changed where the given model explains the records but for that."""
+    if state.model is None:
+        return state
+    state.progress("changes of the given model", 0.0)
+    return same_stage(state.experiment, state.model, state.moving) or state
+
+
+def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:
+    """Ends with a model but no name where there are too few records to tell effects apart."""
+    if len(state.moving) >= FEWEST:
+        return state
+    return diagnose_few(state.experiment, state.model, state.moving, state.effects, state.progress)
+
+
+def fit_baseline(state: DiagnosisState) -> DiagnosisState:
+    """Estimates the floors, sets test records aside, and fits the published model to the others."""
+    setup = prepare_baseline(
+        state.experiment.records, state.usable, state.model, state.selection, state.sharpens, state.progress
+    )
+    return replace(state, setup=setup, where=_where(setup, state.progress), selection=None)
+
+
+def search_effects(state: DiagnosisState) -> DiagnosisState:
+    """Adds effects to the baseline while records left out ask for them."""
+    setup = state.fitted
+    selection = select(
+        setup.baseline.model,
+        setup.training_data,
+        setup.score,
+        setup.null,
+        state.effects,
+        lambda word, part: state.progress(word, 0.4 + 0.4 * part),
+    )
+    return replace(state, selection=selection)
+
+
+def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
+    """Searches once more where the model that was found tells otherwise what slow samples have lost."""
+    selection = state.searched
+    leaves_a_gap = bool(selection.accepted) and selection.score.excess > ADEQUATE
+    if leaves_a_gap and state.sharpens and state.fitted.is_coarse(selection.model):
+        return search_effects(fit_baseline(state))
+    return state
+
+
+def take_out_explicit_steps(state: DiagnosisState) -> DiagnosisState:
+    """Takes out what an explicit step of the loop has changed in simulated data; an option, for no stage does that."""
+    setup, selection = state.fitted, state.selection
+    model = setup.baseline.model if selection is None else selection.model
+    score = setup.score if selection is None else selection.score
+    training_data = setup.training_data
+    if selection is not None and selection.accepted:
+        training_data = selection.accepted[-1].best.training_data
+    known = {n.kind for n in state.experiment.notices}
+    if score.excess <= ADEQUATE or KIND in known or not is_stepped(model, training_data):
+        return state
+    found = fit_baseline(replace(state, experiment=without_steps(state.experiment, model), selection=None))
+    return found if selection is None else search_effects(found)
+
+
+def conclude(state: DiagnosisState) -> Diagnosis:
+    """Ends with the last fits, the gap on records set aside, and the verdict."""
+    return concluded(state.experiment, state.fitted, state.where, state.searched, state.progress)
+
+
+PASSES: tuple[Pass, ...] = (
+    quiet_voltage,
+    check_data,
+    compare_with_given_model,
+    answer_few_records,
+    fit_baseline,
+    search_effects,
+    search_again_with_sharper_samples,
+    conclude,
+)
+"""The diagnosis, in the order in which the passes run."""
+PASSES_ON_SIMULATED_DATA: tuple[Pass, ...] = (
+    *PASSES[: PASSES.index(search_effects)],
+    take_out_explicit_steps,
+    search_effects,
+    take_out_explicit_steps,
+    *PASSES[PASSES.index(search_effects) + 1 :],
+)
+"""The same for data of a simulation whose loop takes the explicit step of Eq. (7)."""
+
+
+def _moves(experiment: Experiment, index: int) -> bool:
+    record = experiment[index]
+    return bool(np.ptp(np.append(record.voltage, record.settled_voltage)) > 0.0)
+
+
+def _where(setup: BaselineSetup, progress: Progress) -> tuple[ResidualShare, ...]:
+    progress("where", 0.35)
+    left = residuals(setup.baseline.model, setup.records, setup.training_data.nuisance)
+    return localise(
+        [setup.records[i] for i in setup.usable],
+        [left[i] for i in setup.usable],
+        [setup.least[i] for i in setup.usable],
+    )
