@@ -101,7 +101,7 @@ Pass = Callable[[DiagnosisState], DiagnosisState | Diagnosis]
 
 
 def quiet_voltage(state: DiagnosisState) -> DiagnosisState:
-    """Follows a voltage that was measured only where it moves by more than its noise."""
+    """Make the voltage follow only changes larger than its measured noise."""
     experiment = state.experiment
     noise = voltage_noise(experiment.records)
     if not noise.any():
