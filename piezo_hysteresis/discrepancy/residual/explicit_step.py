@@ -15,7 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.block import Block, State
-from ...blocks.bouc_wen_kernel import BETA, EXPONENT, GAMMA, H_REFERENCE, PHI1, PHI2, RATE, RATE_EXPONENT, A, rate_factor
+from ...blocks.bouc_wen_kernel import (
+    BETA,
+    EXPONENT,
+    GAMMA,
+    H_REFERENCE,
+    PHI1,
+    PHI2,
+    RATE,
+    RATE_EXPONENT,
+    A,
+    rate_factor,
+)
 from ...blocks.kernel import kernel
 from ...effects import BoucWen, Discretisation, Effect
 from ...effects.hysteresis.bouc_wen import BoucWenBlock
@@ -41,7 +52,7 @@ LINEARISATIONS, PRECISE = 9, 1e-3
 
 
 @kernel
-def run_explicit(v, p, p1, p2, sample_period, state, w):
+def run_explicit(v: Array, p: Array, p1: float, p2: float, sample_period: float, state: Array, w: Array) -> None:
     """The loop with all its terms, one explicit step per sample; arguments as `run_general`."""
     h, last = state[0], state[1]
     for i in range(v.size):
