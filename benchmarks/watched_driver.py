@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from piezo_hysteresis.acquisition import back_ends
 from piezo_hysteresis.nodes.driver import driver_node
+from piezo_hysteresis.stage import back_ends
 
 CLOCK = time.time_ns
 

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
 from piezo_hysteresis.acquisition.session import DriverSession
 from piezo_hysteresis.acquisition.settings import DRIVER, DriverSettings
 from piezo_hysteresis.emulators.gcs2.controller import Controller
 from piezo_hysteresis.emulators.gcs2.server import Gcs2Server
 from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.back_ends import BACK_ENDS
 from piezo_hysteresis.stage.gcs2.connection import Connection
 from piezo_hysteresis.stage.simulated import SimulatedMemoryStage, SimulatedStage
 

@@ -8,8 +8,8 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
 from piezo_hysteresis.nodes.runtime.launch_values import SWITCH, number, parameter_file, replayed, switch
+from piezo_hysteresis.stage.back_ends import BACK_ENDS
 
 SIGTERM_TIMEOUT = "30"
 """A driver ramps to its safe voltage before it ends; launch shall not kill it meanwhile [s]."""

@@ -70,8 +70,8 @@ def test_executables_name_a_function_that_exists(name):
 
 
 def test_driver_parameters_in_the_file_are_the_defaults_of_the_table():
-    from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
     from piezo_hysteresis.acquisition.settings import DRIVER
+    from piezo_hysteresis.stage.back_ends import BACK_ENDS
 
     values = yaml.safe_load((ROOT / "config" / "driver.yaml").read_text())["/**"]["ros__parameters"]
     rows = {row.name: row for row in DRIVER}

@@ -7,10 +7,10 @@ from typing import Any
 
 from ..errors import PiezoError, StageError
 from ..record import Record
+from ..stage.back_ends import BACK_ENDS, open_stage
 from ..stage.opening import Opening
 from ..stage.replay import ReplayStage
 from ..stage.stage import Stage
-from .back_ends import BACK_ENDS, open_stage
 from .command_check import CommandCheck
 from .memory import MemoryAcquisition
 from .playback import Playback

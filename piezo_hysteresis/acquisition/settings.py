@@ -9,8 +9,8 @@ from typing import Any
 
 from ..errors import ParameterError
 from ..parameter import Parameter, Row, Setting
+from ..stage.back_ends import BACK_ENDS
 from ..stage.stage import Description
-from .back_ends import BACK_ENDS
 
 _SOURCE = "driver"
 """Source of the parameters of the driver."""

@@ -12,14 +12,14 @@ from ..report.json_file import write_json
 from ..report.page import page
 from ..report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
 from ..report.verdict import answer_verdict
-from . import reading
+from .options import reading_options
 from .terminal import console, progress, show, show_notices
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
     parser = subparsers.add_parser("diagnose", description=__doc__)
-    reading.add_arguments(parser)
+    reading_options.add_arguments(parser)
     parser.add_argument("--model", metavar="FILE", help="model file to start from; default: identify a model first")
     parser.add_argument("-o", "--output", metavar="FILE", help="write the extended model to this file")
     parser.add_argument("--report", metavar="FILE", help="write the HTML page, and its figures beside it")
@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
         On bad input, or data that do not even determine a baseline.
     """
     start = None if args.model is None else model_file.load(args.model)
-    experiment = reading.read(args)
+    experiment = reading_options.read(args)
     with progress("diagnose") as report_progress:
         found = diagnose(experiment, start, progress=report_progress, explicit_step=args.explicit_step)
     path = ""

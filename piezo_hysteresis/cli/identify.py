@@ -13,14 +13,14 @@ from ..model import model_file
 from ..report.json_file import write_json
 from ..report.tables.parameter_table import correlation_table, parameter_table
 from ..report.tables.table import Table
-from . import reading
+from .options import reading_options
 from .terminal import console, progress, show, show_notices
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
     parser = subparsers.add_parser("identify", description=__doc__)
-    reading.add_arguments(parser)
+    reading_options.add_arguments(parser)
     parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
     parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
     parser.add_argument(
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On bad input, or data that do not determine the model.
     """
-    experiment = reading.read(args)
+    experiment = reading_options.read(args)
     orders = None if args.choose_orders else tuple(args.orders or (8, 8))
     with progress("identify") as report_progress:
         found = identify(

@@ -11,15 +11,15 @@ from ..errors import RecordingError
 from ..record import Experiment
 from ..report.json_file import write_json
 from ..report.tables.quality_table import notice_table, record_table, understood_table
-from . import reading
-from .destination import require_new_experiment, require_new_file
+from .options import reading_options
+from .options.destination import require_new_experiment, require_new_file
 from .terminal import console, show
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
     parser = subparsers.add_parser("import", description=__doc__)
-    reading.add_arguments(parser)
+    reading_options.add_arguments(parser)
     parser.add_argument(
         "-o", "--output", metavar="FOLDER", help="new folder, or file ending .csv .mat .mcap; needed without --preview"
     )
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         require_new_experiment("-o", args.output)
     require_new_file("--preview", args.preview)
     require_new_file("--json", args.json)
-    experiment = reading.read(args)
+    experiment = reading_options.read(args)
     show(record_table(experiment, noise_floors(experiment.records)), notice_table(experiment))
     if args.preview is not None:
         _show_preview(experiment, Path(args.preview).expanduser())

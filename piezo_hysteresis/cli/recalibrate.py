@@ -7,7 +7,7 @@ import argparse
 from ..discrepancy.changes.recalibration import recalibrate
 from ..model import model_file
 from ..report.json_file import write_json
-from . import reading
+from .options import reading_options
 from .terminal import console, show_notices
 
 
@@ -15,7 +15,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Declare the subcommand."""
     parser = subparsers.add_parser("recalibrate", description=__doc__)
     parser.add_argument("model", metavar="MODEL", help="model file of the same stage")
-    reading.add_arguments(parser)
+    reading_options.add_arguments(parser)
     parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
     parser.add_argument("--json", metavar="FILE", help="result for machines")
     parser.set_defaults(run=run)
@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
         On bad input, or records in which nothing moves.
     """
     model = model_file.load(args.model)
-    experiment = reading.read(args)
+    experiment = reading_options.read(args)
     found = recalibrate(model, experiment)
     path = model_file.save(found.model, args.output)
     if args.json is not None:

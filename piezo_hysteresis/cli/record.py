@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from .. import recording
-from ..acquisition.back_ends import BACK_ENDS
 from ..acquisition.phase_recorder import record_phases
 from ..acquisition.session import DriverSession
 from ..acquisition.settings import DRIVER, DriverSettings
 from ..errors import ParameterError
 from ..identification.protocol.drive_limits import DriveLimits
 from ..record import Experiment
+from ..stage.back_ends import BACK_ENDS
 from ..yaml_file import read_yaml
 from .simulate import PROTOCOLS
 from .terminal import console, progress

@@ -10,14 +10,14 @@ from ..model import model_file
 from ..report.figures.comparison import compare
 from ..report.json_file import read_json
 from ..report.page import page
-from . import reading
+from .options import reading_options
 from .terminal import console, progress
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
     parser = subparsers.add_parser("report", description=__doc__)
-    reading.add_arguments(parser)
+    reading_options.add_arguments(parser)
     parser.add_argument(
         "-o", "--output", metavar="FILE", default="report.html", help="HTML page to write (default: report.html)"
     )
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         label, equals, path = text.rpartition("=")
         models[label if equals else Path(path).stem] = model_file.load(path)
     answer = None if args.answer is None else read_json(args.answer)
-    experiment = reading.read(args)
+    experiment = reading_options.read(args)
     nuisances = dict.fromkeys(models, Nuisance(offset=True)) if args.zero_per_phase else None
     with progress("report") as report_progress:
         drawn = page(compare(experiment, models, nuisances), answer=answer, title=args.title, progress=report_progress)

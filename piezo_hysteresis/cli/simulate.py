@@ -10,7 +10,7 @@ from ..identification.protocol.drive_limits import DriveLimits
 from ..record import Experiment, Record
 from ..report.json_file import write_json
 from ..stage.simulated import SimulatedStage
-from .destination import require_new_experiment, require_new_file
+from .options.destination import require_new_experiment, require_new_file
 from .options.plant_option import add_plant_arguments, plant
 from .terminal import console, progress
 

@@ -15,7 +15,7 @@ from ..report.figures.comparison import ModelComparison, compare
 from ..report.json_file import write_json
 from ..report.tables.error_table import error_table, frequency_table
 from ..report.tables.table import Table
-from . import reading
+from .options import reading_options
 from .terminal import console, show, show_notices
 
 
@@ -23,7 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Declare the subcommand."""
     parser = subparsers.add_parser("validate", description=__doc__)
     parser.add_argument("model", metavar="MODEL", help="model file")
-    reading.add_arguments(parser)
+    reading_options.add_arguments(parser)
     parser.add_argument(
         "--zero-per-phase", action="store_true", help="estimate the sensor zero in every phase instead of once"
     )
@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
         On a model or an experiment that cannot be read, or that do not fit each other.
     """
     model = model_file.load(args.model)
-    experiment, conditioned = known_from_within(reading.read(args))
+    experiment, conditioned = known_from_within(reading_options.read(args))
     nuisances = {"error": Nuisance(offset=True)} if args.zero_per_phase else None
     comparison = compare(experiment, {"error": model}, nuisances)
     tests = _tests(comparison)

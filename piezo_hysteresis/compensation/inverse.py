@@ -13,11 +13,11 @@ from ..blocks.block import Block, State, SumBlock
 from ..blocks.channel import ChannelBlock
 from ..blocks.fir import FirBlock
 from ..blocks.low_pass import LowPassBlock
-from ..blocks.mode_path import WholePath
 from ..blocks.scaling import ChangeOfUnit
-from ..blocks.softened_arx import SoftenedArxBlock
+from ..blocks.softening.mode_path import WholePath
+from ..blocks.softening.softened_arx import SoftenedArxBlock
 from ..blocks.time import TimeBlock
-from ..effects import Inversion
+from ..effects import Invertibility
 from ..effects.dynamics.extra_resonance import ModeBlock
 from ..effects.environment.mains_hum import MainsHumBlock
 from ..effects.sensor.gain_drift import GainDriftBlock
@@ -96,7 +96,7 @@ class Inverse:
     def __init__(
         self, model: Model, limits: Limits | None = None, *, band: Band | None = None, approximate: bool = False
     ) -> None:
-        impossible = [e.name for e in model.effects if e.inversion is Inversion.IMPOSSIBLE and not e.is_off]
+        impossible = [e.name for e in model.effects if e.invertibility is Invertibility.IMPOSSIBLE and not e.is_off]
         if impossible and not approximate:
             raise ModelError(
                 f"{', '.join(impossible)}: cannot be turned round; expected a chain without it, or approximate=True to "
@@ -105,13 +105,13 @@ class Inverse:
         self.model, self.limits, self.left_out = model, limits or Limits(), tuple(impossible)
         self.sample_period = model.sample_period
         kept = Model(
-            tuple(e for e in model.effects if e.inversion is not Inversion.IMPOSSIBLE),
+            tuple(e for e in model.effects if e.invertibility is not Invertibility.IMPOSSIBLE),
             model.sample_period,
             model.voltage_scale,
             model.displacement_scale,
         )
         self.chain: Chain = kept.at(model.sample_period)
-        self.not_on_path = tuple(e.name for e in model.effects if e.inversion is Inversion.NOT_NEEDED)
+        self.not_on_path = tuple(e.name for e in model.effects if e.invertibility is Invertibility.NOT_NEEDED)
         blocks, labels = self.chain.blocks, self.chain.labels
         self._nonlinear_end = _end_of_nonlinear_part(blocks, labels.index("voltage_scale"))
         self._nonlinear = NonlinearPart(blocks[: self._nonlinear_end], self.limits, self.sample_period)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..blocks.block import Block, State
 from ..blocks.kernel import kernel
 from ..blocks.linear import Section
-from ..blocks.softened_arx import SoftenedArxBlock, force
+from ..blocks.softening.softened_arx import SoftenedArxBlock, force
 from ..blocks.time import TimeBlock
 from ..effects.sensor.gain_drift import GainDriftBlock
 from ..effects.sensor.offset import OffsetBlock

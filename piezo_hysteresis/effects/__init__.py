@@ -31,7 +31,7 @@ from .hysteresis.level_dependent_memory import LevelDependentMemory
 from .hysteresis.operator import HysteresisOperator, Loop
 from .hysteresis.published_bouc_wen import PublishedBoucWen
 from .hysteresis.rate_dependent_hysteresis import RateDependentHysteresis
-from .inversion import Inversion
+from .invertibility import Invertibility
 from .material.creep import Creep
 from .material.creep_exponential import CreepExponential
 from .material.creep_fractional import CreepFractional
@@ -136,7 +136,7 @@ __all__ = [
     "HysteresisMemory",
     "HysteresisOperator",
     "InitialState",
-    "Inversion",
+    "Invertibility",
     "LevelDependentMemory",
     "Loop",
     "MainsHum",

@@ -18,7 +18,7 @@ from ..blocks.block import Block
 from ..errors import ModelError, ParameterError
 from ..parameter import Parameter, Value
 from .extent import Extent
-from .inversion import Inversion
+from .invertibility import Invertibility
 
 
 class ChainPosition(IntEnum):
@@ -90,7 +90,7 @@ class Effect(ABC):
     """Extra channel of the record that is needed: ``other_displacement`` or ``temperature``."""
     twin: ClassVar[str | None] = None
     """Effect that is one with this one on slow drive: what remains beside the one is the form of it, not the other."""
-    inversion: ClassVar[Inversion]
+    invertibility: ClassVar[Invertibility]
     """Whether `piezo_hysteresis.compensation` can turn the effect round."""
     equation: ClassVar[str]
     signature: ClassVar[str]

@@ -41,14 +41,10 @@ from .bag.rosbag2 import Rosbag2, recorded_model
 from .checks.initial_condition_check import departures, is_within_its_loop
 from .checks.quality import inspect
 from .formats.csv import Csv
-from .formats.format import Format, WritableFormat
 from .formats.gcs_array import GcsArrayFormat
-from .formats.hdf5_variables import Hdf5Variables
+from .formats.known_formats import FORMATS, Format, WritableFormat
 from .formats.mat import Mat
-from .formats.named_arrays import NamedArrays
-from .formats.npy_variables import NpyVariables
 from .formats.npz import Npz
-from .formats.tdms_variables import TdmsVariables
 from .segmentation.decimation import load_decimation
 from .table.read_options import Column, ReadOptions
 
@@ -56,18 +52,6 @@ __all__ = [
     "FORMATS", "Bag", "BagWriter", "Csv", "Format", "GcsArrayFormat", "Mat", "Npz", "ReadOptions", "Rosbag2",
     "inspect", "read", "recorded_model", "write",
 ]  # fmt: skip
-
-FORMATS: Mapping[str, Format] = {
-    "npz": Npz(),
-    "rosbag2": Rosbag2(),
-    "mat": Mat(),
-    "hdf5": NamedArrays((".h5", ".hdf5", ".hdf"), "an HDF5 file", Hdf5Variables),
-    "npy": NamedArrays((".npy",), "a NumPy array", NpyVariables),
-    "tdms": NamedArrays((".tdms",), "a LabVIEW TDMS file", TdmsVariables),
-    "gcs_array": GcsArrayFormat(),
-    "csv": Csv(),
-}
-"""Name of every format to its reader, in the order in which they are asked whether they know a path."""
 
 
 def read(

@@ -16,7 +16,7 @@ from piezo_hysteresis.effects import (
     Creep,
     Effect,
     HysteresisMemory,
-    Inversion,
+    Invertibility,
     Offset,
     PublishedBoucWen,
     RateDependentHysteresis,
@@ -36,7 +36,14 @@ TYPICAL: dict[str, dict[str, float]] = {
 }
 
 every_effect = pytest.mark.parametrize("kind", CHAIN, ids=lambda kind: kind.name)
-exact = [kind for kind in CHAIN if kind.inversion is Inversion.EXACT]
+
+
+def kinds(invertibility: Invertibility) -> list[type[Effect]]:
+    """Effects of the catalogue with this kind of inverse."""
+    return [kind for kind in CHAIN if kind.invertibility is invertibility]
+
+
+exact = kinds(Invertibility.EXACT)
 
 
 def typical(kind: type[Effect]) -> Effect:
@@ -81,7 +88,7 @@ def mismatch(model: Model, inverse: Inverse) -> float:
 
 @every_effect
 def test_declares_it_in_its_own_class(kind: type[Effect]) -> None:
-    assert isinstance(vars(kind).get("inversion"), Inversion), f"{kind.name}: say `inversion = Inversion.…`"
+    assert isinstance(vars(kind).get("invertibility"), Invertibility), kind.name
 
 
 @pytest.mark.parametrize("kind", exact, ids=lambda kind: kind.name)
@@ -130,14 +137,14 @@ def test_exact_at_the_corners_of_the_bounds(kind: type[Effect]) -> None:
     assert checked
 
 
-@pytest.mark.parametrize("kind", [k for k in CHAIN if k.inversion is Inversion.APPROXIMATE], ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", kinds(Invertibility.APPROXIMATE), ids=lambda kind: kind.name)
 def test_approximate_is_good_in_the_band(kind: type[Effect]) -> None:
     for size in (1e-5, 3e-5, 1e-3):
         model = model_with(kind(tau=size))
         assert mismatch(model, Inverse(model)) < 1e-4
 
 
-@pytest.mark.parametrize("kind", [k for k in CHAIN if k.inversion is Inversion.NOT_NEEDED], ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", kinds(Invertibility.NOT_NEEDED), ids=lambda kind: kind.name)
 def test_what_is_not_on_the_path_changes_no_command(kind: type[Effect]) -> None:
     model = model_with(typical(kind))
     inverse, without = Inverse(model), Inverse(model.without(kind.name))
@@ -146,7 +153,7 @@ def test_what_is_not_on_the_path_changes_no_command(kind: type[Effect]) -> None:
     assert inverse.not_on_path == (kind.name,)
 
 
-@pytest.mark.parametrize("kind", [k for k in CHAIN if k.inversion is Inversion.IMPOSSIBLE], ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", kinds(Invertibility.IMPOSSIBLE), ids=lambda kind: kind.name)
 def test_impossible_is_refused_by_name_or_left_out(kind: type[Effect]) -> None:
     model = model_with(typical(kind))
     with pytest.raises(ModelError, match=kind.name):

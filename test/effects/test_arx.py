@@ -10,7 +10,7 @@ from numpy.polynomial import polynomial
 from scipy import signal
 from scipy.integrate import solve_ivp
 
-from piezo_hysteresis.blocks.mode_path import share_of_mode, split
+from piezo_hysteresis.blocks.softening.mode_path import share_of_mode, split
 from piezo_hysteresis.effects import Arx, Discretisation, Softening, SofteningOfOneMode
 from piezo_hysteresis.errors import ModelError, ParameterError
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from piezo_hysteresis.acquisition import back_ends
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
+from piezo_hysteresis.stage import back_ends
 from piezo_hysteresis.stage.simulated import SimulatedStage
 from piezo_hysteresis.stage.stage import Stage, StreamingStage
 

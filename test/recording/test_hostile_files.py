@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 import zstandard
 
-from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
 from piezo_hysteresis.errors import PiezoError, RecordingError
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import read, write
 from piezo_hysteresis.recording.bag.mcap_file import MAGIC
+from piezo_hysteresis.stage.back_ends import BACK_ENDS
 from piezo_hysteresis.stage.opening import Opening
 
 SECONDS = 60

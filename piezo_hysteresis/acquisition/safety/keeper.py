@@ -19,9 +19,9 @@ from dataclasses import replace
 from typing import Any
 
 from ...errors import PiezoError
+from ...stage.back_ends import BACK_ENDS
 from ...stage.opening import Opening
 from ...stage.stage import Stage
-from ..back_ends import BACK_ENDS
 
 READY = "ready"
 """What the keeper answers when it holds the stage."""

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...errors import StageError
+from ...stage.back_ends import BACK_ENDS
 from ...stage.description import Description
-from ..back_ends import BACK_ENDS
 from .keeper import GOODBYE, READY
 
 _START = 30.0

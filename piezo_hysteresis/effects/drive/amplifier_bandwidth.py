@@ -9,7 +9,7 @@ from ...blocks.low_pass import LowPassBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 FOUND_BY = (1e-5, 2e-5, 5e-5, 1.5e-4)
 """Time constants at which a search begins [s]."""
@@ -25,7 +25,7 @@ class AmplifierBandwidth(Effect):
     """
 
     name = "amplifier_bandwidth"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "lag"
     place = ChainPosition.DRIVE
     equation = "τ ẏ + y = x"

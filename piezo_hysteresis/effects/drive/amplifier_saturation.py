@@ -11,7 +11,7 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 UNLIMITED = 1e9
 """Limit that is never reached [V]."""
@@ -29,7 +29,7 @@ class AmplifierSaturation(Effect):
     """
 
     name = "amplifier_saturation"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "amplifier"
     place = ChainPosition.DRIVE
     equation = "y = x − ramp(x − upper) + ramp(lower − x),  ramp(e) = (e + c)²/(4c) inside |e| < c, max(e, 0) outside"

@@ -12,7 +12,7 @@ from ...blocks.kernel import kernel
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 UNLIMITED = 1e9
 """Slope that is never reached [V/s]."""
@@ -28,7 +28,7 @@ class AmplifierSlewLimit(Effect):
     """
 
     name = "amplifier_slew_limit"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "amplifier"
     place = ChainPosition.DRIVE
     equation = "|dy/dt| ≤ S = I_max/C"

@@ -10,7 +10,7 @@ from ...blocks.kernel import kernel
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 FOUND_BY = (0.001, 0.002, 0.005, 0.01)
 """Half widths at which a search begins, in ranges of the drive."""
@@ -26,7 +26,7 @@ class Backlash(Effect):
     """
 
     name = "backlash"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "hysteresis"
     place = ChainPosition.DRIVE
     equation = "y_i = max(x_i − b, min(x_i + b, y_(i−1)))"

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from ...blocks.arx import ArxBlock, dc_gain_slopes
 from ...blocks.block import Array, Block
 from ...blocks.group_delay import GroupDelayBlock
-from ...blocks.softened_arx import SlowSoftenedBlock, SoftenedArxBlock, StaticSoftening
+from ...blocks.softening.softened_arx import SlowSoftenedBlock, SoftenedArxBlock, StaticSoftening
 from ...errors import ModelError, ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 from .softening import Softening
 
 LONGEST_DELAY = 1e6
@@ -48,7 +48,7 @@ class Arx(Effect):
     """
 
     name = "arx"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "dynamics"
     place = ChainPosition.DYNAMICS
     equation = "G(z) = z^(−d) (b1 + b2 z⁻¹ + …)/(1 + a1 z⁻¹ + …)"

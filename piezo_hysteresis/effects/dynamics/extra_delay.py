@@ -9,7 +9,7 @@ from ...blocks.block import Block
 from ...blocks.fir import FirBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class ExtraDelay(Effect):
@@ -28,7 +28,7 @@ class ExtraDelay(Effect):
     """
 
     name = "extra_delay"
-    inversion = Inversion.APPROXIMATE
+    invertibility = Invertibility.APPROXIMATE
     family = "lag"
     place = ChainPosition.DYNAMICS
     equation = "y(t) = x(t − τ)"

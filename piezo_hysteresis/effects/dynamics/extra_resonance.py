@@ -14,7 +14,7 @@ from ...blocks.linear import AddedBlock, Section
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 RESOLVED = 0.25
 """Cycles per sample up to which the mode is simulated; faster ones act as their lag."""
@@ -38,7 +38,7 @@ class ExtraResonance(Effect):
     """
 
     name = "extra_resonance"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "dynamics"
     place = ChainPosition.DYNAMICS
     equation = "y = x + r (q − x),  q̈/ω0² + 2 ζ q̇/ω0 + q = x,  ω0 = 2π f0"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar, Self
 
-from ...blocks.mode_path import Path, WholePath
+from ...blocks.softening.mode_path import Path, WholePath
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 FOUND_BY = (0.01, 0.03, 0.1)
 """Sizes of k3 at which a search begins: a sharp resonance that moves by its width is far from linear in it."""
@@ -31,7 +31,7 @@ class Softening(Term):
     """
 
     name = "softening"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "dynamics"
     place = ChainPosition.DYNAMICS
     host = "arx"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ...blocks.mode_path import OwnPath, Path
-from ..inversion import Inversion
+from ...blocks.softening.mode_path import OwnPath, Path
+from ..invertibility import Invertibility
 from .softening import Softening
 
 
@@ -25,7 +25,7 @@ class SofteningOfOneMode(Softening):
     """
 
     name = "softening_of_one_mode"
-    inversion = Inversion.IMPOSSIBLE
+    invertibility = Invertibility.IMPOSSIBLE
     entry = "softening"
     signature = "The residual looks as for softening, on a stage of several modes"
     source = "Duffing oscillator as one term of a modal expansion"

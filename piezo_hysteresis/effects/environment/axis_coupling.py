@@ -8,7 +8,7 @@ from ...blocks.block import Array, Block
 from ...blocks.channel import ChannelBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class AxisCoupling(Effect):
@@ -27,7 +27,7 @@ class AxisCoupling(Effect):
     """
 
     name = "axis_coupling"
-    inversion = Inversion.NOT_NEEDED
+    invertibility = Invertibility.NOT_NEEDED
     family = "disturbance"
     place = ChainPosition.ENVIRONMENT
     channel = "other_displacement"

@@ -12,7 +12,7 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class MainsHum(Effect):
@@ -32,7 +32,7 @@ class MainsHum(Effect):
     """
 
     name = "mains_hum"
-    inversion = Inversion.NOT_NEEDED
+    invertibility = Invertibility.NOT_NEEDED
     family = "disturbance"
     place = ChainPosition.ENVIRONMENT
     equation = "y = x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)]"

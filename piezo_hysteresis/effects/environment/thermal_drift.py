@@ -11,7 +11,7 @@ from ...blocks.time import TimeBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class ThermalDrift(Effect):
@@ -30,7 +30,7 @@ class ThermalDrift(Effect):
     """
 
     name = "thermal_drift"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "drift"
     place = ChainPosition.ENVIRONMENT
     equation = "y = x + D (1 − e^(−t/τ))"

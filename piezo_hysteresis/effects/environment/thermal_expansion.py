@@ -11,7 +11,7 @@ from ...blocks.channel import ChannelBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class ThermalExpansion(Effect):
@@ -30,7 +30,7 @@ class ThermalExpansion(Effect):
     """
 
     name = "thermal_expansion"
-    inversion = Inversion.NOT_NEEDED
+    invertibility = Invertibility.NOT_NEEDED
     entry = "thermal_drift"
     family = "drift"
     place = ChainPosition.ENVIRONMENT

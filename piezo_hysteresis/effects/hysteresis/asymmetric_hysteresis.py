@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class AsymmetricHysteresis(Term):
@@ -23,7 +23,7 @@ class AsymmetricHysteresis(Term):
     """
 
     name = "asymmetric_hysteresis"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"

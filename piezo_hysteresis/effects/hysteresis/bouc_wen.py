@@ -13,7 +13,7 @@ from ...blocks.bouc_wen_sensitivities import START, linearise_general, linearise
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 from .operator import HysteresisOperator, Loop
 
 MODIFIED_BOUC_WEN = (
@@ -84,7 +84,7 @@ class BoucWen(ModifiedBoucWen):
     """
 
     name = "bouc_wen"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     equation = "w = p1 v³ + p2 v + h;  dh = A dv − β|dv|h − γ dv|h|"
     signature = "The loops do not depend on rate. They have one memory state, which saturates at |A|/(β + γ sgn A)"
     source = "paper, Eq. (2), (3), (6); exact step for n = 1"

@@ -7,7 +7,7 @@ import numpy as np
 from ...blocks.block import Array, Block, MemorylessBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class EvenInputPolynomial(Effect):
@@ -22,7 +22,7 @@ class EvenInputPolynomial(Effect):
     """
 
     name = "even_input_polynomial"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "static"
     place = ChainPosition.HYSTERESIS
     equation = "w + p_e v² + p_4 v⁴"

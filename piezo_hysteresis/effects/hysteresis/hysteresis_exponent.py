@@ -7,7 +7,7 @@ from typing import Self
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 FOUND_BY = (1.3, 1.7)
 """Exponents at which a search begins."""
@@ -27,7 +27,7 @@ class HysteresisExponent(Term):
     """
 
     name = "hysteresis_exponent"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"

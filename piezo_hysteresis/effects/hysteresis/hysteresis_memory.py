@@ -12,7 +12,7 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 from .level_dependent_memory import LevelDependentMemoryBlock
 
 SPAN = 32.0
@@ -38,7 +38,7 @@ class HysteresisMemory(Effect):
     """
 
     name = "hysteresis_memory"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     equation = "w + Σ_j c_j p_j,  p_j = max(v − r_j, min(v + r_j, p_j before))"

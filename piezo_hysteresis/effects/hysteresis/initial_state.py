@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class InitialState(Term):
@@ -17,7 +17,7 @@ class InitialState(Term):
     """
 
     name = "initial_state"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"

@@ -8,7 +8,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.kernel import kernel
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class LevelDependentMemory(Term):
@@ -30,7 +30,7 @@ class LevelDependentMemory(Term):
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     host = "hysteresis_memory"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     equation = "Σ_j c_j (p_j + k_j p_j²),  k_j from k_narrow to k_wide"
     signature = "loops of one amplitude that are wider at one end of the range than at the other"
     source = "Preisach operator in the form of plays, one function for each; its first bend"

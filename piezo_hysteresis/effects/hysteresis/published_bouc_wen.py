@@ -9,7 +9,7 @@ from ...blocks.kernel import fma, kernel
 from ...errors import ModelError
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 from .bouc_wen import MODIFIED_BOUC_WEN, BoucWen, ModifiedBoucWen
 
 
@@ -30,7 +30,7 @@ class PublishedBoucWen(ModifiedBoucWen):
     """
 
     name = "published_bouc_wen"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     equation = "w_i = p1 v_i³ + p2 v_i + h_i;  h_i = h_(i−1) + A Δv − β|Δv||h|^(n−1)h − γ Δv|h|^n"
     signature = "The loops are those of bouc_wen, but depend on the sample rate"
     source = "paper, Eq. (6), (7); exponent of Eq. (2)"

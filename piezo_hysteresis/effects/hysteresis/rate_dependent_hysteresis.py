@@ -7,7 +7,7 @@ from typing import Self
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 FOUND_BY = (-0.03, 0.03)
 """Sizes k at which a search begins."""
@@ -33,7 +33,7 @@ class RateDependentHysteresis(Term):
     """
 
     name = "rate_dependent_hysteresis"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
     host = "bouc_wen"

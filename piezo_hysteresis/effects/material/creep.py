@@ -12,7 +12,7 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 REFERENCE_TIME = 0.1
 """Time after a step at which creep counts as zero [s]."""
@@ -47,7 +47,7 @@ class Creep(Effect):
     """
 
     name = "creep"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "creep"
     place = ChainPosition.MATERIAL
     equation = "y = w + γ Σ_j ½ (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w;  after a step: 1 + γ log10(t/0.1 s)"

@@ -13,7 +13,7 @@ from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 FASTEST = 5e-3
 """Time constant below which a relaxation is no creep but dynamics [s]."""
@@ -31,7 +31,7 @@ class CreepExponential(Effect):
     """
 
     name = "creep_exponential"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     entry = "creep"
     family = "creep"
     place = ChainPosition.MATERIAL

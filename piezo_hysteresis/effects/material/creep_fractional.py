@@ -8,7 +8,7 @@ from ...blocks.block import Block
 from ...blocks.relaxation import RelaxationBlock
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 from .creep import PER_DECADE, REFERENCE_TIME, Creep, settled_mix
 
 
@@ -39,7 +39,7 @@ class CreepFractional(Creep):
     """
 
     name = "creep_fractional"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     entry = "creep"
     equation = (
         "y = w + γ Σ_j g_j (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w,  g_j = ½ (τ_j/0.1)^λ;  "

@@ -8,7 +8,7 @@ from ...blocks.block import Block
 from ...blocks.relaxation import RelaxationBlock
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 from .creep import PER_DECADE, Creep, settled_mix
 
 
@@ -40,7 +40,7 @@ class CreepTwoRates(Creep):
 
     name = "creep_two_rates"
     entry = "creep"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     equation = (
         "y = w + Σ_j g_j (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w,  "
         "g_j = ½ (γ_f (1 − s_j) + γ_s s_j),  s_j = log(τ_j/τ_min)/log(τ_max/τ_min)"

@@ -7,7 +7,7 @@ import numpy as np
 from ...blocks.block import Array, Block, State
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class Offset(Effect):
@@ -35,7 +35,7 @@ class Offset(Effect):
     """
 
     name = "offset"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "sensor"
     place = ChainPosition.ENVIRONMENT
     equation = "y = x + y0 + r x_rest"

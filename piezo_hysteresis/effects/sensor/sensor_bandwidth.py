@@ -7,7 +7,7 @@ from ...blocks.low_pass import LowPassBlock
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class SensorBandwidth(Effect):
@@ -22,7 +22,7 @@ class SensorBandwidth(Effect):
     """
 
     name = "sensor_bandwidth"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "lag"
     place = ChainPosition.SENSOR
     equation = "Y/X = 1/(1 + τ s)^n"

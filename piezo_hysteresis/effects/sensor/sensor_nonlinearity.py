@@ -7,7 +7,7 @@ import numpy as np
 from ...blocks.block import Array, Block, MemorylessBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
-from ..inversion import Inversion
+from ..invertibility import Invertibility
 
 
 class SensorNonlinearity(Effect):
@@ -27,7 +27,7 @@ class SensorNonlinearity(Effect):
     """
 
     name = "sensor_nonlinearity"
-    inversion = Inversion.EXACT
+    invertibility = Invertibility.EXACT
     family = "static"
     place = ChainPosition.SENSOR
     equation = "y = x + s2 x² + s3 x³"

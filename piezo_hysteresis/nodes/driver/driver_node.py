@@ -14,12 +14,12 @@ from rclpy.parameter import Parameter
 from rclpy.wait_for_message import wait_for_message
 from sensor_msgs.msg import PointCloud2
 
-from ...acquisition.back_ends import BACK_ENDS
 from ...acquisition.safety.stop_latch import StopLatch
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DRIVER, IN_FORCE, DriverSettings
 from ...errors import ParameterError, PiezoError, StageError, reason_of
 from ...record import Record
+from ...stage.back_ends import BACK_ENDS
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.node_clock import now
 from ..runtime.parameters import declare, read

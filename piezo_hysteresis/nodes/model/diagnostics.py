@@ -17,6 +17,7 @@ from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
 from .change_reporter import ChangeReporter
+from .residual_alarm import ResidualAlarm
 
 _LONGEST_REASON = 500
 """Characters of a reason that are reported again every second."""
@@ -26,21 +27,20 @@ _LOG_INTERVAL = 0.1
 
 
 class ModelDiagnostics:
-    """Publishes rate, losses, latency, and the residual against what the model file promises.
+    """Publishes rate, losses, latency, and the residual beside the free-run error of the model file.
 
     Parameters
     ----------
     node : GuardedNode
         The model node; its full name stands before every status.
-    warn, error : float
-        Multiples of the model's free-run error.
+    alarm : ResidualAlarm
+        Decides when the residual is a warning or an error.
     changes : ChangeReporter
         Its newest status is published as well.
     """
 
-    def __init__(self, node: GuardedNode, warn: float, error: float, changes: ChangeReporter) -> None:
-        self._node, self._warn, self._error = node, warn, error
-        self._changes = changes
+    def __init__(self, node: GuardedNode, alarm: ResidualAlarm, changes: ChangeReporter) -> None:
+        self._node, self._alarm, self._changes = node, alarm, changes
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: prediction"
         self._publisher = advertise(node, DIAGNOSTICS)
         self._problem = self._refused = ""
@@ -48,7 +48,7 @@ class ModelDiagnostics:
         self._stage = ""
         self._model: Model | None = None
         self._predictor: Predictor | None = None
-        self._promised: float | None = None
+        self._free_run_error: float | None = None
         self._latency = 0.0
         self._seen = (time.monotonic(), 0, 0, 0)
         node.create_timer(1.0, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -70,9 +70,9 @@ class ModelDiagnostics:
         """Report the model that is followed from now on."""
         self._model, self._refused = model, ""
         try:
-            self._promised = float(model.provenance["free_run_error"])
+            self._free_run_error = float(model.provenance["free_run_error"])
         except (KeyError, ValueError):
-            self._promised = None
+            self._free_run_error = None
         message = f"model {model_hash(model)}: {', '.join(e.name for e in model.effects)}"
         self._node.get_logger().info(message, throttle_duration_sec=_LOG_INTERVAL)
 
@@ -110,7 +110,7 @@ class ModelDiagnostics:
                 "warming_up": predictor.warming_up,
                 "swapping": predictor.is_swapping,
                 **({} if rms is None else {"residual_rms": rms}),
-                **({} if self._promised is None else {"free_run_error": self._promised}),
+                **({} if self._free_run_error is None else {"free_run_error": self._free_run_error}),
             }
         findings = list(self._findings(received, lost, repeated)) or [(DiagnosticStatus.OK, "predicting")]
         level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
@@ -122,7 +122,7 @@ class ModelDiagnostics:
         send(self._publisher, array)
 
     def _findings(self, received: bool, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
-        predictor, promised = self._predictor, self._promised
+        predictor = self._predictor
         clock = self._node.get_clock()
         if clock.ros_time_is_active and clock.now().nanoseconds == 0:
             yield DiagnosticStatus.WARN, "use_sim_time is true, and nothing comes on /clock"
@@ -149,7 +149,5 @@ class ModelDiagnostics:
                 DiagnosticStatus.WARN,
                 "the model is warming up, because the earlier drive voltage is unknown",
             )
-        rms = predictor.residual_rms
-        if rms is not None and promised is not None and rms > self._warn * promised:
-            level = DiagnosticStatus.ERROR if rms > self._error * promised else DiagnosticStatus.WARN
-            yield level, f"the residual is {rms / promised:.3g} times the free-run error of the model"
+        if (finding := self._alarm.finding(predictor.residual_rms, self._free_run_error)) is not None:
+            yield finding

@@ -29,6 +29,7 @@ from ..topics import subscribe
 from .change_reporter import CHANGE, ChangeReporter
 from .diagnostics import ModelDiagnostics
 from .publishers import ModelTopics
+from .residual_alarm import ALARM, ResidualAlarm
 
 _COLD = 3.0
 """Time after which kernels are being compiled, and not only loaded [s]."""
@@ -40,26 +41,7 @@ MODEL: tuple[Row, ...] = (
     Setting("model_file", "", "path of the first model; a model on the topic `model` replaces it"),
     Parameter("live_rate", "f_l", "Hz", 50.0, 0.1, 1000.0, "rate of the live scalars", _SOURCE),
     Parameter("rms_time", "T_r", "s", 1.0, 1e-3, 1e4, "time over which residual_rms is taken", _SOURCE),
-    Parameter(
-        "residual_warn",
-        "k_w",
-        "1",
-        3.0,
-        0.0,
-        1e6,
-        "residual that causes a warning, in free-run errors of the model",
-        _SOURCE,
-    ),
-    Parameter(
-        "residual_error",
-        "k_e",
-        "1",
-        10.0,
-        0.0,
-        1e6,
-        "residual that causes an error, in free-run errors of the model",
-        _SOURCE,
-    ),
+    *ALARM,
     *CHANGE,
 )
 """Parameters of the model node."""
@@ -82,9 +64,7 @@ class ModelNode(GuardedNode):
         self._reader = SampleReader()
         self._topics = ModelTopics(self)
         self._changes = ChangeReporter(self, self._values)
-        self._diagnostics = ModelDiagnostics(
-            self, self._values["residual_warn"], self._values["residual_error"], self._changes
-        )
+        self._diagnostics = ModelDiagnostics(self, ResidualAlarm(self._values), self._changes)
         if self._values["model_file"]:
             self._load(self._values["model_file"])
         self.add_on_set_parameters_callback(self._check)

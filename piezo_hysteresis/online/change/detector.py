@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .baseline import Baseline, DriveClass, Scatter, drive_class
+from .false_alarm_threshold import WINDOW, false_alarm_threshold
 from .score import BLOCK_TIME, GROUPS, ChangeScore
-from .threshold import WINDOW, threshold
 
 Array = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ class ChangeDetector:
 
     def _threshold(self, key: DriveClass, scatter: Scatter) -> float:
         if key not in self._thresholds:
-            self._thresholds[key] = threshold(_directions(scatter), self._interval)
+            self._thresholds[key] = false_alarm_threshold(_directions(scatter), self._interval)
         return self._thresholds[key]
 
     def _alike(self, group: int, scatter: Scatter) -> tuple[str, ...]:

@@ -12,10 +12,10 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
 
-from piezo_hysteresis.acquisition import back_ends
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import write
+from piezo_hysteresis.stage import back_ends
 
 from ...acquisition.witness import Witness
 

@@ -5,13 +5,13 @@ import time
 import numpy as np
 import pytest
 
-from piezo_hysteresis.acquisition import back_ends
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.identification.protocol.protocol import Protocol, ProtocolPhase
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.nodes.identification.driver_client import DriverClient
 from piezo_hysteresis.nodes.identification.protocol_runner import run_protocol
 from piezo_hysteresis.recording import read
+from piezo_hysteresis.stage import back_ends
 
 from ...acquisition.witness import Witness
 

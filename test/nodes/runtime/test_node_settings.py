@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from piezo_hysteresis.acquisition.back_ends import BACK_ENDS
 from piezo_hysteresis.acquisition.settings import DRIVER
 from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.model.parameter_file import parameters
@@ -12,6 +11,7 @@ from piezo_hysteresis.nodes.identification.identification_node import IDENTIFICA
 from piezo_hysteresis.nodes.model.model_node import MODEL
 from piezo_hysteresis.nodes.runtime.parameters import describe
 from piezo_hysteresis.parameter import Setting
+from piezo_hysteresis.stage.back_ends import BACK_ENDS
 
 CONFIG = Path(__file__).parents[3] / "config"
 

@@ -7,8 +7,8 @@ from piezo_hysteresis.effects import Arx, BoucWen, Creep
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.online.change.baseline import Baseline, Scatter
+from piezo_hysteresis.online.change.false_alarm_threshold import false_alarm_threshold
 from piezo_hysteresis.online.change.score import GROUPS
-from piezo_hysteresis.online.change.threshold import threshold
 from piezo_hysteresis.online.change.watch import ChangeWatch, baseline_path
 from piezo_hysteresis.online.predictor import Predictor
 
@@ -142,7 +142,7 @@ def test_sums_of_correlated_scores_vary_as_an_autoregressive_series_does():
 
 
 def test_the_threshold_keeps_the_rate_of_false_alarms():
-    level = threshold(np.eye(2), 2000.0, seed=1)
+    level = false_alarm_threshold(np.eye(2), 2000.0, seed=1)
     total = np.cumsum(np.random.default_rng(2).standard_normal((400_000, 2)), axis=0)
     above = np.zeros(len(total), bool)
     for k in range(1, 61):

@@ -1,7 +1,6 @@
-"""Back ends of the driver: the word of the parameter `stage` -> its parameters, and how it is opened from them.
+"""`BACK_ENDS`: every kind of stage that a driver can open, by the value of the driver's parameter `stage`.
 
-A further device is a folder of `piezo_hysteresis.stage` that exports PARAMETERS and `open`, and one line of
-`BACK_ENDS`.
+A further device is a folder beside this file that exports PARAMETERS and `open`, and one line of `BACK_ENDS`.
 """
 
 from __future__ import annotations
@@ -12,9 +11,9 @@ from typing import Any
 
 from ..errors import ParameterError
 from ..parameter import Row
-from ..stage import daqmx, gcs2, replay, simulated
-from ..stage.opening import Opening
-from ..stage.stage import Stage
+from . import daqmx, gcs2, replay, simulated
+from .opening import Opening
+from .stage import Stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +31,7 @@ class BackEnd:
     has_keeper : bool
         True where a second process can bring the device to its safe voltage.
     keeper_ends_driver : bool
-        True where it can do that only once the silent driver has ended: the device is one process's alone.
+        True where it can do that only after the driver has ended, because the device serves one process at a time.
     """
 
     rows: tuple[Row, ...]

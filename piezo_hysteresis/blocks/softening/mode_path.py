@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import ModelError
-from .arx import ArxBlock
-from .block import Array
+from ...errors import ModelError
+from ..arx import ArxBlock
+from ..block import Array
 
 
 def split(a: Array, b: Array) -> tuple[Array, Array, Array]:

@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from .. import recording
-from ..errors import PiezoError, RecordError, RecordingError
-from ..record import Experiment
+from ... import recording
+from ...errors import PiezoError, RecordError, RecordingError
+from ...record import Experiment
 
 T = TypeVar("T")
 

@@ -1,11 +1,11 @@
-"""`Inversion`: what an effect says about its own inverse, so that a chain can be turned round."""
+"""`Invertibility`: whether an effect has an inverse, for `compensation`."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 
 
-class Inversion(StrEnum):
+class Invertibility(StrEnum):
     """Whether a wanted output of an effect can be turned into the input that gives it."""
 
     EXACT = "exact"

@@ -1,4 +1,4 @@
-"""`threshold`: how large the statistic must be, so that false alarms are as rare as the user wants.
+"""`false_alarm_threshold`: how large the statistic must be, so that false alarms are as rare as the user wants.
 
 The largest of many windows is not χ²-distributed. The stream of an unchanged stage is simulated instead.
 """
@@ -37,7 +37,7 @@ def largest_windows(total, longest, largest):  # type: ignore[no-untyped-def]
         largest[i] = most
 
 
-def threshold(directions: Array, interval: float, seed: int = 0) -> float:
+def false_alarm_threshold(directions: Array, interval: float, seed: int = 0) -> float:
     """Value that the statistic exceeds once in `interval` scores on average, while nothing changes.
 
     Parameters

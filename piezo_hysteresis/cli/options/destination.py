@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..errors import RecordingError
+from ...errors import RecordingError
 
 
 def require_new_file(option: str, path: str | None) -> None:

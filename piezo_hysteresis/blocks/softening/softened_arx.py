@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arx import ArxBlock
-from .block import Array, Block, MemorylessBlock, SeriesBlock, State
-from .group_delay import GroupDelayBlock
-from .kernel import kernel
+from ..arx import ArxBlock
+from ..block import Array, Block, MemorylessBlock, SeriesBlock, State
+from ..group_delay import GroupDelayBlock
+from ..kernel import kernel
 from .mode_path import Path
 
 

@@ -1,0 +1,57 @@
+"""`ResidualAlarm`: when the residual is a warning or an error on /diagnostics, and the parameters that set this."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from ...parameter import Parameter, Row
+
+_SOURCE = "model node"
+"""Source of the parameters of the alarm."""
+
+ALARM: tuple[Row, ...] = (
+    Parameter(
+        "residual_warn",
+        "k_w",
+        "1",
+        3.0,
+        0.0,
+        1e6,
+        "residual that causes a warning, in free-run errors of the model",
+        _SOURCE,
+    ),
+    Parameter(
+        "residual_error",
+        "k_e",
+        "1",
+        10.0,
+        0.0,
+        1e6,
+        "residual that causes an error, in free-run errors of the model",
+        _SOURCE,
+    ),
+)
+"""Alarm thresholds: parameters of the model node."""
+
+
+class ResidualAlarm:
+    """Compares the RMS residual with the free-run error that the model file states.
+
+    Parameters
+    ----------
+    values : mapping
+        Values of `ALARM`, by name.
+    """
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self._warn, self._error = float(values["residual_warn"]), float(values["residual_error"])
+
+    def finding(self, rms: float | None, free_run_error: float | None) -> tuple[bytes, str] | None:
+        """Level and message of an alarm; None without one, or while one of the two values [m] is unknown."""
+        if rms is None or free_run_error is None or rms <= self._warn * free_run_error:
+            return None
+        level = DiagnosticStatus.ERROR if rms > self._error * free_run_error else DiagnosticStatus.WARN
+        return level, f"the residual is {rms / free_run_error:.3g} times the free-run error of the model"

@@ -1,0 +1,53 @@
+"""`FORMATS`: every file format that is read, and `Format`: what each of them can do.
+
+A further format is a file in this folder and one line of `FORMATS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from ...record import Experiment
+from ..bag.rosbag2 import Rosbag2
+from ..table.read_options import ReadOptions
+from .csv import Csv
+from .gcs_array import GcsArrayFormat
+from .hdf5_variables import Hdf5Variables
+from .mat import Mat
+from .named_arrays import NamedArrays
+from .npy_variables import NpyVariables
+from .npz import Npz
+from .tdms_variables import TdmsVariables
+
+
+class Format(Protocol):
+    """One way in which experiments lie on disk."""
+
+    def recognises(self, path: Path) -> bool:
+        """True if the file or folder looks like this format."""
+
+    def read(self, path: Path, options: ReadOptions) -> Experiment:
+        """The experiment at `path`, in SI units, with notices about what was found."""
+
+
+@runtime_checkable
+class WritableFormat(Format, Protocol):
+    """A format that can also be written."""
+
+    def write(self, experiment: Experiment, path: Path) -> None:
+        """Write the experiment to `path`."""
+
+
+FORMATS: Mapping[str, Format] = {
+    "npz": Npz(),
+    "rosbag2": Rosbag2(),
+    "mat": Mat(),
+    "hdf5": NamedArrays((".h5", ".hdf5", ".hdf"), "an HDF5 file", Hdf5Variables),
+    "npy": NamedArrays((".npy",), "a NumPy array", NpyVariables),
+    "tdms": NamedArrays((".tdms",), "a LabVIEW TDMS file", TdmsVariables),
+    "gcs_array": GcsArrayFormat(),
+    "csv": Csv(),
+}
+"""Reader of every format by its name, in the order in which they are asked whether they recognise a path."""
