@@ -1,53 +1,39 @@
 """How long until the voltage falls after a stop, and until a device is safe when its driver dies.
 
-    scripts/run python -m benchmarks.safety_times
+    scripts/run python -m benchmarks.safety_times [BACK_END...]
 
-Per back end, in the fastest and the slowest of several attempts: from `stop()` to the first sample at the wire of the
-(emulated) device that is lower, idle and beside two busy processes; and from SIGKILL and SIGSTOP of a driver process
-in motion to the end of its keeper's work.
+Per back end, in the fastest and the slowest of several attempts: from the call of `~/stop` over ROS to the first sample
+at the wire of the (emulated) device that is lower, idle, beside two busy processes, under a flood of commands of 16 MB,
+and during the transfers of a controller; and from SIGKILL and SIGSTOP of a driver process in motion to the end of its
+keeper's work.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
+import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.wire import PERIOD, TOP, WiredSession, check_wire, device, driver_process
+from benchmarks.stop_over_ros import StopBench, StopTimes
+from benchmarks.streaming import LARGE_BLOCKS
+from benchmarks.wire import PERIOD, TOP, check_wire, device, driver_process
 
-FALLS = 0.02
-"""Fall of the voltage that counts [V]."""
 WORDS = ("simulated", "memory", "gcs2", "nidaqmx")
 ATTEMPTS = 3
+CASES = ((0, False, ""), (2, False, ""), (0, True, ""), (2, True, ""), (2, False, "WAV"), (2, False, "DRR?"))
+"""Busy processes, whether commands of 16 MB come in without a pause, and the transfer in which the stop comes."""
 TIMEOUT = 1.0
 """The default of `keeper_timeout` [s]."""
-
-
-def stopped(word: str) -> float:
-    """Time from a stop in motion until the wire falls [s]."""
-    with device(word) as (name, parameters, amplifier, _):
-        s = WiredSession(name, parameters, amplifier)
-        s.start()
-        s.rises()
-        highest, now = 0.0, s.output
-        begin = time.monotonic()
-        s.acquisition.stop()
-        parts = len(s.amplifier.parts)
-        while now > highest - FALLS and not (word == "memory" and len(s.amplifier.parts) > parts):
-            highest = max(highest, now)
-            time.sleep(1e-3)
-            now = s.output
-        took = time.monotonic() - begin
-        s.wait(lambda: not s.acquisition.playback.is_stopping, "rest")
-        check_wire(s.wire)
-        s.end()
-        return took
+TRANSFERS = {"": "", "WAV": ", during an upload", "DRR?": ", during a read-out"}
+"""First letters of the lines of a GCS 2.0 transfer, in words."""
 
 
 def kept(word: str, number: signal.Signals) -> tuple[float, float]:
@@ -87,13 +73,42 @@ def busy(count: int) -> Iterator[None]:
             process.join()
 
 
+def print_stops(words: Sequence[str], folder: Path) -> None:
+    """Rows of the stops of every back end, the driver being a node process."""
+    for word in words:
+        bench = StopBench(word, folder)
+        try:
+            for case in CASES:
+                if word == "gcs2" or not case[2]:
+                    print(f"stop, {word}, {case_times(bench, *case)}", flush=True)
+        except TimeoutError as error:  # a device may give up where no core is free
+            print(f"stop, {word}, not measured: {error}", flush=True)
+        finally:
+            bench.end()
+
+
+def case_times(bench: StopBench, load: int, flooded: bool, transfer: str) -> str:
+    """Times of several stops under one load, in words."""
+    before = bench.refusals
+    with busy(load):
+        found = [bench.times(flooded=flooded, transfer=transfer) for _ in range(ATTEMPTS)]
+    falls, answers = ([1e3 * getattr(times, name) for times in found] for name in StopTimes._fields)
+    words = [
+        f"{load} busy processes{TRANSFERS[transfer]}",
+        f"falls after {min(falls):.0f} to {max(falls):.0f} ms",
+        f"answered after at most {max(answers):.0f} ms",
+    ]
+    if flooded:
+        words.append(f"{bench.refusals - before} commands of 16 MB refused meanwhile")
+    return ", ".join(words)
+
+
 if __name__ == "__main__":
-    for load in (0, 2):
-        with busy(load):
-            for word in WORDS:
-                took = [1e3 * stopped(word) for _ in range(ATTEMPTS)]
-                print(f"stop, {load} busy processes, {word:10s} {min(took):6.0f} to {max(took):6.0f} ms", flush=True)
-    for word in ("gcs2", "nidaqmx"):
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    os.environ.setdefault("FASTDDS_DEFAULT_PROFILES_FILE", str(LARGE_BLOCKS))  # more of the flood arrives
+    with tempfile.TemporaryDirectory() as place:
+        print_stops(sys.argv[1:] or WORDS, Path(place))
+    for word in (word for word in ("gcs2", "nidaqmx") if word in (sys.argv[1:] or WORDS)):
         for number in (signal.SIGKILL, signal.SIGSTOP):
             took, fall = kept(word, number)
             print(f"keeper, {number.name}, {word:8s} safe after {took:.2f} s, steepest fall {fall:.0f} V/s", flush=True)

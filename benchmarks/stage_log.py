@@ -35,7 +35,7 @@ class StageLog:
         max_slew_rate: float,
         ramp_rate: float,
     ) -> None:
-        self._path, self._step = path, max_slew_rate * sample_period
+        self.path, self._step = path, max_slew_rate * sample_period
         self._low, self._high = voltage_min, voltage_max
         self.environment = {"PYTHONPATH": str(Path(piezo_hysteresis.__file__).parents[1])}
         self.driver = [sys.executable, str(Path(__file__).with_name("watched_driver.py")), str(path)]
@@ -43,7 +43,7 @@ class StageLog:
     @property
     def voltages(self) -> np.ndarray:
         """Everything that the stage was given [V]; NaN where a driver began."""
-        data = self._path.read_bytes()
+        data = self.path.read_bytes()
         return np.frombuffer(data[: len(data) // 8 * 8])
 
     @property
@@ -53,9 +53,9 @@ class StageLog:
 
     def shift_clock(self, offset: float) -> None:
         """Let the clock of the computer be off by so much [s], as drivers see it."""
-        draft = self._path.with_name("clock.tmp")
+        draft = self.path.with_name("clock.tmp")
         draft.write_text(str(offset))
-        draft.replace(f"{self._path}.clock")
+        draft.replace(f"{self.path}.clock")
 
     def check(self) -> None:
         """Every sample is inside the limits, and no steeper than allowed, from the safe voltage of every start on."""

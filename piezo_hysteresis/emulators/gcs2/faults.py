@@ -10,6 +10,8 @@ FAULTS = FaultCatalogue(
         "gone": ("DRR?", "half the answer, then the link is closed and no new one accepted"),
         "partial_answer": ("DRR?", "half the answer, then silence"),
         "slow": ("POS?", "the answer comes late, by the number of seconds given after '=' (5)"),
+        "trickle": ("POS?", "the answer comes byte by byte, with the seconds given after '=' between two (0.5)"),
+        "absurd": ("POS?", "the last number of the answer is the one given after '=' (1e300)"),
         "error": ("WAV", "refused with the error number given after '=' (17)"),
         "garbled": ("DRR?", "one value of the answer is no number"),
     },
@@ -23,6 +25,6 @@ FAULTS = FaultCatalogue(
         "skewed": "recorded positions are one sample late",
         "servo_on": "the servo is on and cannot be switched off",
     },
-    values={"slow": 5.0, "error": 17.0},
+    values={"slow": 5.0, "trickle": 0.5, "absurd": 1e300, "error": 17.0},
 )
 """Faults of the emulated controller, with the command at which each begins."""

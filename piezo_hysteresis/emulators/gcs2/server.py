@@ -108,10 +108,16 @@ class Gcs2Server:
             return
         if "garbled" in struck and lines:
             lines[-1 - len(lines) // 4] = "".join("nan" if c.isdigit() else c for c in lines[-1 - len(lines) // 4][:9])
+        if "absurd" in struck and lines:
+            lines[-1] = f"{lines[-1].rpartition('=')[0]}={struck['absurd']:g}".lstrip("=")
         text = " \n".join(lines).encode(_CODE_PAGE, errors="replace") + b"\n" if lines else b""
         if struck.keys() & {"link_lost", "gone", "partial_answer"}:
             text = text[: len(text) // 2]
-        link.sendall(text)
+        for byte in text if "trickle" in struck else b"":
+            link.sendall(bytes([byte]))
+            if self._ended.wait(struck["trickle"]):
+                return
+        link.sendall(b"" if "trickle" in struck else text)
         if "gone" in struck:
             self._close_port()
         if struck.keys() & {"link_lost", "gone"}:

@@ -24,6 +24,8 @@ _HIGHEST_VOLTAGE = 1e4
 """No piezo amplifier gives more [V]."""
 _SERVO_TIMES = (1e-6, 0.1)
 """Servo times that can be [s]."""
+_LONGEST_TRAVEL = 0.1
+"""No piezo stage moves further [m]."""
 _POLL = 5e-3
 """Time between two questions whether the generator runs [s]."""
 
@@ -42,6 +44,7 @@ class Axis:
         self.servo_time = 0.0
         self.waves = WaveTable(self.client, setup)
         self._plausible = (-_HIGHEST_VOLTAGE, _HIGHEST_VOLTAGE)
+        self._travel = (-_LONGEST_TRAVEL / setup.position_unit, _LONGEST_TRAVEL / setup.position_unit)
 
     def identify(self) -> Description:
         """Ask the controller who it is and for its limits; nothing moves.
@@ -68,6 +71,8 @@ class Axis:
             raise Gcs2Error(f"{name}: answers {lowest:g} V to VMI? and {highest:g} V to VMA?, expected a range")
         self.waves.limits, span = (lowest, highest), highest - lowest
         self._plausible = (lowest - span / 2, highest + span / 2)
+        if {"TMN?", "TMX?"} <= known:
+            self._narrow_travel()
         low, high = sorted((lowest / s.amplifier_gain, highest / s.amplifier_gain))
         return Description(
             name=f"{name}, axis {s.axis}",
@@ -83,6 +88,12 @@ class Axis:
             amplifier_gain=s.amplifier_gain,
             measured_voltage=True,
         )
+
+    def _narrow_travel(self) -> None:
+        """Positions further than a whole travel range outside of it cannot be; in open loop a stage leaves it a bit."""
+        first, last = (self.client.number(f"{q} {self.setup.axis}", *self._travel) for q in ("TMN?", "TMX?"))
+        if first < last:
+            self._travel = (2 * first - last, 2 * last - first)
 
     def _longest_block(self, reports_wave_memory: bool) -> int:
         s, client = self.setup, self.client
@@ -103,7 +114,7 @@ class Axis:
 
     def displacement(self) -> float:
         """Position [m]."""
-        return self.client.number(f"POS? {self.setup.axis}") * self.setup.position_unit
+        return self.client.number(f"POS? {self.setup.axis}", *self._travel) * self.setup.position_unit
 
     def open_loop(self) -> None:
         """Switch the servo off and make sure that it is off.
@@ -217,4 +228,11 @@ class Axis:
                 raise Gcs2Error(f"{place}: got the same {len(parts[-1])} recorded samples twice; read again")
             parts.append(array.values)
         values = np.concatenate(parts)
+        outside = (values[:, 1] < self._travel[0]) | (values[:, 1] > self._travel[1])
+        if outside.any():
+            at = int(outside.argmax())
+            raise Gcs2Error(
+                f"{place}: recorded position {at} is {values[at, 1]:g}, expected {self._travel[0]:g} to "
+                f"{self._travel[1]:g}; wrong position_unit, or channels exchanged"
+            )
         return values[:, 0] / s.amplifier_gain, values[:, 1] * s.position_unit

@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 import pytest
+from std_srvs.srv import Trigger
 
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.identification.protocol.protocol import Protocol, ProtocolPhase
@@ -28,11 +29,15 @@ def stage(monkeypatch):
     return stage
 
 
-def begun(lab, voltage, before=lambda link: None, phases=1):
-    """The protocol of one phase with a driver, as a function that calls `before`, carries it on and returns its end."""
+def begun(lab, voltage, before=lambda link: None, phases=1, first=lambda: None):
+    """The protocol of one phase with a driver, as a function that calls `before`, carries it on and returns its end.
+
+    `first` is called when the driver runs and nobody has asked it for anything yet.
+    """
     node = lab.add(DriverNode, discovery_time=0.0)
     lab.do(node.begin)
     lab.driver_node = node
+    first()
     link = lab.do(lambda: DriverClient(lab.node, "driver_node"))
     lab.wait(lambda: not link.missing, "the driver")
     phase, path = ProtocolPhase("long", voltage, PERIOD), lab.folder / "run"
@@ -93,3 +98,26 @@ def test_a_stage_that_was_moved_between_two_phases_ends_the_protocol(lab, stage,
     ended_with = lab.wait(begun(lab, np.zeros(200), push, phases=2), "the end of the protocol")
     assert "begins at 0 V, and the stage is at" in str(ended_with)
     assert "moved by somebody else" in str(ended_with)
+
+
+def test_a_protocol_does_not_begin_while_a_stop_holds(lab, stage):
+    """Asked for before the release: nothing is recorded or played, and the reason is the stop."""
+    ended_with = lab.wait(begun(lab, np.full(200, 1.0), first=lambda: lab.call(Trigger, "driver_node/stop")), "the end")
+    assert str(ended_with) == "the driver was stopped, nothing moves; call driver_node/release first"
+    assert not (lab.folder / "run").exists()
+    assert stage.voltage == 0.0
+
+
+def test_a_stop_between_two_phases_ends_the_protocol_with_its_reason(lab, stage):
+    stopped = []
+
+    def stop(link):
+        if link.state == "done" and not stopped:
+            stopped.append(lab.driver_node._commands._stop())
+
+    ended_with = lab.wait(begun(lab, np.zeros(200), stop, phases=2), "the end of the protocol")
+    assert "phase 'long' was refused: " in str(ended_with)
+    assert "the driver was stopped, nothing moves; call ~/release first" in str(ended_with)
+    assert {record.phase for record in read(lab.folder / "run")} == {"long"}
+    lab.call(Trigger, "driver_node/release")
+    lab.wait(lambda: stage.voltage == 0.0, "the safe voltage")

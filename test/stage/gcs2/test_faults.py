@@ -48,6 +48,11 @@ def test_a_link_that_does_not_come_back_leaves_the_voltage_unknown_and_says_so(b
         ("partial_answer@ERR?:30", "no answer within 1 s|stopped after"),
         ("slow@POS?=5", r"no answer within 1 s to 'POS\? 1'"),
         ("slow@WGO=5", "no answer within 1 s to ERR"),
+        ("trickle@POS?=0.5", r"the answer stopped after [1-3] bytes, expected its end within 1 s"),
+        ("trickle@DRR?=0.5", r"the answer stopped after [1-3] bytes, expected its end within 1 s"),
+        ("absurd@POS?=1e300", r"got '1e\+300' to 'POS\? 1', expected a number from -.* to "),
+        ("absurd@POS?=-5000", r"got '-5000' to 'POS\? 1', expected a number from -.* to "),
+        ("absurd@VOL?:2=-5000", r"got '-5000' to 'VOL\? 1', expected a number from -100 to 300"),
         ("error@WAV:3=3", r"refused 'WAV 1 & PNT 201 .*error 3 \(the command is too long; lower points_per_command"),
         ("error@DRR?=77", "no answer.*it holds error 77"),
         ("error@SVA=555", "error 555"),
@@ -106,6 +111,28 @@ def test_every_fault_can_be_named_and_nothing_else():
     for wrong in ("earthquake", "slow@POS?:x", "slow=fast"):
         with pytest.raises(StageError, match="expected"):
             FAULTS.parse(wrong)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        "VMA?=1e300",
+        "VMI?=-1e300",
+        "VMA?=-5000",
+        "VOL?=-5000",
+        "SPA?=1e-320",
+        "SPA?=1e6",
+        "TNR?=1e300",
+        "WMS?=-1",
+        "TMX?=1e300",
+    ],
+)
+def test_an_answer_that_cannot_be_is_refused_while_opening_and_moves_nothing(bench, answer):
+    b = bench(f"absurd@{answer}", opened=False)
+    with pytest.raises(StageError, match=r"expected (a number from|a range)") as refusal:
+        Gcs2Stage(b.setup())
+    assert "\n" not in str(refusal.value)
+    assert not any(line.startswith(("SV", "WGO", "\x18")) for line in b.controller.heard)
 
 
 @pytest.mark.parametrize("step", ["*IDN?", "HLP?", "SAI?", "SPA?", "VMI?", "TNR?", "WMS?", "VOL?", "ERR?:4"])

@@ -1,0 +1,40 @@
+"""A process that sends commands of 16 MB without a pause, for as long as it lives: a driver decodes and refuses them.
+
+scripts/run python -m benchmarks.command_flood --ros-args -r __ns:=/stage_x
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import rclpy
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import PointCloud2
+
+from benchmarks.wire import PERIOD
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud
+from piezo_hysteresis.nodes.runtime.qos import COMMAND
+from piezo_hysteresis.nodes.runtime.sending import send
+
+SAMPLES = 1_000_000
+"""Of one command, 16 bytes each."""
+
+
+def main() -> None:
+    """Flood `command`; a good waveform but for the step at its end."""
+    rclpy.init()
+    node = Node("flood")
+    publisher = node.create_publisher(PointCloud2, "command", COMMAND)
+    wave = np.zeros(SAMPLES)
+    wave[-1] = 100.0
+    packed = serialize_message(command_to_cloud(wave, PERIOD, "flood"))
+    while rclpy.ok():
+        send(publisher, packed)
+        publisher.wait_for_all_acked(Duration(seconds=1.0))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
