@@ -29,8 +29,8 @@ class SampleBlock:
         Running number of the sample, modulo 2^32.
     phase : (n,) ndarray of uint32
         Number of the phase.
-    stage : str
-        Name of the stage.
+    frame : str
+        Frame in which the displacement is measured; in recordings of earlier versions the name of the stage.
     follows_gap : bool
         True where samples before the block were never measured (a device reading out its memory), as the jump of the
         index shows; False where a jump of the index means lost messages.
@@ -42,7 +42,7 @@ class SampleBlock:
     displacement: Samples
     index: NDArray[np.uint32]
     phase: NDArray[np.uint32]
-    stage: str = ""
+    frame: str = ""
     follows_gap: bool = False
 
     @property

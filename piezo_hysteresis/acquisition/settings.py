@@ -44,6 +44,7 @@ DRIVER: tuple[Row, ...] = (
     Parameter(
         "keeper_timeout", "T_k", "s", 1.0, 0.0, 60.0, "silence after which a device is made safe; 0: no keeper", _SOURCE
     ),
+    Setting("frame_id", "", "frame of the displacement in all headers; empty: the namespace, without one 'stage'"),
     Parameter("discovery_time", "T_d", "s", 0.5, 0.0, 30.0, "wait for another driver of the same topics", _SOURCE),
 )
 """Rows of the driver itself; those of the back ends follow under ``"<word>."``."""

@@ -240,7 +240,6 @@ class StreamingAcquisition:
             displacement=acquired.displacement,
             index=np.arange(first, first + count).astype(np.uint32),  # modulo 2^32
             phase=drive.phase,
-            stage=self.stage.description.name,
             follows_gap=first > self.index,
         )
         self.tally.never_measured += first - self.index

@@ -6,7 +6,9 @@ tables of topics and the rights in ``config/sros2_policy.xml`` from it; a test h
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,9 +16,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
 
+from ..errors import ParameterError
 from .runtime.qos import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES, STATUS
 
 ANYONE = "anyone"
@@ -67,6 +71,15 @@ class Topic:
     def is_latched(self) -> bool:
         """True where a late joiner gets what was published before."""
         return bool(self.quality.durability == DurabilityPolicy.TRANSIENT_LOCAL)
+
+    @property
+    def overriding(self) -> QoSOverridingOptions | None:
+        """Lets parameters change history, depth and reliability; None where late joiners rely on a message.
+
+        Their names are ``qos_overrides.<topic>.<publisher or subscription>.<policy>``. rclpy writes them into the
+        profile that it is given.
+        """
+        return None if self.is_latched else QoSOverridingOptions.with_default_policies()
 
     @property
     def deep(self) -> QoSProfile:
@@ -121,16 +134,21 @@ TOPICS: dict[str, Topic] = {
 """Topics of an axis by name, in the order of the docs."""
 
 
-def advertise(node: Node, name: str, **options: Any) -> Any:
-    """A publisher of one of `TOPICS`."""
+def advertise(node: Node, name: str) -> Any:
+    """A publisher of one of `TOPICS`; ParameterError where a parameter asks for a quality that there is not."""
     topic = TOPICS[name]
-    return node.create_publisher(topic.type, topic.name, topic.quality, **options)
+    with _override_named(topic):
+        return node.create_publisher(
+            topic.type, topic.name, copy(topic.quality), qos_overriding_options=topic.overriding
+        )
 
 
-def advertise_lifecycle(node: LifecycleNode, name: str, **options: Any) -> Any:
-    """A publisher of one of `TOPICS` that is silent while its node is not active."""
+def advertise_lifecycle(node: LifecycleNode, name: str) -> Any:
+    """As `advertise`; silent while its node is not active."""
     topic = TOPICS[name]
-    return node.create_lifecycle_publisher(topic.type, topic.name, topic.quality, **options)
+    with _override_named(topic):
+        quality = copy(topic.quality)
+        return node.create_lifecycle_publisher(topic.type, topic.name, quality, qos_overriding_options=topic.overriding)
 
 
 def subscribe(node: Node, name: str, callback: Callable[[Any], None], *, deep: bool = False, raw: bool = False) -> Any:
@@ -147,6 +165,23 @@ def subscribe(node: Node, name: str, callback: Callable[[Any], None], *, deep: b
         Miss no message while the machine is busy.
     raw : bool
         Take messages as they came over the wire, as bytes.
+
+    Raises
+    ------
+    ParameterError
+        Where a parameter asks for a quality of service that there is not.
     """
     topic = TOPICS[name]
-    return node.create_subscription(topic.type, topic.name, callback, topic.deep if deep else topic.quality, raw=raw)
+    quality = topic.deep if deep else copy(topic.quality)
+    with _override_named(topic):
+        return node.create_subscription(
+            topic.type, topic.name, callback, quality, raw=raw, qos_overriding_options=topic.overriding
+        )
+
+
+@contextmanager
+def _override_named(topic: Topic) -> Iterator[None]:
+    try:
+        yield
+    except RuntimeError as error:  # what rclpy raises on a word that is no policy
+        raise ParameterError(f"qos_overrides of {topic.name}: {error}; expected a policy of ROS 2") from None

@@ -38,7 +38,7 @@ def published():
     rclpy.init(context=context, domain_id=101)
     node = LifecycleNode("live_views", namespace="/stage_x", context=context)
     node.declare_parameter("live_rate", 50.0)
-    driver, model = DriverTopics(node, "stage", PERIOD, 50.0), ModelTopics(node)
+    driver, model = DriverTopics(node, "stage", "stage_x", PERIOD, 50.0), ModelTopics(node)
     heard: dict[str, JointState] = {}
     for topic in ("live", "predicted_live"):
         node.create_subscription(JointState, topic, lambda message, topic=topic: heard.setdefault(topic, message), 10)

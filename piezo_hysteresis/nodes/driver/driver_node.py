@@ -20,6 +20,7 @@ from ...acquisition.settings import DRIVER, IN_FORCE, DriverSettings
 from ...errors import ParameterError, PiezoError, StageError, reason_of
 from ...record import Record
 from ...stage.back_ends import BACK_ENDS
+from ..messages.frame import frame_name
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.node_clock import now
 from ..runtime.parameters import declare, read
@@ -86,22 +87,24 @@ class DriverNode(GuardedNode, LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the stage; on failure the node stays unconfigured and logs the reason."""
         try:
-            settings = DriverSettings.from_values(read(self, DRIVER))
+            driver = read(self, DRIVER)
+            settings = DriverSettings.from_values(driver)
+            frame = frame_name(driver["frame_id"], self.get_namespace())
             values = read(self, BACK_ENDS[settings.stage].rows, f"{settings.stage}.")
             place = f"{self.resolve_topic_name('samples')} of domain {self.context.get_domain_id()}"
             session = DriverSession(settings, values, place, _records, self._latch)
             try:
                 self._refuse_second_driver(settings.discovery_time)
-            except StageError:
+                name = session.limits.name
+                self._topics = DriverTopics(self, name, frame, session.sample_period, settings.live_rate)
+            except Exception:
                 session.close()
                 raise
         except Exception as error:  # rclpy would end the transition without a word
             self._report_failure(error)
             return TransitionCallbackReturn.FAILURE
-        name = session.limits.name
         self._publish_in_force(session.in_force())
         self._session = session
-        self._topics = DriverTopics(self, name, session.sample_period, settings.live_rate)
         self._commands.attach(session, self._topics)
         self._diagnostics.state(DiagnosticStatus.OK, "configured, not active", name)
         self.get_logger().info(f"configured: {name}, {1 / session.sample_period:g} samples per second")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.lifecycle import LifecycleNode
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import Float64, String
 
 from ...acquisition.drive import Event, EventKind, Phase
@@ -28,21 +29,21 @@ class DriverTopics:
         The driver.
     stage : str
         Name of the stage.
+    frame : str
+        Frame in which the displacement is measured.
     sample_period : float
         Time between samples [s].
     live_rate : float
         Rate of the live scalars in stage time [Hz].
     """
 
-    def __init__(self, node: LifecycleNode, stage: str, sample_period: float, live_rate: float) -> None:
-        self._stage = stage
+    def __init__(self, node: LifecycleNode, stage: str, frame: str, sample_period: float, live_rate: float) -> None:
+        self._stage, self._frame = stage, frame
         self._live_step = max(1, round(1 / (live_rate * sample_period)))
         self._next_live = 0
         self._first: dict[int, int] = {}
         self._writer = SampleWriter()
-        self._samples = advertise_lifecycle(
-            node, "samples", qos_overriding_options=QoSOverridingOptions.with_default_policies()
-        )
+        self._samples = advertise_lifecycle(node, "samples")
         self._voltage = advertise_lifecycle(node, "voltage")
         self._displacement = advertise_lifecycle(node, "displacement")
         self._live = advertise_lifecycle(node, "live")
@@ -68,7 +69,7 @@ class DriverTopics:
         for event in begun:
             send(self._phase, String(data=str(event.phase)))
             self._publish_event(event, delivery.first)
-        if not send(self._samples, self._writer.write(delivery.block)):
+        if not send(self._samples, self._writer.write(replace(delivery.block, frame=self._frame))):
             message = f"the middleware did not accept a block of {delivery.block.size} samples; the block is lost"
             self._node.get_logger().warning(message)
         for event in ended:
@@ -124,4 +125,4 @@ class DriverTopics:
                 send(publisher, Float64(data=value))
         if is_heard(self._live):
             stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
-            send(self._live, live(stamp, self._stage, voltage=voltage, displacement=displacement))
+            send(self._live, live(stamp, self._frame, voltage=voltage, displacement=displacement))

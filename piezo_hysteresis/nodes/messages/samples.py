@@ -30,8 +30,8 @@ PREDICTED_SAMPLES = {
 _END_OF_TIME = 2**31
 """Messages count seconds in 32 bits."""
 
-_LONGEST_STAGE = 200
-"""Characters of the name of a stage that are passed on."""
+_LONGEST_FRAME = 200
+"""Characters of the name of a frame that are passed on."""
 
 _LARGEST = {"voltage": 1e4, "displacement": 1.0}
 """What no piezo stage is driven with [V], and no piezo stage moves [m]."""
@@ -39,7 +39,7 @@ _LARGEST = {"voltage": 1e4, "displacement": 1.0}
 
 def samples_to_cloud(block: SampleBlock) -> PointCloud2:
     """Message of `samples`."""
-    return to_cloud(block.columns, SAMPLES, to_stamp(block.stamp), block.stage, dense=not block.follows_gap)
+    return to_cloud(block.columns, SAMPLES, to_stamp(block.stamp), block.frame, dense=not block.follows_gap)
 
 
 class SampleWriter:
@@ -50,7 +50,7 @@ class SampleWriter:
 
     def write(self, block: SampleBlock) -> bytes:
         """Message of one block."""
-        return self._writer.write(block.columns, to_stamp(block.stamp), block.stage, dense=not block.follows_gap)
+        return self._writer.write(block.columns, to_stamp(block.stamp), block.frame, dense=not block.follows_gap)
 
 
 def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
@@ -80,7 +80,7 @@ def _block(columns: Columns) -> SampleBlock:
     block = SampleBlock(
         from_stamp(columns.stamp),
         **columns.values,
-        stage=printable(columns.frame_id[:_LONGEST_STAGE]),
+        frame=printable(columns.frame_id[:_LONGEST_FRAME]),
         follows_gap=not columns.dense,
     )
     _require_consecutive(block)
@@ -147,4 +147,4 @@ class PredictionWriter:
             "index": block.index,
             "model": model,
         }
-        return self._writer.write(columns, to_stamp(block.stamp), block.stage, dense=valid)
+        return self._writer.write(columns, to_stamp(block.stamp), block.frame, dense=valid)

@@ -66,7 +66,7 @@ class ChangeReporter:
         self._folder = Path(given).expanduser()
         self._watch = ChangeWatch(self._interval)
         self._model: Model | None = None
-        self._stage = self._problem = ""
+        self._frame = self._problem = ""
         self._alarms = 0
         self._publisher = advertise(node, "change")
         self.status = DiagnosticStatus(level=DiagnosticStatus.STALE)
@@ -77,7 +77,7 @@ class ChangeReporter:
         """Follow the samples of a block that `answer` predicts."""
         if answer.model is not None and answer.model is not self._model:
             self._follow(answer.model)
-        self._stage = block.stage
+        self._frame = block.frame
         stamp = block.stamp + round(float(block.time[-1]) * 1e9)
         try:
             completed = self._watch.add(np.ascontiguousarray(block.voltage), answer, predictor, stamp)
@@ -162,5 +162,5 @@ class ChangeReporter:
         if watch.since:
             values["onset"] = f"{watch.since // 10**9}.{watch.since % 10**9:09d}"
         name = f"{self._node.get_fully_qualified_name().lstrip('/')}: change"
-        self.status = diagnostic(level, name, message, self._stage, **values)
+        self.status = diagnostic(level, name, message, self._frame, **values)
         send(self._publisher, self.status)

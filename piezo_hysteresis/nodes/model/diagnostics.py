@@ -45,7 +45,7 @@ class ModelDiagnostics:
         self._publisher = advertise(node, DIAGNOSTICS)
         self._problem = self._refused = ""
         self._problems = 0
-        self._stage = ""
+        self._frame = ""
         self._model: Model | None = None
         self._predictor: Predictor | None = None
         self._free_run_error: float | None = None
@@ -83,7 +83,7 @@ class ModelDiagnostics:
 
     def saw(self, block: SampleBlock, now: int) -> None:
         """Note the age of a block that has been dealt with at `now` [ns]."""
-        self._stage = block.stage
+        self._frame = block.frame
         self._latency = max(self._latency, (now - block.stamp) * 1e-9 - float(block.time[-1]))
 
     def _publish(self) -> None:
@@ -116,7 +116,7 @@ class ModelDiagnostics:
         level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
         self._problem, self._latency = "", 0.0
         array = DiagnosticArray(
-            status=[diagnostic(level, self._name, message, self._stage, **values), self._changes.status]
+            status=[diagnostic(level, self._name, message, self._frame, **values), self._changes.status]
         )
         array.header.stamp = self._node.get_clock().now().to_msg()
         send(self._publisher, array)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from rclpy.node import Node
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import Float64
 
 from ...acquisition.sample_block import SampleBlock
@@ -31,9 +30,7 @@ class ModelTopics:
         self._next_live = 0
         self._named: tuple[Model, int] | None = None
         self._writer = PredictionWriter()
-        self._samples = advertise(
-            node, "predicted_samples", qos_overriding_options=QoSOverridingOptions.with_default_policies()
-        )
+        self._samples = advertise(node, "predicted_samples")
         self._prediction = advertise(node, "prediction")
         self._residual = advertise(node, "residual")
         self._rms = advertise(node, "residual_rms")
@@ -68,4 +65,4 @@ class ModelTopics:
             "residual": residual,
         }
         stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
-        send(self._live, live(stamp, block.stage, **values))
+        send(self._live, live(stamp, block.frame, **values))

@@ -28,7 +28,7 @@ def block_of(n, first_index=0, **changes):
         "displacement": np.linspace(0, 1e-5, n),
         "index": (first_index + np.arange(n)).astype(np.uint32),
         "phase": np.full(n, 7, np.uint32),
-        "stage": "simulated",
+        "frame": "simulated",
     }
     return SampleBlock(**{**values, **changes})
 
@@ -39,7 +39,7 @@ def outcome(read, message):
         block = read(message)
     except RecordError as error:
         return str(error)
-    return block.stamp, block.stage, block.follows_gap, [values.tolist() for values in block.columns.values()]
+    return block.stamp, block.frame, block.follows_gap, [values.tolist() for values in block.columns.values()]
 
 
 def read(message):
@@ -59,14 +59,14 @@ def test_samples_come_back_bit_for_bit(displacement, first, gap):
     assert {name: values.tobytes() for name, values in back.columns.items()} == {
         name: values.tobytes() for name, values in block.columns.items()
     }
-    assert (back.stamp, back.stage, back.follows_gap) == (block.stamp, block.stage, gap)
+    assert (back.stamp, back.frame, back.follows_gap) == (block.stamp, block.frame, gap)
 
 
 @given(st.lists(st.tuples(st.integers(1, 5), st.text(max_size=6), st.integers(0, 2**31 * 10**9 - 1), st.booleans())))
 def test_a_stream_says_what_its_messages_say_one_by_one(changes):
     writer, reader = SampleWriter(), SampleReader()
     for size, stage, stamp, gap in changes:
-        block = block_of(size, stage=stage.replace("\0", ""), stamp=stamp, follows_gap=gap)
+        block = block_of(size, frame=stage.replace("\0", ""), stamp=stamp, follows_gap=gap)
         raw = writer.write(block)
         cloud = samples_to_cloud(block)
         assert deserialize_message(raw, PointCloud2) == cloud

@@ -1,0 +1,41 @@
+"""`frame_name`: the frame in which an axis measures, as REP 105 and tf2 want it."""
+
+from __future__ import annotations
+
+import re
+
+from ...errors import ParameterError, printable
+
+_FRAME = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
+"""Words of letters, digits and underscores with slashes in between; tf2 refuses a leading slash."""
+
+_WITHOUT_NAMESPACE = "stage"
+"""Frame of an axis in the root namespace."""
+
+
+def frame_name(given: str, namespace: str) -> str:
+    """Name for the headers of an axis.
+
+    Parameters
+    ----------
+    given : str
+        As the user wants it; empty for the namespace of the axis.
+    namespace : str
+        Of the driver, e.g. ``/stage_x``.
+
+    Raises
+    ------
+    ParameterError
+        If what was given is no name of a frame.
+
+    Examples
+    --------
+    >>> frame_name("", "/lab/stage_x"), frame_name("", "/"), frame_name("mirror", "/lab")
+    ('lab/stage_x', 'stage', 'mirror')
+    """
+    name = given or namespace.strip("/") or _WITHOUT_NAMESPACE
+    if not _FRAME.fullmatch(name):
+        raise ParameterError(
+            f"frame_id: got '{printable(name)}', expected letters, digits and '_', with '/' in between only"
+        )
+    return name

@@ -1,0 +1,36 @@
+"""Parameters change the quality of service of a topic, and words that mean nothing are refused."""
+
+import pytest
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Float64
+
+from piezo_hysteresis.errors import ParameterError
+from piezo_hysteresis.nodes.messages.frame import frame_name
+
+pytestmark = pytest.mark.nodes
+
+VOLTAGE = "qos_overrides./voltage.publisher.reliability"
+BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def test_a_driver_publishes_as_its_parameters_say_in_the_frame_of_its_axis(lab):
+    lab.driver("-p", f"{VOLTAGE}:=best_effort", frame_id="lab/mirror", sample_period=1e-4)
+    live, samples = lab.listen(JointState, "live"), lab.listen(PointCloud2, "samples")
+    voltage = lab.listen(Float64, "voltage", BEST_EFFORT)
+    lab.wait(lambda: live and samples and voltage, "samples")
+    assert {live[0].header.frame_id, samples[0].header.frame_id} == {"lab/mirror"}
+    (told,) = lab.node.get_publishers_info_by_topic("/voltage")
+    assert told.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+
+
+def test_a_word_that_is_no_quality_is_refused_in_one_line(lab):
+    node = lab.start("model_node", "-p", "qos_overrides./prediction.publisher.reliability:=besteffort")
+    assert node.wait() == 2
+    assert "qos_overrides of prediction" in node.output
+
+
+@pytest.mark.parametrize("wrong", ["/stage_x", "a b", "x/", "a//b", "µ"])
+def test_frames_are_names_that_tf_takes(wrong):
+    with pytest.raises(ParameterError, match="frame_id"):
+        frame_name(wrong, "/")
