@@ -150,7 +150,7 @@ def test_any_answer_gives_a_value_that_makes_sense_or_one_clear_error(question, 
 @pytest.mark.parametrize("said", ["1_0", "١", "0x1", "1 0", "-", "1.0", "0000000"])
 def test_an_error_number_has_nothing_but_digits(said):
     """Python reads '1_0' as ten, and '0000000' as no error."""
-    with babbling(f"{said}\n".encode("utf-8")) as client, pytest.raises(StageError, match="expected an error number"):
+    with babbling(f"{said}\n".encode()) as client, pytest.raises(StageError, match="expected an error number"):
         client.command("SVA 1 1")
 
 
