@@ -60,3 +60,29 @@ def test_a_record_is_cut_by_what_its_drive_does():
     assert len({p.amplitude for p in loops}) >= 2
     assert sum(p.record.size for p in pieces) == u.size
     assert all(p.record.continues for p in pieces[1:])
+
+
+@pytest.mark.parametrize("frequency", [1040.0, 1400.0])
+def test_a_fast_mode_is_resolved_up_to_near_half_the_sampling_rate(frequency):
+    fast = Nanopositioner(mode=frequency, delay=2e-4, pole=2e-4)
+    records = [fast.play(growing_sine(f, 3e-4, (0.5, 1.0), hold=0.2), 3e-4, f"sine_{f:g}hz") for f in (2.0, 100.0)]
+    model = identify(Experiment(tuple(records)), memory=True).model
+    assert model[ExtraResonance.name]["f0"] == pytest.approx(frequency, rel=0.01)
+    unseen = Experiment((fast.play(growing_sine(40.0, 3e-4, (0.5, 1.0), hold=0.2), 3e-4, "sine_40hz"),))
+    assert max(percents(model, unseen)) < 0.3
+
+
+def test_a_gain_that_rises_with_the_frequency_shows_a_mode_without_a_step():
+    stage = Nanopositioner(mode=700.0, zeta=0.05, delay=2e-4, pole=1e-4)
+
+    def smooth(frequency):
+        time = 2e-4 * np.arange(round(6.0 / (frequency * 2e-4)))
+        return 4.9 * (1.0 - np.cos(2.0 * np.pi * frequency * time)) * np.minimum(1.0, 0.4 + 0.3 * frequency * time)
+
+    def record(frequency):
+        return stage.play(smooth(frequency), 2e-4, f"sine_{frequency:g}hz")
+
+    found = identify(Experiment((record(2.0), record(100.0))), memory=True)
+    (notice,) = (n for n in found.notices if n.kind == "ringing")
+    assert "the gain rises with the frequency" in notice.message
+    assert max(percents(found.model, Experiment((record(50.0),)))) < 0.3

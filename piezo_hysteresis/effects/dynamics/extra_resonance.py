@@ -16,7 +16,7 @@ from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 from ..invertibility import Invertibility
 
-RESOLVED = 0.25
+RESOLVED = 0.45
 """Cycles per sample up to which the mode is simulated; faster ones act as their lag."""
 
 

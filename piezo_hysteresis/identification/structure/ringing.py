@@ -11,7 +11,7 @@ from .pieces import Kind, RecordPiece
 
 CYCLES = 4.0
 """Fewest cycles in the piece behind the step."""
-RESOLVED = 0.25
+RESOLVED = 0.45
 """Highest frequency, cycles per sample: faster modes are a lag."""
 STANDS_OUT = 10.0
 """Power of the highest line over the median of its spectrum."""

@@ -18,7 +18,6 @@ from ...effects import (
     CreepTwoRates,
     Effect,
     EvenInputPolynomial,
-    ExtraResonance,
     HysteresisMemory,
     LevelDependentMemory,
 )
@@ -27,9 +26,9 @@ from ...model.model import Model
 from ...record import Notice, Record
 from ..fit.fit import Fit, Progress
 from ..records.conditioning import carried
-from .piece_fit import DELAY, GAIN, POLE, PieceFit, fit_pieces
-from .pieces import Kind, RecordPiece, pieces_of
-from .ringing import ringing_frequency
+from .linear_part import fit_linear_part, fit_structure, held_by
+from .piece_fit import PieceFit
+from .pieces import RecordPiece, pieces_of
 from .scores import STRUCTURES, Judged, ModelStructure, judge
 from .uncertainty import as_fit, spread_of
 
@@ -39,12 +38,6 @@ WIDEST = 0.94
 """Half width of the widest play over the largest drive; on the way from rest a play moves beyond its half width."""
 START_CREEP = 0.005
 """Creep per decade at which a fit begins."""
-LAGS = (0.3, 1.5, 4.0)
-"""Delays at which a fit begins [samples]."""
-RINGING_STAYS = 0.7
-"""Share of the power behind a step that a mode may leave."""
-POLE_GAINS = 0.98
-"""Share of the cost that a pole may leave."""
 TIE = 0.02
 """Difference of scores (mean ln R²) within which the structure with fewer numbers is taken."""
 LEADS = 0.35
@@ -92,14 +85,15 @@ def choose_structure(
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)
-    plain, notices = _dynamics(_with_plays(start, used), pieces, sizes)
+    plain, notices = fit_linear_part(_with_plays(start, used), pieces, sizes)
     progress("structure: effects", 0.4)
-    full = _fit(plain.model.with_effect(LevelDependentMemory()), pieces, sizes)
+    held = held_by(plain)
+    full = fit_structure(plain.model.with_effect(LevelDependentMemory()), pieces, sizes, held)
     judged = sorted(judge(full, pieces, STRUCTURES), key=lambda j: j.score)
     best = judged[0]
     chosen = min((j for j in judged if not j.score > best.score + TIE), key=lambda j: (j.structure.size, j.score))
     progress("structure: fit", 0.7)
-    final = _fit(_reduced(full.model, chosen), pieces, sizes)
+    final = fit_structure(_reduced(full.model, chosen), pieces, sizes, held)
     progress("structure: rival", 0.85)
     described = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in judged[:3])
     notices.append(
@@ -140,48 +134,6 @@ def _with_plays(start: Model, records: Sequence[Record]) -> Model:
     return Model(effects, period, start.voltage_scale, start.displacement_scale)
 
 
-def _dynamics(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> tuple[PieceFit, list[Notice]]:
-    """Delay, then a mode where the stage rings behind a step, then a pole where it helps."""
-    found = [_fit(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
-    best = min(found, key=lambda f: f.cost)
-    notices: list[Notice] = []
-    frequency = ringing_frequency(best.model, pieces)
-    if frequency is not None:
-        rings = _fit(best.model.with_effect(ExtraResonance(r=1.0, f0=frequency, zeta=0.02)), pieces, floors)
-        if _behind_steps(rings, pieces) < RINGING_STAYS * _behind_steps(best, pieces) and rings.cost < best.cost:
-            best = rings
-            mode = rings.model[ExtraResonance.name]
-            described = f"a mode at {mode['f0']:.4g} Hz with a damping ratio of {mode['zeta']:.2g}"
-            notices.append(Notice("ringing", f"the stage rings behind the step: {described}"))
-    poles = []
-    for pole in (0.3, 0.8):
-        arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=best.model[Arx.name]["delay"])
-        tried = _fit(best.model.with_effect(arx), pieces, floors)
-        if tried.model.values()[POLE] < 0.0:
-            poles.append(tried)
-    lagging = min(poles, key=lambda f: f.cost, default=best)
-    return (lagging if lagging.cost < POLE_GAINS * best.cost else best), notices
-
-
-def _behind_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
-    counted = [p for p in pieces if p.kind is not Kind.CARRYING]
-    steps = [s for s, p in zip(fit.squares.tolist(), counted, strict=True) if p.kind is Kind.STEP]
-    return float(np.mean(steps)) if steps else np.inf
-
-
-def free_numbers(model: Model) -> list[str]:
-    """Numbers that a fit of a structure frees: all but those that are fixed or the gauge."""
-    held = {GAIN} if not model[Arx.name].values["a"] else set()
-    loop = model.hysteresis
-    if not loop.has_memory:
-        held |= {f"{loop.name}.{n}" for n in loop.fitted_names() if n not in loop.linear_numbers()}
-    return [n for n in model.values() if n not in held and not model.row(n).fixed]
-
-
-def _fit(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
-    return fit_pieces(model, pieces, floors, free_numbers(model))
-
-
 def _reduced(model: Model, chosen: Judged) -> Model:
     """The full model without the effects that were not chosen."""
     structure = chosen.structure
@@ -206,7 +158,7 @@ def _rival(
     model = model.with_hysteresis(start.hysteresis)
     same = ModelStructure(True, 2, True)
     try:
-        rival = _fit(model, pieces, floors)
+        rival = fit_structure(model, pieces, floors, held_by(final))
         lead = next(judge(final, pieces, (same,))).score - next(judge(rival, pieces, (same,))).score
     except PiezoError:
         return None, 0.0

@@ -1,0 +1,130 @@
+"""The linear part of a model without broadband records: a delay, a lightly damped mode, a pole."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+import numpy as np
+
+from ...effects import Arx, ExtraResonance
+from ...model.model import Model
+from ...record import Notice
+from ..records.excitation_content import excitation_content
+from .piece_fit import DELAY, GAIN, POLE, PieceFit, fit_pieces
+from .pieces import Kind, RecordPiece
+from .ringing import RESOLVED, ringing_frequency
+
+LAGS = (0.3, 1.5, 4.0)
+"""Delays at which a fit begins [samples]."""
+RINGING_STAYS = 0.7
+"""Share of the power behind a step that a mode may leave."""
+POLE_GAINS = 0.98
+"""Share of the cost that a pole may leave."""
+SILENT_GAINS = 0.8
+"""Share of the cost that a mode may leave which does not ring, but raises the gain of fast drives."""
+SILENT = (4.0, 10.0)
+"""Frequencies at which the fit of such a mode begins, times the fastest drive."""
+DAMPING = 0.02
+"""Damping ratio at which the fit of a mode begins."""
+SILENT_DAMPING = 0.2
+"""Damping ratio of a mode that does not ring; its lag is part of the delay."""
+WHOLE = 0.3
+"""Distance from 1 of the share of a mode of the whole stage; ringing with another share may be an alias of it."""
+SHAPE, SHARE = tuple(f"{ExtraResonance.name}.{n}" for n in ("f0", "zeta")), f"{ExtraResonance.name}.r"
+"""Numbers of a mode."""
+
+
+def free_numbers(model: Model) -> list[str]:
+    """Numbers that a fit of a structure frees: all but those that are fixed or the gauge."""
+    held = {GAIN} if not model[Arx.name].values["a"] else set()
+    loop = model.hysteresis
+    if not loop.has_memory:
+        held |= {f"{loop.name}.{n}" for n in loop.fitted_names() if n not in loop.linear_numbers()}
+    return [n for n in model.values() if n not in held and not model.row(n).fixed]
+
+
+def fit_structure(
+    model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float], held: Collection[str] = ()
+) -> PieceFit:
+    """Fit all free numbers of a model but those in `held`."""
+    return fit_pieces(model, pieces, floors, [n for n in free_numbers(model) if n not in held])
+
+
+def fit_linear_part(
+    model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]
+) -> tuple[PieceFit, list[Notice]]:
+    """Delay, then a mode where the stage rings or its gain rises with the frequency, then a pole where it helps.
+
+    Parameters
+    ----------
+    model : Model
+        With a delay as its dynamics.
+    pieces : sequence of RecordPiece
+        In order.
+    floors : sequence of float
+        Floor of every record [m].
+
+    Returns
+    -------
+    fit : PieceFit
+        All free numbers at their best.
+    notices : list of Notice
+        ``ringing``, where a mode was taken.
+    """
+    found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
+    best = min(found, key=lambda f: f.cost)
+    best, notices = _with_mode(best, pieces, floors)
+    held = held_by(best)
+    poles = []
+    for pole in (0.3, 0.8):
+        arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=best.model[Arx.name]["delay"])
+        tried = fit_structure(best.model.with_effect(arx), pieces, floors, held)
+        if tried.model.values()[POLE] < 0.0:
+            poles.append(tried)
+    lagging = min(poles, key=lambda f: f.cost, default=best)
+    return (lagging if lagging.cost < POLE_GAINS * best.cost else best), notices
+
+
+def held_by(fit: PieceFit) -> tuple[str, ...]:
+    """Numbers of a mode that a fit holds."""
+    return tuple(n for n in (*SHAPE, SHARE) if n in fit.model.values() and n not in fit.names)
+
+
+def _with_mode(
+    plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]
+) -> tuple[PieceFit, list[Notice]]:
+    frequency = ringing_frequency(plain.model, pieces)
+    found, described = plain, ""
+    if frequency is not None:
+        mode = ExtraResonance(r=1.0, f0=frequency, zeta=DAMPING)
+        rings = fit_structure(plain.model.with_effect(mode), pieces, floors)
+        if _behind_steps(rings, pieces) < RINGING_STAYS * _behind_steps(plain, pieces) and rings.cost < plain.cost:
+            found, numbers = rings, rings.model[ExtraResonance.name]
+            shown = f"a mode at {numbers['f0']:.4g} Hz with a damping ratio of {numbers['zeta']:.2g}"
+            described = f"the stage rings behind the step: {shown}"
+    if found is plain or abs(found.model.values()[SHARE] - 1.0) > WHOLE:
+        silent = min(_silent(plain, pieces, floors), key=lambda f: f.cost, default=plain)
+        if silent.cost < SILENT_GAINS * found.cost:
+            found, numbers = silent, silent.model[ExtraResonance.name]
+            shown = f"as a mode at {numbers['f0']:.4g} Hz with {numbers['r']:.3g} of the displacement makes it do"
+            described = f"the gain rises with the frequency of the drive, {shown}"
+    return found, [Notice("ringing", described)] if described else []
+
+
+def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> Iterator[PieceFit]:
+    """Fits with a mode that no step shows: one number each, its frequency, or its share at the highest frequency."""
+    loops = [p.record for p in pieces if p.kind is Kind.LOOP]
+    fastest = max((excitation_content(r).bandwidth for r in loops), default=0.0)
+    top = RESOLVED / min(p.record.sample_period for p in pieces)
+    for times in SILENT:
+        if 0.0 < times * fastest < top:
+            mode = ExtraResonance(r=1.0, f0=times * fastest, zeta=SILENT_DAMPING)
+            yield fit_structure(plain.model.with_effect(mode), pieces, floors, (SHARE, SHAPE[1]))
+    mode = ExtraResonance(r=0.5, f0=top, zeta=SILENT_DAMPING)
+    yield fit_structure(plain.model.with_effect(mode), pieces, floors, SHAPE)
+
+
+def _behind_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
+    counted = [p for p in pieces if p.kind is not Kind.CARRYING]
+    steps = [s for s, p in zip(fit.squares.tolist(), counted, strict=True) if p.kind is Kind.STEP]
+    return float(np.mean(steps)) if steps else np.inf
