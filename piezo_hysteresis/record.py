@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from .channels import ChannelMapping, Samples, are_finite
 from .errors import RecordError, printable
+from .notice import Notice
 
 __all__ = ["Experiment", "Notice", "Record", "Samples", "are_finite"]
 
@@ -184,31 +185,6 @@ class Record:
             return np.asarray(channel[: blocks * factor].reshape(blocks, factor).mean(axis=1))
 
         return self.with_channels(mean, sample_period=self.sample_period * factor, initial_voltage=self.settled_voltage)
-
-
-@dataclass(frozen=True, slots=True)
-class Notice:
-    """One finding about the quality of data. It is reported; the data are never changed silently.
-
-    Parameters
-    ----------
-    kind : str
-        Stable word: ``gap``, ``clipped``, ``non_finite``, ``duplicate``, ``not_at_rest``, ``units``, …
-    message : str
-        One plain line, made printable.
-    phase : str
-        Phase it was found in; empty for the whole experiment.
-    severe : bool
-        True where no verdict should rest on the data.
-    """
-
-    kind: str
-    message: str
-    phase: str = ""
-    severe: bool = False
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "message", printable(self.message))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.linalg import convolution_matrix
-from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def preview_taps(outside: Array) -> tuple[int, Array]:
     order = outside.size - 1
     if order == 0:
         return 0, 1.0 / outside
-    taps = lfilter([1.0], outside[::-1] / outside[-1], np.eye(1, LONGEST + order)[0]) / outside[-1]
+    taps = scipy.signal.lfilter([1.0], outside[::-1] / outside[-1], np.eye(1, LONGEST + order)[0]) / outside[-1]
     # from the tail: what is left away may not add up to more than rounding
     left = np.cumsum(np.abs(taps[::-1]))[::-1]
     count = max(1, int((left > ROUNDING * left[0]).sum()))

@@ -12,9 +12,10 @@ from .identify import identify
 from .protocol.drive_limits import DriveLimits
 from .protocol.protocol import Protocol, ProtocolPhase, paper, rich, short
 from .steps.delay import Delay, identify_delay
-from .steps.dynamics import Dynamics, compare_orders, identify_arx
+from .steps.dynamics import Dynamics, identify_arx
 from .steps.frequency_response import FrequencyResponse, periodic, welch
 from .steps.hysteresis import fit_hysteresis
+from .steps.order_choice import compare_orders
 from .steps.three_steps import ThreeSteps, three_steps
 
 __all__ = [

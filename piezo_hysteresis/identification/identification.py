@@ -14,7 +14,8 @@ from .fit.normal_equations import Nuisance, residuals
 from .records.roles import Roles
 from .steps.comparison import InputComparison
 from .steps.delay import Delay
-from .steps.dynamics import Dynamics, OrderError
+from .steps.dynamics import Dynamics
+from .steps.order_choice import OrderError
 from .steps.three_steps import ThreeSteps
 
 CORRELATED = 0.95

@@ -27,10 +27,11 @@ from .records.leading_step import steps_apart
 from .records.roles import HELD_OUT, Roles, roles_of
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.delay import Delay, identify_delay
-from .steps.dynamics import Dynamics, OrderError, choose_order, compare_orders, delay_of
+from .steps.dynamics import Dynamics, delay_of
 from .steps.hysteresis import fit_hysteresis
 from .steps.hysteresis_choice import choose_memory
 from .steps.linear_start import dynamics_of, hysteresis_signals
+from .steps.order_choice import OrderError, choose_order, compare_orders
 from .steps.remaining_lag import lag_notices
 from .steps.three_steps import ThreeSteps, named, three_steps
 from .structure.structure_choice import choose_structure

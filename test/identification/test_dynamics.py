@@ -8,9 +8,10 @@ from benchmarks.published_plant import A_Z, B_Z, DELAY, SAMPLE_PERIOD, STROKE, h
 from piezo_hysteresis.effects import Arx
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.identification.protocol import protocol
-from piezo_hysteresis.identification.steps.dynamics import Dynamics, choose_order, compare_orders, identify_arx
+from piezo_hysteresis.identification.steps.dynamics import Dynamics, identify_arx
 from piezo_hysteresis.identification.steps.frequency_response import periodic, welch
 from piezo_hysteresis.identification.steps.linear_start import ITERATIONS
+from piezo_hysteresis.identification.steps.order_choice import choose_order, compare_orders
 
 PUBLISHED = Dynamics(Arx(a=A_Z[1:], b=B_Z, delay=DELAY), SAMPLE_PERIOD)
 BAND = np.geomspace(1.0, 2000.0, 60)

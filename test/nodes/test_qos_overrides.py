@@ -20,8 +20,8 @@ def test_a_driver_publishes_as_its_parameters_say_in_the_frame_of_its_axis(lab):
     voltage = lab.listen(Float64, "voltage", BEST_EFFORT)
     lab.wait(lambda: live and samples and voltage, "samples")
     assert {live[0].header.frame_id, samples[0].header.frame_id} == {"lab/mirror"}
-    (told,) = lab.node.get_publishers_info_by_topic("/voltage")
-    assert told.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    (reported,) = lab.node.get_publishers_info_by_topic("/voltage")
+    assert reported.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
 def test_a_word_that_is_no_quality_is_refused_in_one_line(lab):

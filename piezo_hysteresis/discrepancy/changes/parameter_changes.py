@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from ...identification.structure.pieces import WEIGHTS, pieces_of
 from ...model.model import Model
@@ -125,7 +125,7 @@ class ChangeSearch:
             sizes = np.concatenate((-sizes[:10][::-1], sizes)) if key == "delay" else sizes
             near = float(min(sizes, key=lambda s: self.account(key, float(s), mask=mask).cost))
         low, high = sorted((0.4 * near, 2.2 * near))
-        found = minimize_scalar(
+        found = scipy.optimize.minimize_scalar(
             lambda s: self.account(key, float(s), mask=mask).cost,
             bounds=(low, high),
             method="bounded",

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter, lfiltic
 
 from ...effects import (
     BoucWen,
@@ -149,8 +149,8 @@ def filtered(prediction: ChangeablePrediction, signal: Array, before: float, tau
     lead = 1.0 - (1.0 - keep) / x
     late = (1.0 - keep) - lead
     num, den = [lead, late], [1.0, -keep]
-    state = lfiltic(num, den, [before], [before])
-    return np.asarray(lfilter(num, den, signal, zi=state)[0])
+    state = scipy.signal.lfiltic(num, den, [before], [before])
+    return np.asarray(scipy.signal.lfilter(num, den, signal, zi=state)[0])
 
 
 Shaped = Callable[[ChangeablePrediction, Array, float, float], Array]

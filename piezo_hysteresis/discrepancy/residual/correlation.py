@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
-from scipy.stats import norm
 
 from ...errors import RecordError
 
@@ -117,11 +116,11 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
     lags = min(lags, n // 4)
     auto, _, _ = _products(e, e)
     memory = autoregression(auto / power_e, n)
-    innovations, drive = (lfilter(memory, [1.0], x)[memory.size - 1 :] for x in (e, u))
+    innovations, drive = (scipy.signal.lfilter(memory, [1.0], x)[memory.size - 1 :] for x in (e, u))
     both, auto_e, auto_u = _products(innovations, drive)
     power = float(auto_e[0] * auto_u[0])
     k = np.arange(-lags, lags + 1)
-    z = float(norm.isf(FALSE_ALARMS / 2 / k.size))
+    z = float(scipy.stats.norm.isf(FALSE_ALARMS / 2 / k.size))
     if auto_e[0] <= PREDICTABLE * power_e or auto_u[0] <= PREDICTABLE * power_u:
         cross, effective = np.zeros(k.size), 0.0
     else:
@@ -130,7 +129,7 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
     return Correlation(
         lag=np.asarray(sample_period * np.arange(lags + 1)),
         auto=auto[: lags + 1] / power_e,
-        auto_bound=float(norm.isf(FALSE_ALARMS / 2 / lags) / np.sqrt(n)),
+        auto_bound=float(scipy.stats.norm.isf(FALSE_ALARMS / 2 / lags) / np.sqrt(n)),
         cross_lag=np.asarray(sample_period * k),
         cross=cross,
         cross_bound=float(np.tanh(z / np.sqrt(effective - 3.0))) if effective >= FEWEST_INDEPENDENT else 1.0,

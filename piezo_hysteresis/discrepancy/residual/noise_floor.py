@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import periodogram
-from scipy.signal.windows import hann
 
 from ...channels import quantity_of
 from ...identification.records.excitation_content import noise_on_motion
@@ -45,7 +44,7 @@ def white_noise(record: Record) -> float:
     if record.size < 32:
         return float(np.std(np.diff(record.displacement)) / np.sqrt(2.0))
     third = np.diff(record.displacement, 2)
-    _, density = periodogram(third, window=hann(third.size), detrend=False)
+    _, density = scipy.signal.periodogram(third, window=scipy.signal.windows.hann(third.size), detrend=False)
     frequency = np.linspace(0.0, np.pi, density.size)
     response = (2.0 * np.sin(frequency / 2.0)) ** 4
     top = slice(int(TOP_BAND * density.size), -1)
@@ -81,8 +80,8 @@ def _scatter(record: Record, period: int, first: int) -> float:
     hum = [wave(2 * np.pi * f * t) for f in lines for wave in (np.cos, np.sin)]
     basis = np.array([np.ones(t.size), rest, np.gradient(rest), *seen, *hum])
     steps = steps - np.linalg.lstsq(basis.T, steps, rcond=1e-6)[0] @ basis
-    window = hann(steps.size)
-    frequency, density = periodogram(steps, window=window, detrend=False)
+    window = scipy.signal.windows.hann(steps.size)
+    frequency, density = scipy.signal.periodogram(steps, window=window, detrend=False)
     # the difference of two periods is a comb: white noise has this mean spectrum, twice its variance in all
     alike = window[period:] @ window[:-period] / (window @ window) if steps.size > period else 0.0
     comb = 1.0 - alike * np.cos(2.0 * np.pi * frequency * period)

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from ...effects.drive.backlash import run_play
 from ...identification.records.excitation_content import excitation_content, noise_on_motion
@@ -173,7 +173,7 @@ def at_period(record: Record, period: float) -> Record:
 
 def _is_smooth(u: Array) -> bool:
     at = np.arange(u.size)
-    between = make_interp_spline(at[::2], u[::2])(at[1 : at.size - 1 : 2])
+    between = scipy.interpolate.make_interp_spline(at[::2], u[::2])(at[1 : at.size - 1 : 2])
     return bool(np.sqrt(np.mean((between - u[1 : u.size - 1 : 2]) ** 2)) < SMOOTH * float(np.ptp(u)))
 
 
@@ -182,6 +182,6 @@ def _interpolated(record: Record, period: float) -> Record:
     then = period * np.arange(int(now[-1] / period * (1.0 + 1e-12)) + 1)
 
     def spline(channel: Array) -> Array:
-        return np.asarray(make_interp_spline(now, channel)(then))
+        return np.asarray(scipy.interpolate.make_interp_spline(now, channel)(then))
 
     return record.with_channels(spline, sample_period=period, initial_voltage=record.settled_voltage)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from ...effects import AmplifierSaturation, MainsHum
 from .candidate_refits import LEAST_GAIN
@@ -158,7 +158,7 @@ def may_be_off(candidate: FittedCandidate) -> bool:
     at, scale, k = [fitted.names.index(n) for n in measured], np.array([errors[n] for n in measured]), off.size
     spread = fitted.covariance[np.ix_(at, at)] / np.outer(scale, scale)
     spread = spread[:k, :k] - spread[:k, k:] @ np.linalg.pinv(spread[k:, k:], hermitian=True) @ spread[k:, :k]
-    return bool(off @ np.linalg.pinv(spread, rcond=1e-9, hermitian=True) @ off < chi2.ppf(0.95, max(1, k)))
+    return bool(off @ np.linalg.pinv(spread, rcond=1e-9, hermitian=True) @ off < scipy.stats.chi2.ppf(0.95, max(1, k)))
 
 
 def bends_all_along(candidate: FittedCandidate) -> bool:

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import minimum_filter
-from scipy.optimize import least_squares
+import scipy
 
 from ...blocks.block import Array
 from ...blocks.bouc_wen_kernel import LOOP_OFF, run_plain
@@ -85,7 +84,7 @@ def closest_loop(loops: Sequence[Loop]) -> dict[str, float]:
     search = _Search([replace(loop, v=loop.v / span, start=loop.start / span) for loop in loops])
     costs = np.array([[float(np.sum(search.solve(beta, ratio)[1] ** 2)) for ratio in RATIOS] for beta in LOSSES])
     polished = [
-        least_squares(
+        scipy.optimize.least_squares(
             lambda x: search.solve(np.exp(x[0]), x[1])[1],
             [np.log(LOSSES[i]), RATIOS[j]],
             bounds=([np.log(LOSSES[0] / 10.0), -1.0], [np.log(LOSSES[-1] * 10.0), 1.0]),
@@ -102,7 +101,7 @@ def closest_loop(loops: Sequence[Loop]) -> dict[str, float]:
 
 def _valleys(costs: Array) -> list[tuple[int, int]]:
     """Places on the grid lower than their neighbours, the lowest first: loops of one amplitude have several."""
-    lowest = minimum_filter(costs, size=3, mode="nearest")
+    lowest = scipy.ndimage.minimum_filter(costs, size=3, mode="nearest")
     places = np.argwhere((costs == lowest) & (costs <= DEEP * costs.min()))
     order = np.argsort([costs[i, j] for i, j in places])
     return [(int(i), int(j)) for i, j in places[order][:VALLEYS]]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 Array = NDArray[np.float64]
 
@@ -39,5 +39,7 @@ def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Ar
     known = values > SMALLEST * values[-1]
     root, vectors = np.sqrt(values[known]), vectors[:, known]
     box = (lower / scale, upper / scale)
-    found = lsq_linear(root[:, None] * vectors.T, (vectors.T @ (slope * scale)) / root, box, method="bvls")
+    found = scipy.optimize.lsq_linear(
+        root[:, None] * vectors.T, (vectors.T @ (slope * scale)) / root, box, method="bvls"
+    )
     return np.asarray(scale * found.x)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm, t
+import scipy
 
 from ...errors import IdentificationError
 from ...record import Notice, Record
@@ -85,7 +85,7 @@ class Delay:
 def _onset(response: StepResponse) -> tuple[int, float, float, list[str]]:
     """First responding sample, its interval in samples, and what makes it doubtful."""
     mean = response.mean * np.sign(response.mean[np.argmax(np.abs(response.mean))])
-    threshold = float(t.isf(norm.sf(SURE), response.freedom))
+    threshold = float(scipy.stats.t.isf(scipy.stats.norm.sf(SURE), response.freedom))
     beyond = mean > threshold * response.deviation
     sure = beyond & np.append(beyond[1:], True)
     if not sure.any():

@@ -7,13 +7,12 @@ where the noise is white.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.linalg import lstsq
-from scipy.signal import lfilter
 
 from ...effects import Arx, Discretisation
 from ...errors import IdentificationError, ParameterError
@@ -78,7 +77,7 @@ class Dynamics:
         )
 
 
-def _solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> tuple[Samples, float]:
+def solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> tuple[Samples, float]:
     """Least squares from the triangle: coefficients of some regressors, and the norm of what is left."""
     regressors = r[:, :-1][:, columns]
     scale = np.linalg.norm(regressors, axis=0)
@@ -87,7 +86,7 @@ def _solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> 
     return theta, float(np.linalg.norm(r[:, -1] - regressors @ theta))
 
 
-def _reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
+def reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
     """Mirror poles outside the unit circle into it and scale B so that |B/A| stays; the number mirrored."""
     poles = np.roots(np.concatenate(([1.0], a)))
     outside = np.abs(poles) > LARGEST_POLE
@@ -159,15 +158,18 @@ def identify_arx(
         raise IdentificationError(f"ARX: got na = {na}, nb = {nb}, d = {delay}, expected na >= 0, nb >= 1, d >= 1")
     if not any(np.ptp(u) > 0.0 for u, _ in signals):
         raise IdentificationError("ARX: the input does not move; expected a record with excitation, e.g. noise")
-    theta, left = _solve(triangle(signals, orders, delay))
+    theta, left = solve(triangle(signals, orders, delay))
     one_step = left / float(np.sqrt(sum(y.size for _, y in signals)))
     candidates: list[Dynamics] = []
     for iteration in range(iterations + 1):
         if iteration:
             whitener = np.concatenate(([1.0], candidates[-1].arx.array("a")))
-            whitened = [(lfilter([1.0], whitener, u - u[0]), lfilter([1.0], whitener, y - y[0])) for u, y in signals]
-            theta, _ = _solve(triangle(whitened, orders, delay))
-        a, b, mirrored = _reflected(theta[:na], theta[na:])
+            whitened = [
+                (scipy.signal.lfilter([1.0], whitener, u - u[0]), scipy.signal.lfilter([1.0], whitener, y - y[0]))
+                for u, y in signals
+            ]
+            theta, _ = solve(triangle(whitened, orders, delay))
+        a, b, mirrored = reflected(theta[:na], theta[na:])
         reflected_notices = (
             Notice(
                 "unstable_reflected", f"{mirrored} unstable poles of the ARX model were mirrored into the unit circle"
@@ -201,55 +203,7 @@ def delay_of(signals: Signals, longest: int = 16, order: int = 8, sure: float = 
         Standard errors beyond which a coefficient counts.
     """
     regressors = triangle(signals, (order, longest + order), 1)
-    theta, left = _solve(regressors)
+    theta, left = solve(regressors)
     error = left / np.sqrt(sum(y.size for _, y in signals)) * np.linalg.norm(np.linalg.pinv(regressors[:, :-1]), axis=1)
     onset = np.flatnonzero(np.abs(theta[order:]) > sure * error[order:])
     return min(1 + int(onset[0]), longest) if onset.size else 1
-
-
-@dataclass(frozen=True, slots=True)
-class OrderError:
-    """Errors of one order na = nb: on the data it was fitted to (one step), and free-run on the records held out."""
-
-    order: int
-    one_step_error: float
-    free_run_error: float
-
-
-def compare_orders(signals: Signals, delay: int, sample_period: float, highest: int = 10) -> tuple[OrderError, ...]:
-    """Error against order na = nb = 1 … `highest`: fitted to the first two thirds of every record, judged on the rest.
-
-    Parameters
-    ----------
-    signals : sequence of (u, y)
-        Input and output of every record.
-    delay : int
-        d, samples.
-    sample_period : float
-        Sample period [s].
-    highest : int
-        Highest order; the regressors of the lower ones are among its own.
-
-    Returns
-    -------
-    tuple of OrderError
-        In rising order.
-    """
-    cuts = [2 * y.size // 3 for _, y in signals]
-    early = [(u[:cut], y[:cut]) for (u, y), cut in zip(signals, cuts, strict=True)]
-    regressors = triangle(early, (highest, highest), delay)
-    table = []
-    for order in range(1, highest + 1):
-        theta, left = _solve(regressors, np.r_[:order, highest : highest + order])
-        a, b, _ = _reflected(theta[:order], theta[order:])
-        model = Dynamics(Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay), sample_period)
-        late = [(y - model.simulate(u))[cut:] for (u, y), cut in zip(signals, cuts, strict=True)]
-        free_run = float(np.std(np.concatenate([e - e.mean() for e in late])))
-        table.append(OrderError(order, left / float(np.sqrt(sum(cuts))), free_run))
-    return tuple(table)
-
-
-def choose_order(table: Sequence[OrderError], slack: float = 0.01) -> int:
-    """Smallest order whose free-run error is within `slack` of the best."""
-    best = min(row.free_run_error for row in table)
-    return next(row.order for row in table if row.free_run_error <= best * (1.0 + slack))

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal.windows import hann
 
 from ...errors import IdentificationError
 from ...record import Samples
@@ -72,7 +72,7 @@ def welch(signals: Iterable[tuple[Samples, Samples]], sample_period: float, segm
     -----
     Deviation √((1−γ²)/(2 n γ²)) with n independent averages (Bendat and Piersol, *Random Data*, Table 9.6).
     """
-    window = hann(segment, sym=False)
+    window = scipy.signal.windows.hann(segment, sym=False)
     lines = segment // 2
     uu, yy, uy, count = np.zeros(lines), np.zeros(lines), np.zeros(lines, dtype=np.complex128), 0
     for u, y in signals:

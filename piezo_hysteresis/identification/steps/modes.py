@@ -12,9 +12,8 @@ from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
-from scipy.signal import decimate, lfilter
 
 from ...errors import IdentificationError
 from .dynamics import LARGEST_POLE, Dynamics, identify_arx, in_free_run, settling
@@ -95,7 +94,7 @@ def _found_at(
 ) -> Array:
     """Denominators (na/2, 2) of sections, from dynamics found at a lower rate."""
     slow = [
-        (decimate(u - u[0], factor, ftype="fir"), decimate(y - y[0], factor, ftype="fir"))
+        (scipy.signal.decimate(u - u[0], factor, ftype="fir"), scipy.signal.decimate(y - y[0], factor, ftype="fir"))
         for u, y in signals
         if y.size >= SHORTEST * factor
     ]
@@ -113,7 +112,7 @@ def _found_at(
 
 def _projected(sections: Array, signals: Signals) -> tuple[Array, Array, Array]:
     """The numerators that fit best (k, 2), the residual that they leave, and what every tap answers."""
-    shaped = [[lfilter([1.0], [1.0, *a], u) for a in sections] for u, _ in signals]
+    shaped = [[scipy.signal.lfilter([1.0], [1.0, *a], u) for a in sections] for u, _ in signals]
     basis = _about_means([np.array([_delayed(s, k) for s in one for k in (0, 1)]) for one in shaped])
     scale = np.linalg.norm(basis, axis=1)
     scale[scale == 0.0] = 1.0
@@ -126,7 +125,10 @@ def _projected(sections: Array, signals: Signals) -> tuple[Array, Array, Array]:
 def _slopes(sections: Array, numerators: Array, signals: Signals) -> Array:
     """∂y/∂(a1, a2) of every section, shape (2k, n)."""
     both = list(zip(sections, numerators, strict=True))
-    twice = [[-lfilter([1.0], [1.0, *a], lfilter(b, [1.0, *a], u)) for a, b in both] for u, _ in signals]
+    twice = [
+        [-scipy.signal.lfilter([1.0], [1.0, *a], scipy.signal.lfilter(b, [1.0, *a], u)) for a, b in both]
+        for u, _ in signals
+    ]
     return _about_means([np.array([_delayed(s, k) for s in one for k in (1, 2)]) for one in twice])
 
 
@@ -156,7 +158,7 @@ def _fitted(sections: Array, signals: Signals) -> tuple[Array, Array]:
         inverse = np.linalg.pinv(basis @ basis.T, rcond=INDEPENDENT, hermitian=True)
         return np.asarray((along @ basis.T @ inverse @ basis - along).T)
 
-    fitted = least_squares(
+    fitted = scipy.optimize.least_squares(
         residual, sections.ravel(), slopes, method="lm", x_scale="jac", ftol=CONVERGED, max_nfev=SIMULATIONS
     )
     return fitted.x.reshape(-1, 2), projected(tuple(fitted.x))[0]

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f
+import scipy
 
 from ...errors import IdentificationError
 from ...record import Record, Samples
@@ -84,7 +84,7 @@ def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
     swing = max(float(np.ptp(record.displacement)) for record, _ in edges)
     quietest = max(float(scatters.min()), resolution / np.sqrt(12.0), NEGLIGIBLE * swing)
     freedom = min(base.size for base in bases) - 1
-    by_chance = float(np.sqrt(f.isf(RARE, freedom, freedom)))
+    by_chance = float(np.sqrt(scipy.stats.f.isf(RARE, freedom, freedom)))
     edges = [e for e, scatter in zip(edges, scatters, strict=True) if scatter <= max(QUIET, by_chance) * quietest]
     # A stage that still rings is not straight over a long base line; a short one is noisy.
     for most in BEFORE:

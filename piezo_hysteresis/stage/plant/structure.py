@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.optimize import brentq
 
 from ...blocks.kernel import kernel
 from ...errors import ParameterError
@@ -76,7 +76,7 @@ class Structure(Group):
                 raise ParameterError(
                     "structure: the softened spring cannot carry the load, expected smaller softening coefficients"
                 )
-        return float(brentq(balance, 0.0, grown, xtol=1e-16))
+        return float(scipy.optimize.brentq(balance, 0.0, grown, xtol=1e-16))
 
 
 class Mechanics:
