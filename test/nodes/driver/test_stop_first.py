@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from std_srvs.srv import Trigger
 
-from piezo_hysteresis.acquisition import back_ends
 from piezo_hysteresis.nodes.driver import commands
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
+from piezo_hysteresis.stage import back_ends
 
 from ...acquisition.witness import Witness
 
