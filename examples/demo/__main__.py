@@ -1,7 +1,7 @@
-"""`make demo`: a stage with something hidden in it, identified, followed live, and found out, over real ROS 2.
+"""`make demo`: a stage with something hidden in it, identified, followed live, found out and driven, over real ROS 2.
 
-Driver, model node and identification node run as processes of their own. The effect is drawn by a seed and written to
-a plant file that only the driver reads; it is shown here after the verdict.
+Driver, model, identification and compensation node run as processes of their own. The effect is drawn by a seed and
+written to a plant file that only the driver reads; it is shown here after the verdict.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 
 import picture
 import rclpy
+import scan
 from bench import Bench, Trace
 from numpy.typing import NDArray
 from probe import probe
@@ -25,6 +26,7 @@ from processes import Processes
 from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from scan import Scan
 
 from piezo_hysteresis import Model, load
 from piezo_hysteresis.identification import DriveLimits
@@ -55,13 +57,14 @@ class Demo:
         self.voltage: NDArray = probe(LIMITS)
         self.traces: dict[str, Trace] = {}
         self.verdict = ""
+        self.scan: Scan | None = None
 
     def say(self, text: str) -> None:
         """Print a line with the time since the start."""
         self.console.print(f"[dim]{time.monotonic() - self.begin:6.1f} s[/dim]  {text}")
 
     def start(self, processes: Processes, speed: float, protocol: str, seed: int) -> Bench:
-        """Start the three nodes; the model node begins with the numbers of the paper."""
+        """Start the four nodes; the model node begins with the numbers of the paper."""
         plant = self.folder / "plant.yaml"
         processes.start(
             "driver_node",
@@ -73,8 +76,15 @@ class Demo:
         )
         processes.start("model_node", model_file=ROOT / "config" / "published_stage.yaml")
         processes.start("identification_node", protocol=protocol, experiment_root=self.folder / "experiments")
+        processes.start(
+            "compensation_node",
+            approximate=True,  # whatever is hidden: what cannot be turned round is in the expected error
+            approach=scan.APPROACH,
+            way_back=scan.APPROACH,
+            learning_rounds=scan.ROUNDS,
+        )
         ids = ", ".join(f"{name} {number}" for name, number in processes.ids.items())
-        self.say(f"three processes in {NAMESPACE}, ROS domain {os.environ['ROS_DOMAIN_ID']}: {ids}")
+        self.say(f"four processes in {NAMESPACE}, ROS domain {os.environ['ROS_DOMAIN_ID']}: {ids}")
         return Bench(NAMESPACE, LIMITS.sample_period, processes.check)
 
     def look(self, bench: Bench, name: str, model: Model) -> None:
@@ -128,17 +138,27 @@ class Demo:
         values = self.run_job(bench, "identify")
         experiment = Path(values["experiment"])
         self.say(f"identified: {values['verdict']}; recorded in {os.path.relpath(experiment)}")
-        self.look(bench, "identified", bench.new_model(count))
+        identified = bench.new_model(count)
+        self.look(bench, "identified", identified)
+        self.scan = Scan(bench, LIMITS, identified)
+        self.scan.linear(identified)
+        self.scan.follow("identified model")
+        self.say("scanned with a linear gain, and through the inverse of the identified model")
 
         count = len(bench.models)
         values = self.run_job(bench, "diagnose")
         self.verdict = values["verdict"]
         self.say(f"[bold]verdict: {self.verdict}[/bold]")
         self.look(bench, "extended", bench.new_model(count))
+        self.scan.follow("extended model")
+        self.scan.learn(f"learning, {scan.ROUNDS} rounds", "learning")
+        self.scan.show(self.console)
         return experiment
 
     def report(self, experiment: Path) -> None:
         """Figures and the page."""
+        assert self.scan is not None
+        self.scan.save(self.folder)
         picture.save(self.folder / "residual.png", self.voltage, LIMITS.sample_period, self.traces)
         command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "report", os.path.relpath(experiment)]
         for label, file in (("identified", "identification.yaml"), ("extended", "diagnosis.yaml")):
@@ -146,7 +166,7 @@ class Demo:
         if (experiment / "answer.json").exists():
             command += ["--answer", experiment / "answer.json"]
         subprocess.run([*command, "-o", self.folder / "report.html"], check=True, stdout=subprocess.DEVNULL)
-        self.say(f"written: {os.path.relpath(self.folder)}/report.html, residual.png")
+        self.say(f"written: {os.path.relpath(self.folder)}/report.html, residual.png, scan.png, scan.csv")
 
     def reveal(self) -> None:
         """What the stage was hiding."""

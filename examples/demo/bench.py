@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -16,13 +17,20 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from piezo_hysteresis import Model
+from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.model.model_file import loads
 from piezo_hysteresis.model.model_parameters import hash_number
-from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.cloud import from_cloud, to_cloud
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
-from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES
+from piezo_hysteresis.nodes.messages.samples import SampleReader
+from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES, STATUS
 
 Array = NDArray[np.float64]
+
+SERVICES = {"identification_node": ("plan", "identify", "diagnose"), "compensation_node": ("learn",)}
+"""Services that are called, by node."""
+KEPT = 3000
+"""Blocks of samples that are kept: half a minute."""
 
 
 @dataclass
@@ -49,8 +57,36 @@ class Trace:
         return float(np.sqrt(np.mean(self.residual**2)))
 
 
+class Recording:
+    """The newest samples of the driver, as they arrived."""
+
+    def __init__(self) -> None:
+        self._reader = SampleReader()
+        self._blocks: deque[SampleBlock] = deque(maxlen=KEPT)
+
+    def take(self, message: bytes) -> None:
+        """Take in a message of `samples`."""
+        self._blocks.append(self._reader.read(message))
+
+    def holds(self, index: int) -> bool:
+        """Whether the sample with this index, or a later one, has arrived."""
+        return bool(self._blocks) and (int(self._blocks[-1].index[-1]) - index) % 2**32 < 2**31
+
+    def displacement(self, first: int, size: int) -> Array:
+        """Displacement of `size` samples from index `first` on [m]."""
+        found = np.full(size, np.nan)
+        for block in self._blocks:
+            number = block.index - np.uint32(first % 2**32)
+            inside = number < size
+            found[number[inside]] = block.displacement[inside]
+        lost = int(np.isnan(found).sum())
+        if lost:
+            raise RuntimeError(f"{lost} of {size} samples of the scan were lost on the way")
+        return found
+
+
 class Bench:
-    """Client of the three nodes in one namespace.
+    """Client of the nodes in one namespace.
 
     Parameters
     ----------
@@ -73,20 +109,29 @@ class Bench:
         self._live_rms: list[float] = []
         self._followed: int | None = None
         self._ended: dict[str, DiagnosticStatus] = {}
+        self._driven: list[DiagnosticStatus] = []
+        self._samples = Recording()
         self._command = self.node.create_publisher(PointCloud2, "command", COMMAND)
+        self._trajectory = self.node.create_publisher(PointCloud2, "trajectory", COMMAND)
         subscribe = self.node.create_subscription
-        subscribe(DiagnosticStatus, "status", self._on_status, LATCHED)
+        subscribe(DiagnosticStatus, "status", self._on_status, STATUS)
         subscribe(DiagnosticStatus, "command_status", self._on_command_status, COMMAND_STATUS)
         subscribe(String, "model", lambda message: self.models.append(message.data), LATCHED)
         subscribe(Float64, "residual_rms", self._on_rms, COMMAND)
         subscribe(PointCloud2, "predicted_samples", self._on_predicted, SAMPLES)
+        subscribe(PointCloud2, "samples", self._samples.take, SAMPLES, raw=True)
         self._services = {
-            name: self.node.create_client(Trigger, f"identification_node/{name}")
-            for name in ("plan", "identify", "diagnose")
+            service: self.node.create_client(Trigger, f"{owner}/{service}")
+            for owner, services in SERVICES.items()
+            for service in services
         }
 
     def _on_status(self, status: DiagnosticStatus) -> None:
-        self.status = status
+        """Two nodes publish on `status`."""
+        if "compensation_node" in status.name:
+            self._driven.append(status)
+        else:
+            self.status = status
 
     def _on_command_status(self, status: DiagnosticStatus) -> None:
         if values_of(status)["state"] in ("refused", "done", "stopped"):
@@ -137,7 +182,7 @@ class Bench:
         self.wait(lambda: time.monotonic() > end, "the end of a pause", 2.0 * duration + 10.0)
 
     def call(self, service: str) -> Trigger.Response:
-        """Call a service of the identification node, which answers at once."""
+        """Call a service of the identification or the compensation node, which answers at once."""
         client = self._services[service]
         self.wait(client.service_is_ready, f"service {service}", 60.0)
         future = client.call_async(Trigger.Request())
@@ -154,18 +199,10 @@ class Bench:
         TimeoutError
             If that, or its prediction, takes too long.
         """
-        self.wait(lambda: self._command.get_subscription_count() > 0, "a driver", 60.0)
         self._live_rms = []
         self.wait(lambda: bool(self._live_rms), "a prediction by the model node", 60.0)
         self._blocks, self._live_rms = [], []
-        self._ended.pop(name, None)
-        stamp = self.node.get_clock().now().to_msg()
-        self._command.publish(command_to_cloud(voltage, self._sample_period, name, stamp))
-        self.wait(lambda: name in self._ended, f"end of '{name}'", timeout)
-        values = values_of(self._ended[name])
-        if values["state"] != "done":
-            raise RuntimeError(f"the driver did not play '{name}': {values['state']}, {self._ended[name].message}")
-        first = int(values["first_index"])
+        first = self._send(voltage, name, timeout)
         last = (first + voltage.size - 1) % 2**32
         self.wait(lambda: self._seen(last), "the prediction of the last sample", 30.0)
         index, residual = (np.concatenate(column) for column in zip(*self._blocks, strict=True))
@@ -173,6 +210,77 @@ class Bench:
         inside = number < voltage.size
         live, self._blocks = self._live_rms, None
         return Trace(self._sample_period * number[inside], residual[inside], live)
+
+    def play_measured(self, voltage: Array, name: str, timeout: float = 120.0) -> Array:
+        """Play a waveform [V] and return the displacement of every sample, shape as `voltage` [m].
+
+        Raises
+        ------
+        RuntimeError
+            If the driver does not play it to its end, or samples were lost.
+        TimeoutError
+            If that takes too long.
+        """
+        return self.measured(self._send(voltage, name, timeout), voltage.size)
+
+    def follow(self, wanted: Array, name: str, timeout: float = 120.0) -> DiagnosticStatus:
+        """Send a path [m] to the compensation node, and wait until it was played or refused; its last status."""
+        self.wait(lambda: self._trajectory.get_subscription_count() > 0, "a compensation node", 60.0)
+        self._driven.clear()
+        columns = {"displacement": wanted}
+        stamp = self.node.get_clock().now().to_msg()
+        self._trajectory.publish(to_cloud(columns, {"displacement": "f8"}, stamp, name))
+        return self._driven_to_end(name, timeout)
+
+    def learn(self, timeout: float = 120.0) -> DiagnosticStatus:
+        """Let the compensation node play the last path in rounds; its status after the best of them.
+
+        Raises
+        ------
+        RuntimeError
+            If it does not.
+        """
+        self._driven.clear()
+        answer = self.call("learn")
+        if not answer.success:
+            raise RuntimeError(f"learn: {answer.message}")
+        end = self._driven_to_end("", timeout)
+        rounds = [status for status in self._driven if values_of(status)["state"] == "learning"]
+        return min(rounds, key=lambda status: float(values_of(status)["rms"]), default=end)
+
+    def measured(self, first: int, size: int) -> Array:
+        """Displacement of `size` samples from index `first` on [m].
+
+        Raises
+        ------
+        RuntimeError
+            If samples were lost on the way.
+        """
+        self.wait(lambda: self._samples.holds(first + size - 1), "the last sample", 30.0)
+        return self._samples.displacement(first, size)
+
+    def _driven_to_end(self, name: str, timeout: float) -> DiagnosticStatus:
+        def ended() -> DiagnosticStatus | None:
+            ends = ("done", "refused", "failed", "stopped")
+            own = [s for s in self._driven if values_of(s)["state"] in ends and name in ("", values_of(s)["phase"])]
+            return own[-1] if own else None
+
+        self.wait(lambda: ended() is not None, f"the end of '{name or 'learning'}'", timeout)
+        found = ended()
+        assert found is not None
+        return found
+
+    def _send(self, voltage: Array, name: str, timeout: float) -> int:
+        """Play a waveform; the index of its first sample."""
+        self.wait(lambda: self._command.get_subscription_count() > 0, "a driver", 60.0)
+        self._ended.pop(name, None)
+        stamp = self.node.get_clock().now().to_msg()
+        self._command.publish(command_to_cloud(voltage, self._sample_period, name, stamp))
+        self.wait(lambda: name in self._ended, f"end of '{name}'", timeout)
+        values = values_of(self._ended[name])
+        if values["state"] != "done":
+            raise RuntimeError(f"the driver did not play '{name}': {values['state']}, {self._ended[name].message}")
+        return int(values["first_index"])
 
     def _seen(self, index: int) -> bool:
         return bool(self._blocks) and (int(self._blocks[-1][0][-1]) - index) % 2**32 < 2**31

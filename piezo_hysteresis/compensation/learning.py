@@ -133,6 +133,7 @@ class IterativeLearning:
         following = plan(
             self.model, self._reference, self.limits, start=start, approximate=self.approximate,
             approach=(played.begin - played.preview) * played.sample_period,
+            way_back=(played.voltage.size - played.begin - played.wanted.size) * played.sample_period,
         )  # fmt: skip
         if not following.reachability.is_whole and played.reachability.is_whole:
             self._end("the corrected path is out of reach")

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..errors import StageError
+
+RESOLUTION = 5e-5
+"""Usual resolution of a plan, as a share of the range of the drive: 0.5 mV of 10 V."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +21,10 @@ class Limits:
         Range of the drive before the amplifier [V].
     max_slew_rate : float
         Steepest change between two samples [V/s].
+    resolution : float
+        Changes behind the amplifier up to this do not turn a backlash round [V]. Turning it needs a jump by its whole
+        width; without a resolution, rounding errors of a path that stands still make the drive jump. Default 0: every
+        change turns it.
 
     Raises
     ------
@@ -28,6 +35,7 @@ class Limits:
     voltage_min: float = -math.inf
     voltage_max: float = math.inf
     max_slew_rate: float = math.inf
+    resolution: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.voltage_min < self.voltage_max:
@@ -37,3 +45,11 @@ class Limits:
             )
         if not self.max_slew_rate > 0:
             raise StageError(f"max_slew_rate: got {self.max_slew_rate!r}, expected a positive number of V/s")
+        if not 0.0 <= self.resolution < math.inf:
+            raise StageError(f"resolution: got {self.resolution!r}, expected zero or a positive number of V")
+
+    @property
+    def resolved(self) -> Limits:
+        """The same with a resolution: that given, else `RESOLUTION` of a finite range."""
+        span = self.voltage_max - self.voltage_min
+        return self if self.resolution or not math.isfinite(span) else replace(self, resolution=RESOLUTION * span)

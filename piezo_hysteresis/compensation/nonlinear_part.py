@@ -76,11 +76,11 @@ class NonlinearPart:
         self.blocks = [m for b in blocks for m in (b.members if isinstance(b, SumBlock) else (b,))]
         self.kind, self.loop, self.periods = solver.NO_LOOP, np.zeros(8), np.full(2, sample_period)
         self.poly, self.weights, self.radii = np.zeros(4), np.zeros((2, 0)), np.zeros(0)
-        self.drive = np.zeros(15)
+        self.drive = np.zeros(16)
         self.drive[[r.PER_VOLT, r.LEAD]] = 1.0
         self.drive[[r.LOWER, r.UPPER, r.REACH]] = -np.inf, np.inf, np.inf
         self.drive[[r.LOWEST, r.HIGHEST]] = limits.voltage_min, limits.voltage_max
-        self.drive[r.STEP] = limits.max_slew_rate * sample_period
+        self.drive[[r.STEP, r.RESOLUTION]] = limits.max_slew_rate * sample_period, limits.resolution
         banks: list[tuple[float, Array, Array, Array]] = []
         for block in self.blocks:
             self._take(block, banks)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,14 +77,19 @@ class Plan:
         """Of the path [m]."""
         return float(np.ptp(self.wanted))
 
-    def with_voltage(self, voltage: Array, predicted: Array, end: ChainState) -> Plan:
-        """The same path with another drive, of the same length."""
-        return replace(self, voltage=voltage, predicted=predicted, end=end)
-
 
 def smooth_way(begin: float, end: float, count: int) -> Array:
     """From one level to another without a kink, shape (count,); the first sample is `begin`."""
     return np.asarray(begin + (end - begin) * (0.5 - 0.5 * np.cos(np.pi * np.arange(count) / max(count, 1))))
+
+
+def _way_back(last: float, rest: float, duration: float, limits: Limits, period: float) -> Array:
+    """Drive from `last` to `rest` [V] inside the slew limit, shape (k,), without the first; empty for no duration."""
+    if duration == 0.0:
+        return np.empty(0)
+    steepest = 0.5 * np.pi * abs(rest - last)  # of a half cosine, times its duration
+    count = max(round(duration / period), math.ceil(1.001 * steepest / limits.max_slew_rate / period), 1)
+    return np.append(smooth_way(last, rest, count)[1:], rest)
 
 
 def plan(
@@ -93,6 +99,7 @@ def plan(
     *,
     start: ChainState | None = None,
     approach: float = 0.05,
+    way_back: float = 0.0,
     band: Band | None = None,
     approximate: bool = False,
     covariance: ParameterCovariance | None = None,
@@ -111,6 +118,9 @@ def plan(
         State of the model now. Default: at rest at 0 V, or at the limit that is nearest to it.
     approach : float
         Duration of the smooth way from where the stage is to the first sample of the path [s].
+    way_back : float
+        Duration of the smooth way from the last voltage to that at which the drive began [s]; longer where the slew
+        limit asks for it. Default 0: the last voltage is held.
     band : Band, optional
         Low-pass of the path. Default `Band.of` the model's sample period.
     approximate : bool
@@ -123,9 +133,10 @@ def plan(
     ModelError
         On a path that is empty or not finite, or a chain that cannot be turned round.
     """
-    y = samples(wanted, "displacement")
-    if not approach >= 0.0:
-        raise ModelError(f"approach: got {approach!r} s, expected zero or more")
+    y, limits = samples(wanted, "displacement"), limits.resolved
+    for name, duration in (("approach", approach), ("way_back", way_back)):
+        if not duration >= 0.0:
+            raise ModelError(f"{name}: got {duration!r} s, expected zero or more")
     state = start or model.rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
     band = band or Band.of(model.sample_period)
     at = float(model.run([state.inputs[0]], state)[0][0])
@@ -136,17 +147,19 @@ def plan(
     parts = tuple(replace(part, begin=part.begin - late, end=part.end - late) for part in found.parts)
     found = replace(found, parts=parts)
     inverse = Inverse(model, limits, band=band, approximate=approximate)
-    predicted, end = model.run(found.voltage, state)
+    back = _way_back(float(found.voltage[-1]), state.inputs[0], way_back, limits, model.sample_period)
+    voltage = np.concatenate((found.voltage, back))
+    predicted, end = model.run(voltage, state)
     begin = way.size + inverse.preview
     off = predicted[begin : begin + y.size] - y
     expected = ExpectedError(
         float(np.sqrt(np.mean(off**2))),
         free_run_error(model),
-        None if covariance is None else parameter_error(model, found.voltage, covariance),
+        None if covariance is None else parameter_error(model, voltage, covariance),
     )
     return Plan(
         y,
-        found.voltage,
+        voltage,
         predicted,
         begin,
         model.sample_period,

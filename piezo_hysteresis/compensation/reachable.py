@@ -61,8 +61,9 @@ def reachable(
     """
     y = samples(wanted, "displacement")
     state = start or model.rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
+    limits = limits.resolved
     limited = Inverse(model, limits, band=band, approximate=approximate)
-    free = Inverse(model, Limits(), band=band, approximate=approximate)
+    free = Inverse(model, Limits(resolution=limits.resolution), band=band, approximate=approximate)
     given, reached = _followed(limited, y, state)
     needed, aim = _followed(free, y, state)
     span = float(np.ptp(y)) or float(np.abs(y).max()) or model.displacement_scale

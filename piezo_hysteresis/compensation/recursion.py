@@ -11,13 +11,17 @@ from math import sqrt
 from ..blocks.kernel import kernel
 from .hysteresis_solver import loop_end, solve, static_part
 
-PER_VOLT, LEFT, LEAD, BACK, PLAY, REACH, LOWER, UPPER, CORNER, LOWEST, HIGHEST, STEP, LOW, HIGH, TURN = range(15)
+PER_VOLT, LEFT, LEAD, BACK, PLAY, REACH, LOWER, UPPER, CORNER, LOWEST, HIGHEST, STEP, LOW, HIGH, TURN, RESOLUTION = (
+    range(16)
+)
 """Numbers of the drive: 1/voltage scale, pole, play, slew limit and saturation of the amplifier, limits of the drive
-[V], ends of the search [v], sign of the static slope."""
+[V], ends of the search [v], sign of the static slope, smallest change that turns a play round [V]."""
 VOLTAGE, SLEWED, POLE, HELD, PUSHED, LAST, H, W = range(8)
 """States: drive, behind the slew limit, behind the pole, behind the play, before the play [V]; v, h and w."""
 SAME = 1e-13
 """Changes below this share of the voltage are no reversal to a play."""
+TOUCHING = 1e-6
+"""Distance from an edge of the play, in shares of its half width, that counts as touching."""
 
 
 @kernel
@@ -50,7 +54,10 @@ def voltage_for(v, d, state):
     pushed = v
     if d[PLAY] > 0.0:
         move, same = v - state[HELD], SAME * (abs(v) + d[PLAY])
-        pushed = v + d[PLAY] if move > same else v - d[PLAY] if move < -same else state[PUSHED]
+        side, touching = state[PUSHED] - state[HELD], d[PLAY] * (1.0 - TOUCHING)
+        up = same if side >= touching else max(same, d[RESOLUTION])  # to the edge that is not touched: a jump
+        down = same if side <= -touching else max(same, d[RESOLUTION])
+        pushed = v + d[PLAY] if move > up else v - d[PLAY] if move < -down else state[PUSHED]
     slewed = pushed
     if d[LEFT] != 0.0:
         slewed = (pushed - d[LEFT] * state[POLE] - d[BACK] * state[SLEWED]) / d[LEAD]

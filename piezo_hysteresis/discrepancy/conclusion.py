@@ -10,7 +10,7 @@ from ..record import Experiment
 from .diagnosis import Diagnosis
 from .excitation_check import missing_excitation
 from .form_uncertainty import with_form_uncertainty
-from .gap import Gap, measure_gap
+from .gap import Gap, measure_gap, stating
 from .next_experiment import decide
 from .residual.localise import ResidualShare
 from .search.baseline_setup import BaselineSetup
@@ -72,8 +72,8 @@ def concluded(
     return Diagnosis(
         verdict=verdict,
         reason=reason,
-        model=final.model,
-        baseline=first.model,
+        model=stating(final.model, gap.live, setup.span),
+        baseline=stating(first.model, gap.before, setup.span),
         selection=selection,
         fit=final,
         where=where,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..identification.fit.normal_equations import Nuisance, residuals
 from ..model.model import Model
+from ..model.provenance import free_run
 from ..record import Record
 from .search.cross_validation import ADEQUATE
 
@@ -68,6 +69,11 @@ class Gap:
             float(np.mean([(getattr(p, when) / p.floor) ** 2 for p in self.per_phase])) for when in ("before", "after")
         )
         return after < (FALLS if before > ADEQUATE else 1.0) * before
+
+
+def stating(model: Model, percent: float, stroke: float) -> Model:
+    """The model with the free-run error that was found for it, in % of the `stroke` [m], in its provenance."""
+    return replace(model, provenance={**model.provenance, **free_run(0.01 * percent * stroke, percent)})
 
 
 def measure_gap(

@@ -27,6 +27,13 @@ def provenance(experiment: Experiment, error: float, percent: float) -> Mapping[
         "source": experiment.source,
         "date": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         "data_hash": data_hash(experiment),
+        **free_run(error, percent),
+    }
+
+
+def free_run(error: float, percent: float) -> Mapping[str, str]:
+    """The free-run error alone, in metres and in per cent of the displacement range."""
+    return {
         "free_run_error": repr(float(f"{error:.6g}")),
         "free_run_error_percent": repr(float(f"{percent:.6g}")),
     }

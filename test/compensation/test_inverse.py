@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
-from piezo_hysteresis.compensation import Band, Inverse, Limits
+from piezo_hysteresis.compensation import Band, Inverse, Limits, plan
 from piezo_hysteresis.compensation.factors import factors, preview_taps, zero_phase_taps
 from piezo_hysteresis.compensation.linear_inverse import LinearInverse
-from piezo_hysteresis.effects import Arx, BoucWen, Creep, ExtraResonance, HysteresisMemory
+from piezo_hysteresis.compensation.plan import smooth_way
+from piezo_hysteresis.effects import AmplifierBandwidth, Arx, Backlash, BoucWen, Creep, ExtraResonance, HysteresisMemory
 from piezo_hysteresis.errors import ModelError, StageError
 from piezo_hysteresis.model.model import Model
 
@@ -77,6 +80,20 @@ def test_a_lightly_damped_resonance_does_not_ring() -> None:
     assert rms < 1e-3
 
 
+def test_rounding_of_a_path_that_stands_still_does_not_turn_a_backlash_round() -> None:
+    model = stage(Backlash(b=0.05), AmplifierBandwidth(tau=1e-5))
+    limits = Limits(0.0, 10.0)
+    levels = (3e-6, 5e-6, 7e-6, 5e-6, 3e-6)
+    held = [np.append(smooth_way(a, b, 250), np.full(2000, b)) for a, b in itertools.pairwise(levels)]
+    wanted = np.concatenate(held)
+    found = plan(model, wanted, limits)
+    jumps = np.abs(np.diff(found.voltage)) > 0.05
+    assert 1 <= jumps.sum() < 20, "the drive jumps where the path turns, not while it is held"
+    assert found.expected.planned < 1e-4 * found.range
+    chattering, _ = Inverse(model, limits).command(wanted, Inverse(model, limits).rest(0.0))
+    assert (np.abs(np.diff(chattering)) > 0.05).sum() > jumps.sum()
+
+
 def test_it_goes_on_from_the_middle_of_a_motion() -> None:
     model = stage(Creep(gamma=0.01), HysteresisMemory(c=(0.05,) * 8))
     drive = np.concatenate((3.0 * (1.0 - np.cos(np.arange(2000) / 60.0)), np.full(3000, 4.0)))
@@ -106,6 +123,8 @@ def test_what_makes_no_sense_is_refused() -> None:
         Limits(1.0, 0.0)
     with pytest.raises(StageError, match="slew"):
         Limits(max_slew_rate=0.0)
+    with pytest.raises(StageError, match="resolution"):
+        Limits(resolution=-1.0)
     with pytest.raises(ModelError, match="band"):
         Band(2e3, 1e3)
     inverse = Inverse(stage())

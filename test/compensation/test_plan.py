@@ -57,6 +57,25 @@ def test_too_high_and_too_fast_are_distinguished() -> None:
     assert max(p.needed_slew for p in fast.parts) > 1e3
 
 
+def test_the_way_back_ends_at_the_first_voltage_inside_the_slew_limit() -> None:
+    y = swing(50.0, 2e-6, 6e-6, 2)[:-300]
+    for slew, shortest in ((5e4, 0.02), (200.0, 0.005)):
+        limits = Limits(0.0, 10.0, slew)
+        there = plan(stage(), y[:1], Limits(0.0, 10.0)).voltage if slew > 1e3 else None
+        found = (
+            plan(stage(), y, limits, way_back=shortest)
+            if slew > 1e3
+            else plan(stage(), np.full(50, 3e-6), limits, approach=0.5, way_back=shortest)
+        )
+        assert there is None or there[-1] > 0.0
+        assert found.voltage[-1] == found.voltage[0] == 0.0
+        assert found.voltage.size - found.begin - found.wanted.size >= round(shortest / PERIOD)
+        assert np.abs(np.diff(found.voltage)).max() <= slew * PERIOD * (1.0 + 1e-9)
+        assert found.predicted.size == found.voltage.size
+    with pytest.raises(ModelError, match="way_back"):
+        plan(stage(), y, UNIPOLAR, way_back=-1.0)
+
+
 def test_the_error_to_expect_holds_the_covariance() -> None:
     model = stage()
     u = 3.0 * (1.0 - np.cos(np.arange(2000) / 100.0))

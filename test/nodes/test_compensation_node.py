@@ -4,7 +4,7 @@ import signal
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
@@ -14,7 +14,7 @@ from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_file import dumps, save
 from piezo_hysteresis.nodes.messages.cloud import to_cloud
 from piezo_hysteresis.nodes.messages.conversions import values_of
-from piezo_hysteresis.nodes.runtime.qos import LATCHED
+from piezo_hysteresis.nodes.runtime.qos import LATCHED, STATUS
 from piezo_hysteresis.stage.plant import PlantParameters
 
 pytestmark = pytest.mark.nodes
@@ -36,18 +36,18 @@ class Compensation:
 
     def __init__(self, lab, known=MODEL, **parameters):
         self.lab = lab
-        self.statuses = lab.listen(DiagnosticStatus, "status", LATCHED)
+        self.statuses = lab.listen(DiagnosticStatus, "status", STATUS)
         self.driver = lab.driver(**DRIVER, real_time_factor=1.0)
         self.samples = lab.streaming()
-        model = save(known, lab.folder / "model.yaml")
-        self.process = lab.start(NODE, **{"model_file": str(model), "approach": 0.05, **parameters})
+        model = str(save(known, lab.folder / "model.yaml")) if known is not None else ""
+        self.process = lab.start(NODE, **{"model_file": model, "approach": 0.05, **parameters})
         self.trajectory = lab.publisher(PointCloud2, "trajectory")
         lab.wait(self._is_ready, "the node to find the driver")
 
     def _is_ready(self):
         self.send(np.full(3, np.nan), "ready")
         self.lab.pause(0.3)
-        return self.statuses and "expected finite" in self.statuses[-1].message
+        return self.statuses and any(text in self.statuses[-1].message for text in ("expected finite", "no model"))
 
     def send(self, wanted, phase="scan", period=PERIOD):
         wanted = np.asarray(wanted, dtype=np.float64)
@@ -163,3 +163,55 @@ def test_a_new_model_takes_effect_between_trajectories(lab):
     node.send(scan(0.3, 0.5), "second")
     second = values_of(node.until("second", "done"))
     assert float(second["rms"]) > 0.02 * STROKE, "the model of twice the gain was followed"
+
+
+def test_a_path_begins_in_the_loop_that_was_driven_before_the_model_came(lab):
+    node = Compensation(lab, None)
+    statuses, models = lab.statuses(), lab.publisher(String, "model", LATCHED)
+    up_and_half_way_down = 4.0 * (1.0 - np.cos(2.0 * np.pi * 2.0 * PERIOD * np.arange(3750)))
+    lab.send(np.append(up_and_half_way_down, np.full(500, up_and_half_way_down[-1])), "loop", PERIOD)
+    lab.wait(lambda: "done" in lab.states(statuses, "loop"), "the loop")
+    models.publish(String(data=dumps(MODEL)))
+    lab.pause(0.5)
+    wanted = np.full(100, float(np.mean(node.samples.newest.displacement)))
+    settled = MODEL.run([4.0], MODEL.rest(4.0))[0][0]
+    assert abs(settled - wanted[0]) > 0.02 * STROKE, "at rest at this voltage the stage would be elsewhere"
+    node.send(wanted)
+    assert float(values_of(node.until("scan", "done"))["rms"]) < 0.004 * STROKE
+
+
+def test_learning_claims_the_stage_and_leaves_it_safe(lab):
+    node = Compensation(lab, MODEL.with_values({"bouc_wen.p2": 1.05 * MODEL.values()["bouc_wen.p2"]}), way_back=0.1)
+    statuses, holders = lab.statuses(), lab.listen(String, "claimed_by", LATCHED)
+    node.send(scan())
+    node.until("scan", "done")
+    lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the way back")
+    before = len(node.statuses)
+    assert node.ask("learn").success
+    node.until("scan_0", "playing")
+    lab.send(np.zeros(10), "other", PERIOD)
+    lab.wait(lambda: "refused" in lab.states(statuses, "other"), "the refusal of another one's command")
+    assert any("claimed by compensation_node" in s.message for s in list(statuses) if s.name == "other")
+    ended = lab.wait(
+        lambda: [s for s in node.statuses[before:] if values_of(s)["state"] in ("done", "failed")], "learning to end"
+    )
+    assert values_of(ended[0])["state"] == "done", ended[0].message
+    rounds = [values_of(s) for s in list(node.statuses) if values_of(s)["state"] == "learning"]
+    assert len(rounds) > 1
+    for values in rounds:
+        at = int(np.flatnonzero(node.samples.place() == int(values["first_index"]))[0])
+        error = node.samples.displacement[at : at + scan().size] - scan()
+        assert np.sqrt(np.mean(error**2)) == pytest.approx(float(values["rms"]), rel=1e-3)
+    lab.wait(lambda: holders[-1].data == "", "the end of the claim")
+    lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
+
+
+def test_what_somebody_else_has_claimed_is_refused_with_the_reason(lab):
+    node = Compensation(lab)
+    holders = lab.listen(String, "claimed_by", LATCHED)
+    lab.publisher(KeyValue, "claim").publish(KeyValue(key="another_lab", value="claim"))
+    lab.wait(lambda: holders and holders[-1].data == "another_lab", "the claim")
+    lab.pause(0.2)
+    node.send(scan())
+    assert "claimed by another_lab" in node.until("scan", "refused").message
+    assert not node.ask("learn").success

@@ -20,7 +20,7 @@ from ...model.model import Model
 from ...record import Experiment, Record
 from ..diagnosis import Diagnosis, Verdict
 from ..excitation_check import missing_excitation
-from ..gap import measure_gap
+from ..gap import measure_gap, stating
 from ..next_experiment import decide
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
@@ -123,8 +123,8 @@ def diagnose_few(
     return Diagnosis(
         verdict=Verdict.UNKNOWN,
         reason=f"{reason}.",
-        model=final.model,
-        baseline=baseline.model,
+        model=stating(final.model, gap.live, stroke(records)),
+        baseline=stating(baseline.model, gap.before, stroke(records)),
         selection=selection,
         fit=final,
         where=where,

@@ -8,55 +8,109 @@ from ...acquisition.sample_block import SampleBlock
 from ...errors import ModelError
 from ...model.chain import ChainState
 from ...model.model import Model
-
-_LONGEST_GAP = 1_000_000
-"""Samples that were lost and are gone through with the voltage held; after more the stage counts as settled."""
+from ...online.predictor import Predictor
+from ...online.voltage_history import is_held
 
 
 class AppliedState:
     """Runs the model along, so that a path begins in the hysteresis and creep that the stage is in.
 
+    A new model is run over the voltages that were applied before it came.
+
     Parameters
     ----------
-    model : Model
-        What the stage does.
-    block : SampleBlock
-        First samples; the stage counts as settled at the first voltage.
+    sample_period : float
+        Of the driver [s].
+
+    Attributes
+    ----------
+    voltage : float
+        Newest voltage [V].
+    noise : float
+        Rms noise of the sensor, from its changes between samples while the drive is held; 0 before that [m].
     """
 
-    def __init__(self, model: Model, block: SampleBlock) -> None:
-        self.model = model
-        self.voltage = float(block.voltage[0])
-        self._state = model.rest(self.voltage)
-        self._next = int(block.index[0])
-        self.take(block)
+    def __init__(self, sample_period: float) -> None:
+        self.sample_period = sample_period
+        self.voltage = self.noise = 0.0
+        self._predictor = Predictor(sample_period)
+        self._wanted: Model | None = None
 
     @property
-    def state(self) -> ChainState:
-        """State after the last sample."""
-        return self._state
+    def is_ready(self) -> bool:
+        """Whether the model that was followed last has been run over what was applied."""
+        return self._predictor.state is not None and not self._predictor.is_swapping
 
-    def take(self, block: SampleBlock) -> None:
-        """Run over a block; samples that were lost are bridged with the voltage held."""
-        missing = (int(block.index[0]) - self._next) % 2**32
-        if missing > _LONGEST_GAP:
-            self._state = self.model.rest(self.voltage)
-        elif missing:
-            _, self._state = self.model.run(np.full(missing, self.voltage), self._state)
-        _, self._state = self.model.run(block.voltage, self._state)
-        self.voltage = float(block.voltage[-1])
-        self._next = (int(block.index[-1]) + 1) % 2**32
-
-    def check_period(self, period: float) -> None:
-        """Refuse a driver at another period.
+    @property
+    def model(self) -> Model:
+        """Model in force.
 
         Raises
         ------
         ModelError
-            Naming both periods.
+            If there is none: none came, or it ran away on what was applied.
         """
-        if abs(period / self.model.sample_period - 1.0) > 1e-6:
-            raise ModelError(
-                f"model: got a sample period of {self.model.sample_period:g} s, expected {period:g} s (the driver's); "
-                "identify at the rate of the driver"
-            )
+        if self._predictor.model is None:
+            raise ModelError("the model diverged on the voltages that were applied; identify again")
+        return self._predictor.model
+
+    @property
+    def state(self) -> ChainState:
+        """State of the model after the last sample.
+
+        Raises
+        ------
+        ModelError
+            If there is none.
+        """
+        if self._predictor.state is None:
+            raise ModelError("no samples have been taken in; is the driver active?")
+        return self._predictor.state
+
+    def follow(self, model: Model) -> None:
+        """Let this model take over as soon as it has been run over what was applied.
+
+        Raises
+        ------
+        ModelError
+            If it is of another sample period.
+        """
+        check_period(model, self.sample_period)
+        if model is not self._wanted:
+            self._wanted = model
+            self._predictor.swap(model)
+
+    def take(self, block: SampleBlock) -> None:
+        """Run over a block; samples that were lost are bridged with the voltage held.
+
+        Raises
+        ------
+        PiezoError
+            On samples that no stage gives, and on a model that runs away.
+        """
+        self._predictor.predict(
+            int(block.index[0]),
+            block.stamp + round(float(block.time[0]) * 1e9),
+            block.voltage,
+            block.displacement,
+            follows_gap=block.follows_gap,
+            settled=block.index[0] == 0 or block.phase[0] == 0,
+        )
+        self.voltage = float(block.voltage[-1])
+        if block.size > 1 and is_held(block.voltage):
+            self.noise = float(np.sqrt(0.5 * np.mean(np.diff(block.displacement) ** 2)))
+
+
+def check_period(model: Model, period: float) -> None:
+    """Refuse a driver at another period.
+
+    Raises
+    ------
+    ModelError
+        Naming both periods.
+    """
+    if abs(period / model.sample_period - 1.0) > 1e-6:
+        raise ModelError(
+            f"model: got a sample period of {model.sample_period:g} s, expected {period:g} s (the driver's); "
+            "identify at the rate of the driver"
+        )

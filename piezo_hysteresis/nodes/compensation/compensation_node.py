@@ -13,11 +13,10 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from ...compensation import Limits
-from ...errors import ModelError, PiezoError, StageError
+from ...errors import ModelError, PiezoError, StageError, printable, reason_of
 from ...model.model import Model
 from ...model.model_file import load, loads
 from ...online.warmup import compile_kernels
-from ...parameter import Parameter, Row, Setting
 from ..identification.driver_client import DriverClient
 from ..messages.phase_text import phase_name
 from ..messages.samples import SampleReader
@@ -26,27 +25,12 @@ from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..runtime.sending import send
 from ..topics import advertise, subscribe
-from .applied_state import AppliedState
+from .applied_state import AppliedState, check_period
 from .path_runs import TICK, Job, PathRuns
 from .set_point import SetPoint
+from .settings import COMPENSATION
 from .status import CompensationStatus
 from .trajectory import described, trajectory_from_cloud, why_not
-
-_SOURCE = "compensation node"
-"""Where the bounds of the parameters come from."""
-
-COMPENSATION: tuple[Row, ...] = (
-    Setting("model_file", "", "path of the first model; a model on the topic `model` replaces it between trajectories"),
-    Setting("driver", "driver_node", "name of the driver node in the same namespace"),
-    Setting("play", True, "false: a trajectory is planned and kept for ~/plan and ~/learn, nothing moves"),
-    Setting("approximate", False, "leave out effects that cannot be turned round instead of refusing the model"),
-    Setting("learning_rounds", 2, "corrections that ~/learn plays", lower=0, upper=100),
-    Parameter("sensor_noise", "σ", "m", 0.0, 0.0, 1e-3, "rms noise of the sensor, at which learning stops", _SOURCE),
-    Parameter("approach", "t_a", "s", 0.1, 1e-3, 1e3, "duration of the way to the first sample of a path", _SOURCE),
-    Parameter("longest_trajectory", "t_max", "s", 120.0, 1e-3, 1e5, "longer ones are refused", _SOURCE),
-    Parameter("integral_time", "t_i", "s", 0.0, 0.0, 1e6, "slow integral behind set_displacement; 0: off", _SOURCE),
-)
-"""Parameters of the node."""
 
 
 class CompensationNode(GuardedNode):
@@ -95,15 +79,18 @@ class CompensationNode(GuardedNode):
     def _follow_model(self, model: Model) -> None:
         """From the next trajectory on; the one that plays ends with the model that it was planned with."""
         self._model = model
-        if self._job is None:
-            self._applied = None
+        if self._job is None and self._applied is not None:
+            self._applied.follow(model)
 
     def _on_samples(self, message: bytes) -> None:
+        driver = self._driver.limits
         try:
             block = self._reader.read(message)
-            if self._model is not None and self._applied is None:
-                self._applied = AppliedState(self._model, block)
-            elif self._applied is not None:
+            if driver is not None and (self._applied is None or self._applied.sample_period != driver.sample_period):
+                self._applied = AppliedState(driver.sample_period)
+                if self._model is not None:
+                    self._applied.follow(self._model)
+            if self._applied is not None:
                 self._applied.take(block)
             if self._runs.tracking is not None:
                 self._runs.tracking.take(block)
@@ -117,7 +104,7 @@ class CompensationNode(GuardedNode):
         try:
             applied, limits = self._ready()
             name = phase_name(cloud.header.frame_id)
-            wanted = trajectory_from_cloud(cloud, applied.model.sample_period, self._values["longest_trajectory"])
+            wanted = trajectory_from_cloud(cloud, applied.sample_period, self._values["longest_trajectory"])
         except PiezoError as error:
             self._status.refuse(name, str(error))
             return
@@ -127,7 +114,9 @@ class CompensationNode(GuardedNode):
     def _on_set_displacement(self, message: Float64) -> None:
         try:
             applied, limits = self._ready()
-            found = self._runs.planned(np.full(16, float(message.data)), limits)
+            if not applied.is_ready:
+                raise ModelError("the new model is being run over what was applied; send it again in a moment")
+            found = self._runs.planned(np.full(16, float(message.data)), limits, way_back=False)
             if not found.reachability.is_whole:
                 raise StageError(why_not(found))
         except PiezoError as error:
@@ -147,14 +136,18 @@ class CompensationNode(GuardedNode):
         """
         if self._job is not None:
             raise StageError(f"busy with '{self._phase}'; wait, or ~/stop first")
-        if self._model is None:
-            raise ModelError("no model yet; expected model_file, or a model on the topic 'model'")
         driver = self._driver.limits
         if driver is None or self._driver.missing:
             raise StageError(f"no driver: waiting for {self._driver.missing}")
+        if self._driver.stopped:
+            raise StageError(self._driver.stopped)
+        if self._driver.holder and not self._driver.owns:
+            raise StageError(f"the stage is claimed by {printable(self._driver.holder)}; wait until it is released")
         if self._applied is None:
             raise StageError("no samples yet; is the driver active?")
-        self._applied.check_period(driver.sample_period)
+        if self._model is None:
+            raise ModelError("no model yet; expected model_file, or a model on the topic 'model'")
+        check_period(self._model, driver.sample_period)
         slew = driver.max_slew_rate * (1.0 - 1e-9)  # rounding shall not make a step that the driver refuses
         return self._applied, Limits(driver.voltage_min, driver.voltage_max, slew)
 
@@ -177,14 +170,20 @@ class CompensationNode(GuardedNode):
             next(self._job)
         except StopIteration:
             self._finish()
-        except PiezoError as error:
+        except Exception as error:
             self._finish()
-            self._status.failed(self._phase, str(error))
+            report = self._status.refuse if self._driver.state == "refused" else self._status.failed
+            report(self._phase, reason_of(error))
+            if not isinstance(error, PiezoError):
+                raise
 
     def _finish(self) -> None:
         self._job, self._runs.tracking = None, None
-        if self._applied is not None and self._model is not self._applied.model:
-            self._applied = None  # the new model takes over with the next block
+        if self._applied is not None and self._model is not None:
+            try:
+                self._applied.follow(self._model)
+            except ModelError as error:
+                self._status.refuse("model", str(error))
 
     def _give_up(self) -> None:
         if self._job is not None:

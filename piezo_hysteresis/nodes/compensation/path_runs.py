@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...compensation import IterativeLearning, Limits, Plan, plan
-from ...errors import StageError
+from ...errors import StageError, printable
 from ...identification.protocol.protocol import ProtocolPhase
 from ..identification.driver_client import DriverClient
 from .applied_state import AppliedState
@@ -63,7 +63,7 @@ class PathRuns:
         """Let no plan begin any more."""
         self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def planned(self, wanted: np.ndarray, limits: Limits) -> Plan:
+    def planned(self, wanted: np.ndarray, limits: Limits, way_back: bool = True) -> Plan:
         """Plan of a path (n,) [m] from where the stage is."""
         applied = self._applied()
         return plan(
@@ -72,8 +72,17 @@ class PathRuns:
             limits,
             start=applied.state,
             approach=self._values["approach"],
+            way_back=self._values["way_back"] if way_back else 0.0,
             approximate=self._values["approximate"],
         )
+
+    def _until(self, condition: Callable[[], bool], missing: str) -> Job:
+        waited = 0.0
+        while not condition():
+            waited += TICK
+            if waited > _STARTED_WITHIN:
+                raise StageError(f"waited {_STARTED_WITHIN:g} s for {missing}")
+            yield
 
     def _in_thread(self, future: Future[Any]) -> Generator[None, None, Any]:
         while not future.done():
@@ -83,6 +92,7 @@ class PathRuns:
     def follow(self, name: str, wanted: np.ndarray, limits: Limits) -> Job:
         """Plan a path and, where it can be had, play it."""
         self._status.show("planning", f"{wanted.size} samples", name)
+        yield from self._until(lambda: self._applied().is_ready, "the model to be run over what was applied")
         found: Plan = yield from self._in_thread(self._pool.submit(self.planned, wanted, limits))
         self.last = (name, found)
         if not found.reachability.is_whole:
@@ -97,7 +107,7 @@ class PathRuns:
     def _report_result(self, name: str, tracking: Tracking) -> None:
         rms, expected = tracking.rms or 0.0, tracking.plan.expected.total
         reason = f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm"
-        self._status.show("done", reason, name, rms=rms, expected=expected)
+        self._status.show("done", reason, name, first_index=tracking.path_index, rms=rms, expected=expected)
 
     def _play(self, name: str, found: Plan) -> Generator[None, None, Tracking]:
         """Send a drive to the driver and collect what the stage does.
@@ -124,13 +134,28 @@ class PathRuns:
         return tracking
 
     def rounds(self, name: str, first: Plan, limits: Limits) -> Job:
-        """Play the last trajectory again, and correct it by what is measured."""
+        """Play the last trajectory again, and correct it by what is measured; nobody else drives the stage meanwhile.
+
+        Raises
+        ------
+        StageError
+            If the stage is somebody else's, or the driver refuses or stops a round.
+        """
+        self._driver.claim()
+        try:
+            yield from self._until(lambda: bool(self._driver.holder), "the claim on the stage")
+            yield from self._learn(name, first, limits)
+        finally:
+            self._driver.release()
+
+    def _learn(self, name: str, first: Plan, limits: Limits) -> Job:
+        yield from self._until(lambda: self._applied().is_ready, "the model to be run over what was applied")
         applied = self._applied()
         learning = IterativeLearning(
             applied.model,
             first,
             limits,
-            noise=self._values["sensor_noise"],
+            noise=self._values["sensor_noise"] or applied.noise,
             approximate=self._values["approximate"],
         )
         # the stage is no longer where the first plan began
@@ -139,8 +164,18 @@ class PathRuns:
         for number in range(1 + self._values["learning_rounds"]):
             if learning.next is None:
                 break
+            if not self._driver.owns:
+                raise StageError(
+                    f"the stage is claimed by {printable(self._driver.holder) or 'nobody'}, not by this node"
+                )
             tracking = yield from self._play(f"{name}_{number}", learning.next)
             yield from self._in_thread(self._pool.submit(learning.update, tracking.measured, applied.state))
+            now = learning.rounds[-1]
+            reason = f"round {number}: {1e9 * now.rms:.1f} nm rms, expected {1e9 * now.expected:.1f} nm"
+            index = tracking.path_index
+            self._status.show(
+                "learning", reason, f"{name}_{number}", first_index=index, rms=now.rms, expected=now.expected
+            )
         if not learning.rounds:
             raise StageError("the trajectory can no longer be had from where the stage is")
         best, last = learning.best, learning.rounds[-1]

@@ -31,10 +31,18 @@ class CompensationStatus:
         node.create_timer(1.0, self._repeat, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def show(
-        self, state: str, reason: str, phase: str = "", level: bytes = DiagnosticStatus.OK, **errors: float
+        self,
+        state: str,
+        reason: str,
+        phase: str = "",
+        level: bytes = DiagnosticStatus.OK,
+        first_index: int | None = None,
+        **errors: float,
     ) -> None:
-        """Publish a state; errors in metres."""
+        """Publish a state; `first_index` is the first sample of the path in `samples`, errors are in metres."""
         texts = {name: f"{error:.6g}" for name, error in errors.items()}
+        if first_index is not None:
+            texts["first_index"] = str(first_index)
         status = diagnostic(level, self._name, reason, "", state=state, phase=phase, refused=self.refused, **texts)
         if status != self._shown:
             self._shown = status

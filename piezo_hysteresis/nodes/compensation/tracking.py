@@ -34,6 +34,11 @@ class Tracking:
         for block in early:
             self.take(block)
 
+    @property
+    def path_index(self) -> int | None:
+        """Index of the first sample of the path in `samples`; None before the driver has reported it."""
+        return None if self.first is None else (self.first + self.plan.begin) % 2**32
+
     def take(self, block: SampleBlock) -> None:
         """Take in a block of `samples`."""
         if self.first is None:

@@ -1,0 +1,40 @@
+"""Parameters of the compensation node."""
+
+from __future__ import annotations
+
+from ...parameter import Parameter, Row, Setting
+
+_SOURCE = "compensation node"
+"""Where the bounds of the parameters come from."""
+
+COMPENSATION: tuple[Row, ...] = (
+    Setting("model_file", "", "path of the first model; a model on the topic `model` replaces it between trajectories"),
+    Setting("driver", "driver_node", "name of the driver node in the same namespace"),
+    Setting("play", True, "false: a trajectory is planned and kept for ~/plan and ~/learn, nothing moves"),
+    Setting("approximate", False, "leave out effects that cannot be turned round instead of refusing the model"),
+    Setting("learning_rounds", 2, "corrections that ~/learn plays", lower=0, upper=100),
+    Parameter(
+        "sensor_noise",
+        "σ",
+        "m",
+        0.0,
+        0.0,
+        1e-3,
+        "rms noise of the sensor, at which learning stops; 0: taken from the samples while the drive is held",
+        _SOURCE,
+    ),
+    Parameter("approach", "t_a", "s", 0.1, 1e-3, 1e3, "duration of the way to the first sample of a path", _SOURCE),
+    Parameter(
+        "way_back",
+        "t_b",
+        "s",
+        0.0,
+        0.0,
+        1e3,
+        "duration of the way back to the voltage before the path; 0: the last displacement is held",
+        _SOURCE,
+    ),
+    Parameter("longest_trajectory", "t_max", "s", 120.0, 1e-3, 1e5, "longer ones are refused", _SOURCE),
+    Parameter("integral_time", "t_i", "s", 0.0, 0.0, 1e6, "slow integral behind set_displacement; 0: off", _SOURCE),
+)
+"""Parameters of the node."""
