@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import matplotlib as mpl
@@ -15,15 +16,30 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from piezo_hysteresis.discrepancy import Diagnosis, diagnose
+from piezo_hysteresis.discrepancy.next_experiment import separations
 from piezo_hysteresis.discrepancy.residual.noise_floor import ADEQUACY, noise_floors, stroke
-from piezo_hysteresis.discrepancy.search.candidates import screen
+from piezo_hysteresis.discrepancy.search.acceptance_tests import share_left
+from piezo_hysteresis.discrepancy.search.candidate_refits import LATER, LEAST_GAIN, refit_candidates
+from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen
 from piezo_hysteresis.discrepancy.search.cross_validation import ADEQUATE
+from piezo_hysteresis.discrepancy.search.refit import without
+from piezo_hysteresis.discrepancy.search.selection import KEEPS, REFITS
 from piezo_hysteresis.discrepancy.search.test_records import reporting
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.protocol import protocol
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.record import Experiment, Record
-from piezo_hysteresis.report.figures.style import BLUE, GREEN, GREY, MEASURED, ORANGE, PREDICTED, SETTINGS, canvas
+from piezo_hysteresis.report.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    MEASURED,
+    ORANGE,
+    PREDICTED,
+    SETTINGS,
+    canvas,
+)
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
@@ -145,6 +161,80 @@ def screening(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
+@cache
+def refits(diagnosis: Diagnosis) -> tuple[dict[str, float], list[FittedCandidate]]:
+    """Predicted gain of the best candidates by name, and their joint refits, best first."""
+    assert diagnosis.selection is not None
+    selection = diagnosis.selection
+    before = selection.steps[0].before
+    found = screen(selection.baseline, selection.accepted[0].best.training_data, CATALOGUE)[:REFITS]
+    predicted = {c.name: max(0.0, before.cost - c.score.cost) for c in found}
+    return predicted, refit_candidates(selection.baseline, found, before, lambda word, fraction: None)
+
+
+def refitting(diagnosis: Diagnosis) -> Figure:
+    """Step 7: gain of the best candidates, predicted and after the joint refit."""
+    assert diagnosis.selection is not None
+    predicted, fitted = refits(diagnosis)
+    cost = diagnosis.selection.steps[0].before.cost
+    reached = {c.name: max(0.0, cost - c.score.cost) for c in fitted}
+    names = sorted(predicted, key=lambda name: -reached.get(name, 0.0))
+    figure, ((axes,),) = canvas(1, 1, 3.2)
+    at = np.arange(len(names))
+    axes.barh(at - 0.2, [predicted[n] for n in names], 0.36, color=GREY, label="predicted in step 6")
+    axes.barh(at + 0.2, [reached.get(n, 0.0) for n in names], 0.36, color=BLUE, label="after the joint fit")
+    for k, name in enumerate(names):
+        if name not in reached:
+            axes.annotate("not fitted: too far behind", (0.0, k + 0.2), (4, 0), textcoords="offset points", va="center")
+    axes.set_yticks(at, names)
+    axes.invert_yaxis()
+    axes.set(title="Gain of the best candidates", xlabel="gain G in mean ln R² on records left out [1]")
+    axes.legend(loc="lower right")
+    return figure
+
+
+def acceptance(diagnosis: Diagnosis) -> Figure:
+    """Step 8: gain and remaining error of every refit, beside the limits."""
+    assert diagnosis.selection is not None
+    before, null = diagnosis.selection.steps[0].before, diagnosis.selection.null
+    _, fitted = refits(diagnosis)
+    colours = [GREEN, *[BLUE] * (len(fitted) - 1)]
+    figure, ((gains, left),) = canvas(1, 2, 3.2, sharey=True)
+    at = np.arange(len(fitted))
+    gains.barh(at, [before.cost - c.score.cost for c in fitted], color=colours)
+    gains.axvline(LEAST_GAIN, color=ORANGE, linestyle="--", label=f"limit: at least {LEAST_GAIN:g}")
+    left.barh(at, [100.0 * share_left(c.score, before, null) for c in fitted], color=colours)
+    left.axvline(100.0 * KEEPS[0], color=ORANGE, linestyle="--", label=f"limit: at most {100 * KEEPS[0]:.0f} %")
+    alone = without(fitted[0], LATER)
+    if alone is not None:
+        mark = {"marker": "D", "linestyle": "none", "color": BLACK, "label": "beside the model refitted without it"}
+        gains.plot(alone.score.cost - fitted[0].score.cost, 0, **mark)
+        left.plot(100.0 * share_left(fitted[0].score, alone.score, null), 0, **mark)
+    gains.set_yticks(at, [c.name for c in fitted])
+    gains.invert_yaxis()
+    gains.set(title="Gain", xlabel="G [1]")
+    left.set(title="Error that remains", xlabel="share of V - V₀ [%]")
+    for axes in (gains, left):
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.12), fontsize=8)
+    return figure
+
+
+def next_phase(diagnosis: Diagnosis) -> Figure:
+    """Step 10: how well each phase would separate the two best explanations."""
+    _, fitted = refits(diagnosis)
+    first, second = fitted[:2]
+    powers = separations(first.fit.model, second.fit.model, first.training_data)
+    names = sorted(powers, key=lambda name: -powers[name])
+    figure, ((axes,),) = canvas(1, 1, 3.0)
+    axes.barh(np.arange(len(names)), [powers[n] for n in names], color=[GREEN, *[BLUE] * (len(names) - 1)])
+    axes.set_yticks(np.arange(len(names)), [n.replace("_", " ") for n in names])
+    axes.invert_yaxis()
+    axes.set_xscale("log")
+    title = f"How well a phase would separate {first.name} and {second.name}"
+    axes.set(title=title, xlabel="expected squared difference [floors² per second of stage time]")
+    return figure
+
+
 def gap(diagnosis: Diagnosis) -> Figure:
     """Step 9: error of the test records before and after."""
     assert diagnosis.gap is not None
@@ -168,7 +258,10 @@ STEPS: dict[str, Callable[[Diagnosis], Figure]] = {
     "where": where,
     "missing": missing,
     "screening": screening,
+    "refits": refitting,
+    "acceptance": acceptance,
     "gap": gap,
+    "next": next_phase,
 }
 """Every picture, in the order of the page."""
 

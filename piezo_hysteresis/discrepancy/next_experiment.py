@@ -34,7 +34,7 @@ class NextExperiment:
     separates : tuple of str
         Effects between which it would decide.
     power : float
-        Expected squared distance between the two, in floors per second of stage time.
+        Expected squared distance between the two, in floors² per second of stage time.
     """
 
     phase: str
@@ -81,24 +81,27 @@ def menu(training_data: TrainingData, model: Model) -> dict[str, Record]:
     }
 
 
-def propose(first: Model, second: Model, names: tuple[str, str], training_data: TrainingData) -> NextExperiment:
-    """Phase of the menu on which two fitted models differ most, beyond what either can still adjust.
+def separations(first: Model, second: Model, training_data: TrainingData) -> dict[str, float]:
+    """How far two fitted models differ on every phase of the menu, beyond what either can still adjust.
 
     Parameters
     ----------
     first, second : Model
         Fitted, one with each effect.
-    names : (str, str)
-        The effects.
-    training_data : Evidence
+    training_data : TrainingData
         What has been recorded: it binds the common parameters.
+
+    Returns
+    -------
+    dict of str to float
+        By phase name the expected squared distance, in floors² per second of stage time.
     """
     free = free_numbers(first, training_data)
     directions = gauge(first, free)
     known = weighted_sum(grams(first, training_data.records, free, training_data.nuisance), training_data.floors)
     prior = directions.T @ known[:-1, :-1] @ directions
     floor = float(np.min(training_data.floors))
-    best = NextExperiment("", names, -1.0)
+    powers = {}
     for name, record in menu(training_data, first).items():
         (difference,) = (a - b for a, b in zip(second.simulate(record), first.simulate(record), strict=True))
         (gram,) = grams(first, [record], free, training_data.nuisance, [difference[None, :]])
@@ -108,10 +111,25 @@ def propose(first: Model, second: Model, names: tuple[str, str], training_data: 
         inner = prior + directions.T @ total[:q, :q] @ directions
         scale = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
         solved = np.linalg.lstsq(inner * np.outer(scale, scale), scale * cross, rcond=1e-9)[0] * scale
-        power = float(total[q, q] - cross @ solved) / record.duration
-        if power > best.power:
-            best = NextExperiment(name, names, power)
-    return best
+        powers[name] = float(total[q, q] - cross @ solved) / record.duration
+    return powers
+
+
+def propose(first: Model, second: Model, names: tuple[str, str], training_data: TrainingData) -> NextExperiment:
+    """Phase of the menu on which two fitted models differ most.
+
+    Parameters
+    ----------
+    first, second : Model
+        Fitted, one with each effect.
+    names : (str, str)
+        The effects.
+    training_data : TrainingData
+        What has been recorded.
+    """
+    powers = separations(first, second, training_data)
+    phase = max(powers, key=lambda name: powers[name])
+    return NextExperiment(phase, names, powers[phase])
 
 
 def decide(selection: Selection, training_data: TrainingData) -> NextExperiment | None:
@@ -121,7 +139,7 @@ def decide(selection: Selection, training_data: TrainingData) -> NextExperiment 
     ----------
     selection : Selection
         Outcome of the search.
-    training_data : Evidence
+    training_data : TrainingData
         What has been recorded.
     """
     for step in selection.accepted:

@@ -121,7 +121,7 @@ def is_stepped(model: Model, training_data: TrainingData) -> bool:
     ----------
     model : Model
         Fitted to the evidence.
-    training_data : Evidence
+    training_data : TrainingData
         Records and floors.
     """
     if BoucWen.name not in model:

@@ -51,7 +51,7 @@ def joint(model: Model, training_data: TrainingData, max_iterations: int, tolera
     ----------
     model : Model
         Where to begin.
-    training_data : Evidence
+    training_data : TrainingData
         Records, floors, and what is free in each record.
     max_iterations : int
         Linearisations.

@@ -63,7 +63,7 @@ def select(
     ----------
     model : Model
         Fitted baseline.
-    training_data : Evidence
+    training_data : TrainingData
         Records that fit and choose.
     score : Score
         Of the baseline.
