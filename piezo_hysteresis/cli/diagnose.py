@@ -25,9 +25,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--report", metavar="FILE", help="write the HTML page, and its figures beside it")
     parser.add_argument("--json", metavar="FILE", help="write the answer as JSON")
     parser.add_argument(
-        "--explicit-step",
+        "--time",
+        type=float,
+        default=float("inf"),
+        metavar="S",
+        help="seconds after which the search ends with the best answer so far; default: no limit",
+    )
+    parser.add_argument(
+        "--no-explicit-step",
         action="store_true",
-        help="the data come from a simulation with the explicit step of Eq. (7); no real stage needs this",
+        help="do not look for the explicit step of Eq. (7), which only simulated data can hold",
     )
     parser.set_defaults(run=run)
 
@@ -43,7 +50,13 @@ def run(args: argparse.Namespace) -> int:
     start = None if args.model is None else model_file.load(args.model)
     experiment = reading_options.read(args)
     with progress("diagnose") as report_progress:
-        found = diagnose(experiment, start, progress=report_progress, explicit_step=args.explicit_step)
+        found = diagnose(
+            experiment,
+            start,
+            progress=report_progress,
+            explicit_step=not args.no_explicit_step,
+            time_limit=args.time,
+        )
     path = ""
     if args.output is not None and found.model is not None:
         path = str(model_file.save(found.model, args.output))

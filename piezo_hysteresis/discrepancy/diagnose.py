@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Collection
 
 import numpy as np
 
 from ..effects import CATALOGUE, Effect
-from ..errors import IdentificationError
+from ..errors import IdentificationError, ParameterError
 from ..identification.fit.fit import Progress
 from ..identification.one_core import on_one_core
 from ..model.model import Model
 from ..record import Experiment
 from .diagnosis import Diagnosis
-from .passes import PASSES, PASSES_ON_SIMULATED_DATA, DiagnosisState
+from .passes import PASSES, DiagnosisState, take_out_explicit_steps
 
 
 @on_one_core
@@ -23,7 +24,8 @@ def diagnose(
     *,
     effects: Collection[type[Effect]] = CATALOGUE,
     progress: Progress | None = None,
-    explicit_step: bool = False,
+    explicit_step: bool = True,
+    time_limit: float = np.inf,
 ) -> Diagnosis:
     """Find where simulation and measurement disagree, name the missing effect, add it, and show the gap shrink.
 
@@ -38,8 +40,11 @@ def diagnose(
     progress : callable, optional
         Called with a word and the fraction done.
     explicit_step : bool
-        True for data of a simulation that takes the explicit step of Eq. (7): if the data agree, what that step
-        changes is taken out before anything is named. No real stage needs it.
+        Whether the explicit step of Eq. (7) is looked for, which only simulations take, and what it changes is taken
+        out before anything is named.
+    time_limit : float
+        Time after which the search ends with the best answer so far [s]; the baseline before it and the last fit after
+        it are always made.
 
     Returns
     -------
@@ -48,14 +53,19 @@ def diagnose(
 
     Raises
     ------
+    ParameterError
+        If the time limit is not positive.
     IdentificationError
         If nothing in the experiment moves.
     ModelError
         If the records are faster than the model.
     """
-    state = DiagnosisState(experiment, model, effects, progress or (lambda word, fraction: None))
+    if not time_limit > 0.0:
+        raise ParameterError(f"diagnose: got a time limit of {time_limit:g} s, expected more than 0 s")
+    end = time.monotonic() + time_limit
+    state = DiagnosisState(experiment, model, effects, progress or (lambda word, fraction: None), end)
     with np.errstate(over="ignore", invalid="ignore"):  # diverging trials show in their cost
-        for run in PASSES_ON_SIMULATED_DATA if explicit_step else PASSES:
+        for run in (p for p in PASSES if explicit_step or p is not take_out_explicit_steps):
             found = run(state)
             if isinstance(found, Diagnosis):
                 return found

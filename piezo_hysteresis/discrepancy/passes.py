@@ -18,7 +18,7 @@ from ..record import Experiment, Notice
 from .changes.same_stage import same_stage
 from .conclusion import concluded
 from .diagnosis import Diagnosis, Verdict
-from .residual.explicit_step import KIND, is_stepped, without_steps
+from .residual.explicit_step import KIND, explicit_model, without_steps
 from .residual.localise import ResidualShare, localise
 from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
 from .search.baseline_setup import BaselineSetup, prepare_baseline
@@ -26,12 +26,15 @@ from .search.cross_validation import ADEQUATE
 from .search.selection import select
 from .search.selection_result import Selection
 from .search.single_record import diagnose_few
+from .search.time_limit import ending_at
 from .verdict import FEWEST
 
 Array = NDArray[np.float64]
 
 VOLTAGE_NOISE = "voltage_noise"
 """Kind of the notice of an experiment whose voltage is followed but for its noise."""
+STEPS_LEAVE = 10.0
+"""Cost that may be left once the changes of an explicit step are taken out before anything is named."""
 IDLE = ("idle", "hold", *CARRYING)
 """Phases that only bring the stage from one state to another."""
 
@@ -50,6 +53,8 @@ class DiagnosisState:
         The library to choose from.
     progress : callable
         Called with a word and the fraction done.
+    end : float
+        When the search for effects has to end, on the clock of `time.monotonic` [s].
     setup : BaselineSetup or None
         Floors, records, and the baseline that was fitted to them.
     where : tuple of ResidualShare
@@ -62,6 +67,7 @@ class DiagnosisState:
     model: Model | None
     effects: Collection[type[Effect]]
     progress: Progress
+    end: float = np.inf
     setup: BaselineSetup | None = None
     where: tuple[ResidualShare, ...] = ()
     selection: Selection | None = None
@@ -158,14 +164,15 @@ def fit_baseline(state: DiagnosisState) -> DiagnosisState:
 def search_effects(state: DiagnosisState) -> DiagnosisState:
     """Adds effects to the baseline while records left out ask for them."""
     setup = state.fitted
-    selection = select(
-        setup.baseline.model,
-        setup.training_data,
-        setup.score,
-        setup.null,
-        state.effects,
-        lambda word, part: state.progress(word, 0.4 + 0.4 * part),
-    )
+    with ending_at(state.end):
+        selection = select(
+            setup.baseline.model,
+            setup.training_data,
+            setup.score,
+            setup.null,
+            state.effects,
+            lambda word, part: state.progress(word, 0.4 + 0.4 * part),
+        )
     return replace(state, selection=selection)
 
 
@@ -173,24 +180,33 @@ def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
     """Searches once more where the model that was found tells otherwise what slow samples have lost."""
     selection = state.searched
     leaves_a_gap = bool(selection.accepted) and selection.score.excess > ADEQUATE
-    if leaves_a_gap and state.sharpens and state.fitted.is_coarse(selection.model):
+    if selection.in_time and leaves_a_gap and state.sharpens and state.fitted.is_coarse(selection.model):
         return search_effects(fit_baseline(state))
     return state
 
 
 def take_out_explicit_steps(state: DiagnosisState) -> DiagnosisState:
-    """Takes out what an explicit step of the loop has changed in simulated data; an option, for no stage does that."""
+    """Take out what an explicit step of the loop has changed in the data of a simulation; no stage does that.
+
+    Before the search only where nothing else is missing; after it with the first effects behind which the data show it.
+    """
     setup, selection = state.fitted, state.selection
-    model = setup.baseline.model if selection is None else selection.model
-    score = setup.score if selection is None else selection.score
-    training_data = setup.training_data
-    if selection is not None and selection.accepted:
-        training_data = selection.accepted[-1].best.training_data
-    known = {n.kind for n in state.experiment.notices}
-    if score.excess <= ADEQUATE or KIND in known or not is_stepped(model, training_data):
+    training_data, model = setup.training_data, setup.baseline.model
+    if any(n.kind == KIND for n in state.experiment.notices) or setup.score.excess <= ADEQUATE:
         return state
-    found = fit_baseline(replace(state, experiment=without_steps(state.experiment, model), selection=None))
-    return found if selection is None else search_effects(found)
+    if selection is None:
+        explicit = explicit_model(model, training_data, STEPS_LEAVE)
+        return state if explicit is None else fit_baseline(_freed(state, explicit))
+    for step in (s.best for s in selection.accepted if selection.in_time):
+        leaves_a_gap = step.score.excess > ADEQUATE
+        explicit = explicit_model(step.fit.model, step.training_data) if leaves_a_gap else None
+        if explicit is not None:
+            return search_effects(fit_baseline(_freed(state, explicit)))
+    return state
+
+
+def _freed(state: DiagnosisState, model: Model) -> DiagnosisState:
+    return replace(state, experiment=without_steps(state.experiment, model), selection=None)
 
 
 def conclude(state: DiagnosisState) -> Diagnosis:
@@ -204,19 +220,13 @@ PASSES: tuple[Pass, ...] = (
     compare_with_given_model,
     answer_few_records,
     fit_baseline,
+    take_out_explicit_steps,
     search_effects,
+    take_out_explicit_steps,
     search_again_with_sharper_samples,
     conclude,
 )
 """The diagnosis, in the order in which the passes run."""
-PASSES_ON_SIMULATED_DATA: tuple[Pass, ...] = (
-    *PASSES[: PASSES.index(search_effects)],
-    take_out_explicit_steps,
-    search_effects,
-    take_out_explicit_steps,
-    *PASSES[PASSES.index(search_effects) + 1 :],
-)
-"""The same for data of a simulation whose loop takes the explicit step of Eq. (7)."""
 
 
 def _moves(experiment: Experiment, index: int) -> bool:

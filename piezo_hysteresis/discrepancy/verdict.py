@@ -57,6 +57,8 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
     gap : Gap
         Before and after.
     """
+    if not selection.in_time and not named:
+        return Verdict.UNKNOWN, "No effect is named: the time limit ended the search before an answer was found."
     names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
     closed = selection.explained(selection.score)
     if named:
@@ -67,6 +69,8 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
         )
         said = f"The model misses {names}, which explains {100 * closed:.0f} % of the gap; {rest}."
         fitted = [s.best.effect.public_name() for s in selection.accepted if not s.best.effect.is_predicted_live()]
+        if not selection.in_time:
+            said += " The time limit ended the search, so that more may be missing."
         return Verdict.NAMED, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
     many = gap.unseen and len(gap.per_phase) >= FEWEST
     foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE

@@ -11,7 +11,7 @@ from benchmarks.naming_cases import UNKNOWN, Case
 from benchmarks.naming_experiments import ProtocolVariant
 from piezo_hysteresis.discrepancy import Verdict, diagnose
 from piezo_hysteresis.effects import BY_NAME, CATALOGUE
-from piezo_hysteresis.errors import IdentificationError
+from piezo_hysteresis.errors import IdentificationError, ParameterError
 from piezo_hysteresis.record import Experiment, Notice, Record
 
 BRIEF = ProtocolVariant(hold=3.0)
@@ -150,3 +150,20 @@ def test_no_effect_is_named_where_its_twin_was_no_candidate():
     found = diagnose(hidden("softening", plant="independent").experiment(), effects=library)
     assert found.verdict is Verdict.UNKNOWN
     assert "the closest effect is softening" in found.reason and "sensor_nonlinearity" in found.reason
+
+
+def test_a_search_that_runs_out_of_time_gives_the_best_answer_so_far():
+    found = diagnose(hidden("creep").experiment(), time_limit=1e-9)
+    assert found.verdict is Verdict.UNKNOWN
+    assert "the time limit ended the search" in found.reason
+    assert found.gap.after == pytest.approx(found.gap.before)
+    with pytest.raises(ParameterError, match="more than 0 s"):
+        diagnose(hidden("creep").experiment(), time_limit=0.0)
+
+
+def test_logarithmic_creep_is_saved_as_the_law_that_holds():
+    found = diagnose(Case("effects", ("creep",), 1, 5e-4, extra={"creep": ("logarithmic", 0.015)}).experiment())
+    (effect,) = found.effects()
+    low, high = effect["parameters"]["gamma"]["interval_95"]
+    assert effect["law"] == "creep" and "creep" in found.model
+    assert low <= 0.015 <= high

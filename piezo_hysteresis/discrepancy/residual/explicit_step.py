@@ -30,10 +30,12 @@ from ...blocks.bouc_wen_kernel import (
 from ...blocks.kernel import kernel
 from ...effects import BoucWen, Discretisation, Effect
 from ...effects.hysteresis.bouc_wen import BoucWenBlock
-from ...errors import DivergenceError
+from ...identification.fit.normal_equations import grams
 from ...model.model import Model
 from ...record import Experiment, Notice, Record
-from ..search.refit import joint
+from ..search.candidates import directions, free_numbers
+from ..search.cross_validation import held_out
+from ..search.refit import FAILURES, joint
 from ..search.training_data import TrainingData
 from .sampling import at_period, less
 
@@ -45,8 +47,10 @@ SEEN = 0.5
 """Change of a record in floors from which it can be reported."""
 BETTER = 0.9
 """Share of the cost that may be left once the changes are taken out."""
-OTHER_SHARES = (0.5, 1.5)
-"""Shares of the changes that must not do as well as the whole of them."""
+PRESENT, LEFT = 0.7, 0.3
+"""How far from the whole of the changes the share may be that the residual holds, and share left when they are out."""
+TURNS = 4
+"""Times that the changes are computed at most."""
 LINEARISATIONS, PRECISE = 9, 1e-3
 """Linearisations of a fit at most, and relative decrease of the cost at which it has converged."""
 
@@ -114,31 +118,55 @@ def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
     return [b - a if r.sample_period < own else np.zeros(r.size) for r, a, b in pairs]
 
 
-def is_stepped(model: Model, training_data: TrainingData) -> bool:
-    """Whether the loop behind the data takes the explicit step: they fit best with the whole of its changes taken out.
+def explicit_model(model: Model, training_data: TrainingData, leaves: float = np.inf) -> Model | None:
+    """The model behind data whose loop takes the explicit step; None where the residual does not hold its changes.
+
+    Changes of a model that was fitted to stepped data are a little wrong: they are taken out and the model is fitted
+    again, until both agree.
 
     Parameters
     ----------
     model : Model
-        Fitted to the evidence.
+        Fitted to the training data.
     training_data : TrainingData
         Records and floors.
+    leaves : float
+        Cost at most without the changes: a large effect that is still missing may look alike.
     """
     if BoucWen.name not in model:
-        return False
-    with suppress(DivergenceError):
-        changes = step_changes(model, training_data.records)
-        sizes = [np.sqrt(np.mean(c**2)) / f for c, f in zip(changes, training_data.floors, strict=True)]
-        if max(sizes) < SEEN:
-            return False
+        return None
+    records, floors = training_data.records, training_data.floors
+    with suppress(*FAILURES):
+        changes = step_changes(model, records)
+        share = _share(model, training_data, changes) if _largest(changes, floors) > SEEN else 0.0
+        if abs(share - 1.0) > PRESENT:
+            return None
+        cost = joint(model, training_data, LINEARISATIONS, PRECISE).cost
+        for _ in range(TURNS):
+            freed = replace(training_data, records=less(records, changes))
+            found = joint(model, freed, LINEARISATIONS, PRECISE)
+            if found.cost > BETTER * cost:
+                return None
+            model, before = found.model, changes
+            changes = step_changes(model, records)
+            if _largest([a - b for a, b in zip(changes, before, strict=True)], floors) < SEEN:
+                break
+        if found.cost < leaves and abs(_share(model, freed, changes)) < LEFT:
+            return model
+    return None
 
-        def cost(share: float) -> float:
-            records = less(training_data.records, [share * c for c in changes])
-            return joint(model, replace(training_data, records=records), LINEARISATIONS, PRECISE).cost
 
-        whole = cost(1.0)
-        return whole < BETTER * cost(0.0) and all(whole < cost(share) for share in OTHER_SHARES)
-    return False
+def _largest(changes: Sequence[Array], floors: Array) -> float:
+    """Largest change of a record in units of its floor, rms."""
+    return max(float(np.sqrt(np.mean(c**2))) / f for c, f in zip(changes, floors, strict=True))
+
+
+def _share(model: Model, training_data: TrainingData, changes: list[Array]) -> float:
+    """Share of the changes that the residual holds beside all that the model can still adjust, by linear estimate."""
+    names = free_numbers(model, training_data)
+    rows = [c[None, :] for c in changes]
+    products = grams(model, training_data.records, names, training_data.nuisance, rows)
+    return float(held_out(products, training_data.floors, directions(model, names, 1)).step[-1])
 
 
 def without_steps(experiment: Experiment, model: Model) -> Experiment:

@@ -28,6 +28,8 @@ FIRST, LATER = 3, 9
 """Linearisations of a refit before the field is thinned out, and after."""
 FEWEST_STARTS = 3
 """Starts of an effect from which all are tried where the likeliest led to no floor."""
+TIE = 0.02
+"""Gain up to which the effect with the fewest numbers is taken."""
 FINER = 0.05
 """Gain from which the finer form of an effect is taken."""
 
@@ -138,7 +140,15 @@ def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
 
 
 def simplest(refits: list[FittedCandidate]) -> FittedCandidate:
-    """The refit with the fewest numbers among those that are as good as the best."""
+    """The refit with the fewest numbers among those that are as good as the best.
+
+    A further number in the law of an effect must gain as much as an effect if the law without it is at the floor.
+    """
     best = refits[0]
-    ties = [c for c in refits if c is best or c.score.cost - best.score.cost < 0.02]
+
+    def is_form(candidate: FittedCandidate) -> bool:
+        alike = candidate.effect.public_name() == best.effect.public_name()
+        return alike and candidate.score.excess <= ADEQUATE
+
+    ties = [c for c in refits if c is best or c.score.cost - best.score.cost < (LEAST_GAIN if is_form(c) else TIE)]
     return min(ties, key=lambda c: (len(c.fit.names), c.score.cost))

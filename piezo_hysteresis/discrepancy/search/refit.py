@@ -19,6 +19,7 @@ from ...identification.steps.modes import identify_modes
 from ...model.model import Model
 from .candidates import Candidate, FittedCandidate, free_numbers, score_model
 from .cross_validation import Score
+from .time_limit import check_time
 from .training_data import TrainingData
 
 LINEAR = ("lag", "dynamics")
@@ -62,7 +63,10 @@ def joint(model: Model, training_data: TrainingData, max_iterations: int, tolera
     ------
     DivergenceError, ParameterError, ModelError, IdentificationError
         As `fit` does.
+    TimeSpentError
+        Where the search has a time limit, which is over.
     """
+    check_time()
     return fit(
         model,
         training_data.records,
@@ -156,6 +160,7 @@ def _behind_anew(
 
     While an effect is still missing, iterations that improve the broadband records may worsen the others.
     """
+    check_time()
     broadband = training_data.broadband()
     if not broadband or not isinstance(model[Arx.name], Arx):
         return None

@@ -6,6 +6,7 @@ Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 20
 from __future__ import annotations
 
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +32,7 @@ from .candidates import Candidate, FittedCandidate, alikeness, screen
 from .cross_validation import ADEQUATE, Score
 from .refit import Fitted, refit, restart, without
 from .selection_result import MANY, Rejection, Selection, Step
+from .time_limit import TimeSpentError
 from .training_data import TrainingData
 
 ALONE = 4.0
@@ -75,21 +77,23 @@ def select(
         Called with a word and the fraction done.
     """
     report = progress or (lambda word, fraction: None)
-    baseline, steps, accepted = model, list[Step](), 0
-    while not _is_enough(score, accepted) and len(steps) < MOST_TURNS and accepted < MOST:
-        step = _turn(model, training_data, score, null, effects, KEEPS[min(accepted, 1)], report)
-        if step is None:
-            break
-        steps.append(step)
-        if step.accepted:
-            model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
-            accepted += 1
-        elif step.renewed is not None:
-            model, score = step.renewed.model, step.renewed.score
-        else:
-            break
-    model, score = _pruned(model, score, steps)
-    return Selection(baseline, model, score, tuple(steps), null)
+    baseline, steps, accepted, in_time = model, list[Step](), 0, False
+    with suppress(TimeSpentError):
+        while not _is_enough(score, accepted) and len(steps) < MOST_TURNS and accepted < MOST:
+            step = _turn(model, training_data, score, null, effects, KEEPS[min(accepted, 1)], report)
+            if step is None:
+                break
+            steps.append(step)
+            if step.accepted:
+                model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
+                accepted += 1
+            elif step.renewed is not None:
+                model, score = step.renewed.model, step.renewed.score
+            else:
+                break
+        model, score = _pruned(model, score, steps)
+        in_time = True
+    return Selection(baseline, model, score, tuple(steps), null, in_time)
 
 
 def _is_enough(score: Score, accepted: int) -> bool:

@@ -79,6 +79,8 @@ class Selection:
         In order; the last may not be accepted.
     null : float
         V that a perfect model would have.
+    in_time : bool
+        False where the time limit ended the search, so that more may be missing.
     """
 
     baseline: Model
@@ -86,6 +88,7 @@ class Selection:
     score: Score
     steps: tuple[Step, ...]
     null: float
+    in_time: bool = True
 
     @property
     def accepted(self) -> tuple[Step, ...]:

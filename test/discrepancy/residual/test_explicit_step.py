@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.residual.explicit_step import KIND, is_stepped, step_changes, without_steps
+from piezo_hysteresis.discrepancy.residual.explicit_step import KIND, explicit_model, step_changes, without_steps
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
-from piezo_hysteresis.effects import Arx, BoucWen, PublishedBoucWen
+from piezo_hysteresis.effects import Arx, AsymmetricHysteresis, BoucWen, HysteresisExponent, PublishedBoucWen
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
@@ -56,8 +56,8 @@ def test_slow_records_have_many_steps_behind_every_sample():
 
 
 def test_data_of_an_explicit_step_are_recognised():
-    assert is_stepped(model(BoucWen), training_data(answered(PublishedBoucWen)))
-    assert not is_stepped(model(BoucWen), training_data(answered(BoucWen)))
+    assert explicit_model(model(BoucWen), training_data(answered(PublishedBoucWen))) is not None
+    assert explicit_model(model(BoucWen), training_data(answered(BoucWen))) is None
 
 
 def test_without_the_steps_the_exact_loop_answers():
@@ -65,3 +65,17 @@ def test_without_the_steps_the_exact_loop_answers():
     assert [n.kind for n in freed.notices] == [KIND]
     for record, expected in zip(freed, model(BoucWen).simulate(list(freed)), strict=True):
         assert np.std(record.displacement - expected) < 1.1 * NOISE
+
+
+def test_the_changes_hold_every_term_of_the_loop():
+    terms = (HysteresisExponent(n=1.6), AsymmetricHysteresis(phi1=0.5, phi2=-0.4))
+    loop = Model((BoucWen(**LOOP), *terms, Arx(a=(), b=(1.0,), delay=1)), FAST, 10.0, 1e-5)
+    jump = Record(10.0 * np.repeat([0.0, 0.05, 0.02], 4), np.zeros(12), FAST)
+    (change,) = step_changes(loop, [jump])
+    first = LOOP["A"] * 0.05  # from h = 0 no loss
+    power = (abs(first) / 0.2) ** 0.6
+    loss = power * (LOOP["beta"] * 0.03 * first - LOOP["gamma"] * 0.03 * abs(first))
+    second = first - LOOP["A"] * 0.03 - loss - 0.5 * 0.03 * first - 0.4 * 0.03 * abs(first)
+    exact = loop.simulate([jump])[0]
+    expected = 1e-5 * (second + LOOP["p1"] * 0.02**3 + LOOP["p2"] * 0.02)
+    assert exact[-1] + change[-1] == pytest.approx(expected, rel=1e-9)
