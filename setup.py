@@ -1,20 +1,29 @@
 """Build script of the ROS 2 package; colcon and pip read it."""
 
+import re
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
 NAME = "piezo_hysteresis"
+HERE = Path(__file__).parent
+README = HERE / "README.md"  # not in the folder in which colcon builds
+SOURCE = (HERE / NAME / "__init__.py").read_text(encoding="utf-8")
+VERSION = re.search(r'^__version__ = "(.+)"$', SOURCE, re.MULTILINE)[1]
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version=VERSION,
     description="Hysteresis and dynamics of piezo-actuated stages: models, identification, live prediction over ROS 2",
+    long_description=README.read_text(encoding="utf-8") if README.exists() else "",
+    long_description_content_type="text/markdown",
     license="Apache-2.0",
+    license_files=["LICENSE"],
     maintainer="piezo_hysteresis maintainers",
     maintainer_email="piezo-hysteresis@users.noreply.github.com",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={f"{NAME}.report": ["page.css", "page.html.jinja"]},
+    package_data={NAME: ["py.typed"], f"{NAME}.report": ["page.css", "page.html.jinja"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -40,10 +49,19 @@ setup(
     extras_require={
         "hardware": ["nidaqmx[grpc]"],
         "labview": ["npTDMS"],
+        "notebook": ["jupyterlab", "jupytext", "pandas", "xarray"],
+        "ros": [
+            "ros-kilted-diagnostic-msgs",
+            "ros-kilted-rclpy",
+            "ros-kilted-rmw-fastrtps-cpp",
+            "ros-kilted-sensor-msgs",
+            "ros-kilted-std-msgs",
+            "ros-kilted-std-srvs",
+        ],
         "test": ["hypothesis", "pytest"],
         "test-hardware": ["nidaqmx[grpc]==1.7.0", "pipython==2.11.0.6"],
     },
-    zip_safe=True,
+    zip_safe=False,
     entry_points={
         "console_scripts": [
             f"driver_node = {NAME}.nodes.start:driver_node",

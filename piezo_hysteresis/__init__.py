@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from .record import Experiment, Record
     from .recording import read
 
+__version__ = "0.1.0"
+"""Version of the package, as in package.xml and CHANGELOG.md."""
+
 _ROOMS = {
     "Experiment": "record",
     "Model": "model.model",

@@ -1,13 +1,17 @@
 """What the package says about itself is true: versions, dependencies, executables, parameter files."""
 
 import ast
+import json
 import re
+import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 import yaml
+
+import piezo_hysteresis
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
@@ -38,7 +42,8 @@ def imported():
 
 def test_versions_agree():
     version = PACKAGE.findtext("version")
-    assert f'version="{version}"' in (ROOT / "setup.py").read_text()
+    assert version == piezo_hysteresis.__version__
+    assert "version=VERSION" in (ROOT / "setup.py").read_text()
     assert f"## {version}" in (ROOT / "CHANGELOG.md").read_text()
 
 
@@ -81,3 +86,49 @@ def test_driver_parameters_in_the_file_are_the_defaults_of_the_table():
     assert set(values) == set(rows)
     for name, value in values.items():
         assert rows[name].check(value) == rows[name].value, name
+
+
+@pytest.mark.parametrize("node", ["driver_node", "model_node", "identification_node", "compensation_node"])
+def test_a_node_without_ros_ends_in_one_line(node):
+    hidden = "import sys; sys.modules['rclpy'] = None; from piezo_hysteresis.nodes import start; "
+    command = [sys.executable, "-c", f"{hidden} sys.exit(start.{node}())"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2
+    assert line.startswith(f"{node}: got no Python package 'rclpy', expected ROS 2")
+
+
+def test_the_command_says_its_version():
+    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "--version"]
+    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=60).stdout
+    assert said == f"piezo_hysteresis {piezo_hysteresis.__version__}\n"
+
+
+def test_the_types_are_for_users_too():
+    assert (ROOT / "piezo_hysteresis" / "py.typed").exists()
+    assert '"py.typed"' in (ROOT / "setup.py").read_text()
+
+
+def test_the_core_needs_no_ros():
+    code = "import sys; sys.modules['rclpy'] = None; import piezo_hysteresis as p; [getattr(p, n) for n in p.__all__]"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, timeout=120)
+
+
+@pytest.mark.soak
+def test_wheel_and_source_distribution_pass_their_check():
+    subprocess.run([ROOT / "scripts" / "dist"], check=True, timeout=1800)
+    (wheel,) = (ROOT / "dist").glob("*.whl")
+    assert wheel.name.startswith(f"piezo_hysteresis-{piezo_hysteresis.__version__}-py3")
+    needed = {part["name"].lower() for part in json.loads((ROOT / "dist" / "sbom.cdx.json").read_text())["components"]}
+    assert {"numpy", "numba", "matplotlib"} <= needed
+    assert not [name for name in needed if name.startswith("ros-")]
+    assert "| numpy" in (ROOT / "dist" / "licences.md").read_text()
+
+
+def test_the_locked_file_has_a_hash_for_everything_that_is_required():
+    text = (ROOT / "requirements-locked.txt").read_text()
+    parts = re.split(r"\n(?=\S)", text.strip())
+    locked = {re.match(r"([\w.-]+)==", part)[1] for part in parts if "--hash=sha256:" in part}
+    assert len(locked) == len(parts)
+    wanted = re.search(r"install_requires=\[(.*?)\]", (ROOT / "setup.py").read_text(), re.DOTALL)
+    assert {name.lower() for name in re.findall(r'"([\w.-]+)"', wanted.group(1))} <= locked

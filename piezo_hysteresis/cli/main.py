@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from .. import __version__
 from ..errors import IdentificationError, PiezoError, printable
 
 COMMANDS = {
@@ -66,6 +67,7 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="piezo", description="Identify models of piezo stages, check them, and find missing physical effects."
     )
+    parser.add_argument("--version", action="version", version=f"piezo_hysteresis {__version__}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
     for name, summary in COMMANDS.items():
         if name == chosen:

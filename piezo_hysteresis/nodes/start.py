@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 import signal
+import sys
 from importlib import import_module
+
+ROS_PACKAGES = (
+    "action_msgs", "ament_index_python", "builtin_interfaces", "diagnostic_msgs", "lifecycle_msgs", "rcl_interfaces",
+    "rclpy", "sensor_msgs", "std_msgs", "std_srvs",
+)  # fmt: skip
+"""Python packages that ROS 2 brings."""
+NO_ROS = 2
+"""Exit status of a node on a computer without ROS 2."""
 
 
 def driver_node() -> int:
@@ -32,6 +41,13 @@ def _run(module: str) -> int:
     except (KeyboardInterrupt, ImportError) as error:
         if _was_interrupted(error):
             return 128 + signal.SIGINT
+        missing = (error.name or "").partition(".")[0] if isinstance(error, ImportError) else ""
+        if missing in ROS_PACKAGES:
+            sys.stderr.write(
+                f"{module.rpartition('.')[2]}: got no Python package '{missing}', expected ROS 2; load its setup.bash, "
+                "or on Linux x86-64 type pip install '.[ros]' in the source folder\n"
+            )
+            return NO_ROS
         raise
 
 
