@@ -12,6 +12,8 @@
     │   ├── DeviceError                          the device itself failed
     │   └── StoppedError                         work on a device was broken off because a stop was asked for
     └── RecordingError        (OSError)          a file that cannot be read or written
+
+`UnknownStateWarning` is the one warning: a simulation that starts from rest although its record does not.
 """
 
 from __future__ import annotations
@@ -96,3 +98,7 @@ class DivergenceError(PiezoError, ArithmeticError):
             "expected a bounded output; check its parameters (stable ARX, beta >= |gamma|) and the drive"
         )
         self.effect, self.sample, self.time = effect, sample, time
+
+
+class UnknownStateWarning(UserWarning):
+    """A simulation that starts from rest although the record does not."""

@@ -225,6 +225,12 @@ class Experiment:
         """Smallest sample period [s]."""
         return min(r.sample_period for r in self.records)
 
+    @property
+    def range(self) -> float:
+        """Peak to peak of the displacement over all records [m]: the 100 % of every percentage."""
+        lowest = min(float(r.displacement.min()) for r in self.records)
+        return max(float(r.displacement.max()) for r in self.records) - lowest
+
     def noting(self, *notices: Notice) -> Experiment:
         """The same records, with more notices."""
         return replace(self, notices=(*self.notices, *notices))

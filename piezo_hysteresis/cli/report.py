@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..identification.fit.normal_equations import Nuisance
+from ..discrepancy.residual.residual import zero_per_phase
 from ..model import model_file
 from ..report.figures.comparison import compare
 from ..report.json_file import read_json
@@ -30,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--answer", metavar="FILE", help="file written by piezo diagnose --json")
     parser.add_argument(
-        "--zero-per-phase", action="store_true", help="estimate the sensor zero in every phase instead of once"
+        "--one-zero", action="store_true", help="one sensor zero for all phases instead of one for each"
     )
     parser.add_argument("--title", default="Piezo stage: model against measurement", help="heading of the page")
     parser.set_defaults(run=run)
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
         models[label if equals else Path(path).stem] = model_file.load(path)
     answer = None if args.answer is None else read_json(args.answer)
     experiment = reading_options.read(args)
-    nuisances = dict.fromkeys(models, Nuisance(offset=True)) if args.zero_per_phase else None
+    nuisances = None if args.one_zero else {label: zero_per_phase(model) for label, model in models.items()}
     with progress("report") as report_progress:
         drawn = page(compare(experiment, models, nuisances), answer=answer, title=args.title, progress=report_progress)
     path = Path(args.output).expanduser()

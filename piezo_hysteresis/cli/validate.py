@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..discrepancy.residual.correlation import CAPTION, correlate
+from ..discrepancy.residual.residual import zero_per_phase
 from ..errors import RecordError
-from ..identification.fit.normal_equations import Nuisance
 from ..identification.records.conditioning_split import known_from_within
 from ..model import model_file
 from ..report.figures.comparison import ModelComparison, compare
@@ -25,7 +25,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("model", metavar="MODEL", help="model file")
     reading_options.add_arguments(parser)
     parser.add_argument(
-        "--zero-per-phase", action="store_true", help="estimate the sensor zero in every phase instead of once"
+        "--one-zero", action="store_true", help="one sensor zero for all phases instead of one for each"
     )
     parser.add_argument("--figures", metavar="FOLDER", help="folder for the figures and their data")
     parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     """
     model = model_file.load(args.model)
     experiment, conditioned = known_from_within(reading_options.read(args))
-    nuisances = {"error": Nuisance(offset=True)} if args.zero_per_phase else None
+    nuisances = None if args.one_zero else {"error": zero_per_phase(model)}
     comparison = compare(experiment, {"error": model}, nuisances)
     tests = _tests(comparison)
     if args.json is not None:

@@ -44,7 +44,7 @@ class PhaseError:
     is_fitted: bool
 
 
-def phase_errors(model: Model, experiment: Experiment, roles: Roles, reach: float) -> tuple[PhaseError, ...]:
+def phase_errors(model: Model, experiment: Experiment, roles: Roles) -> tuple[PhaseError, ...]:
     """Free-run errors of the records that were fitted, then of those held out.
 
     Parameters
@@ -53,13 +53,11 @@ def phase_errors(model: Model, experiment: Experiment, roles: Roles, reach: floa
     experiment : Experiment
     roles : Roles
         Which records were fitted.
-    reach : float
-        Range of the displacement of the experiment [m].
     """
     errors = residuals(model, experiment.records, Nuisance(offset=True))
     rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
     return tuple(
-        PhaseError(experiment[i].phase, rms[i], 100.0 * rms[i] / reach, i in roles.fitted)
+        PhaseError(experiment[i].phase, rms[i], 100.0 * rms[i] / experiment.range, i in roles.fitted)
         for i in (*roles.fitted, *roles.held_out)
     )
 

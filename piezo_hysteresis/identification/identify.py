@@ -176,7 +176,7 @@ def identify(
     if not roles.broadband:
         notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted])
     report("free run", 0.95)
-    phases = phase_errors(joint.model, experiment, roles, reach)
+    phases = phase_errors(joint.model, experiment, roles)
     zero = float(np.mean([e.mean() for e in residuals(joint.model, records)]))
     joint = replace(joint, model=joint.model.with_effect(Offset(y0=zero)))
     if not joint.converged:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+import warnings
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..effects import CHAIN, Discretisation, Effect, HysteresisOperator, Offset
-from ..errors import ModelError
+from ..errors import ModelError, UnknownStateWarning
 from ..parameter import Parameter, Value
 from ..record import Record
 from .chain import Chain, ChainState, Channels
 from .free_run import free_run, linearised_run
-from .samples import row
+from .samples import row, samples
 
 Array = NDArray[np.float64]
+
+
+def _is_voltage(given: object) -> bool:
+    return isinstance(given, np.ndarray) or (isinstance(given, list | tuple) and all(np.isscalar(x) for x in given[:1]))
 
 
 def _place(effect: Effect) -> tuple[int, int]:
@@ -197,13 +203,63 @@ class Model:
         """
         return self.at(self.sample_period).run(row(voltage, "voltage"), state, channels)
 
-    def simulate(self, records: Record | Iterable[Record]) -> list[Array]:
-        """Free-run displacement [m] of every record, each at its own sample period.
+    @overload
+    def simulate(self, records: Record | Iterable[Record], phase: str | None = None) -> list[Array]: ...
+
+    @overload
+    def simulate(self, records: Array | Sequence[float]) -> Array: ...
+
+    def simulate(
+        self, records: Record | Iterable[Record] | Array | Sequence[float], phase: str | None = None
+    ) -> list[Array] | Array:
+        """Free-run displacement [m] of every record, each at its own sample period; or of a voltage from rest.
 
         A record starts from a stage at rest at its `settled_voltage`, unless it continues the one before it; between
         two that continue, the last voltage was held.
+
+        Parameters
+        ----------
+        records : Record, iterable of Record, or (n,) array_like
+            Give the whole experiment and `phase`, so that the state is carried into the records of that phase. An array
+            is a drive voltage [V] at the model's sample period, of a stage settled at its first value.
+        phase : str, optional
+            Return only records whose phase name is, or begins with, `phase`, as `Experiment.named`.
+
+        Returns
+        -------
+        list of (n,) ndarray, or (n,) ndarray for an array
+
+        Raises
+        ------
+        ModelError
+            If there is no such phase, or a record is faster than the model.
+
+        Warns
+        -----
+        UnknownStateWarning
+            If the first record continues one that is not given: it was simulated from rest, and is wrong at first.
         """
-        return free_run(self, [records] if isinstance(records, Record) else records)
+        if _is_voltage(records):
+            voltage = samples(cast(Array, records), "voltage")
+            return self.run(voltage, self.rest(voltage[0]))[0]
+        given = [records] if isinstance(records, Record) else list(cast(Iterable[Record], records))
+        wanted = [i for i, r in enumerate(given) if phase is None or phase in (r.phase, r.phase.split("_")[0])]
+        if not wanted:
+            held = ", ".join(dict.fromkeys(r.phase for r in given)) or "no record"
+            raise ModelError(f"phase: got {phase!r}, expected one of {held}")
+        if given[0].continues or given[0].truncated:
+            warnings.warn(
+                f"record '{given[0].phase}' continues one that was not given; it is simulated from rest at "
+                f"{given[0].settled_voltage:g} V and is wrong at first; give the whole experiment and phase='…'",
+                UnknownStateWarning,
+                stacklevel=2,
+            )
+        outputs = self.free_run(given)
+        return [outputs[i] for i in wanted]
+
+    def free_run(self, records: Iterable[Record]) -> list[Array]:
+        """As `simulate`, of any records, without a word about where the first one begins."""
+        return free_run(self, records)
 
     def linearise(
         self, records: Iterable[Record], wanted: Collection[str], block: int = 8192
@@ -232,6 +288,6 @@ class Model:
 
     def contributions(self, record: Record) -> dict[str, Array]:
         """How much each effect beyond hysteresis, dynamics and offset adds to the displacement [m], shape (n,)."""
-        (whole,) = self.simulate(record)
+        (whole,) = self.free_run([record])
         core = {e.name for e in self.effects if not any(p.off is not None for p in e.parameters)} | {Offset.name}
-        return {e.name: whole - self.without(e.name).simulate(record)[0] for e in self.effects if e.name not in core}
+        return {e.name: whole - self.without(e.name).free_run([record])[0] for e in self.effects if e.name not in core}

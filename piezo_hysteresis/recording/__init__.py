@@ -122,6 +122,7 @@ def _one(place: Path, chosen: Format, options: ReadOptions) -> Experiment:
     records = experiment.records
     if records[0].continues:  # what it continues is not here
         records = (replace(records[0], continues=False, truncated=True), *records[1:])
+        experiment = experiment.noting(Notice("truncated", _CONTINUES, records[0].phase))
     if options.initial_voltage is not None:
         settled = options.initial_voltage
         records = tuple(r if r.continues or r.truncated else replace(r, initial_voltage=settled) for r in records)
@@ -163,6 +164,11 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
 
 _WITHIN = "begins on a branch of its loop: what came before is not recorded; a settled stage needs `initial_voltage`"
 """Message of a record that begins in motion on its loop."""
+_CONTINUES = (
+    "continues a phase that was not read: its initial state is unknown, and a simulation is wrong at first; read the "
+    "whole experiment"
+)
+"""Message of a first record that continues one which is not there."""
 _IN_MOTION = "{phases}: the first sample lies on a ramp from {levels}, taken as where the stage had settled"
 """Message of records that begin on a ramp."""
 _BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,7 @@ from piezo_hysteresis.effects import (
     ThermalDrift,
     effect_named,
 )
-from piezo_hysteresis.errors import ModelError, ParameterError
+from piezo_hysteresis.errors import ModelError, ParameterError, UnknownStateWarning
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -112,3 +114,23 @@ def test_creep_goes_on_between_records_that_continue() -> None:
     (_, _, y, _, (slope,)), *_ = list(model.linearise(parts, ["creep.gamma"]))[1:]
     np.testing.assert_array_equal(y, behind)
     np.testing.assert_allclose(slope, model.sensitivities(whole, ["creep.gamma"])[1]["creep.gamma"][5000:], rtol=1e-3)
+
+
+def test_a_part_of_an_experiment_carries_the_state_or_says_that_it_cannot():
+    whole = Record(5.0 - 5.0 * np.cos(np.arange(3000.0) / 300.0), np.zeros(3000), PERIOD, phase="triangle")
+    first, second = whole.split(1500)
+    second = replace(second, phase="validation")
+    (carried,) = MODEL.simulate([first, second], phase="validation")
+    np.testing.assert_array_equal(carried, MODEL.simulate(whole)[0][1500:])
+    with pytest.warns(UnknownStateWarning, match="'validation' continues one that was not given"):
+        (alone,) = MODEL.simulate(second)
+    assert np.ptp(alone - carried) > 1e-9
+    with pytest.raises(ModelError, match="expected one of triangle, validation"):
+        MODEL.simulate([first, second], phase="sine")
+
+
+def test_simulate_takes_a_voltage():
+    drive = 5.0 - 5.0 * np.cos(np.arange(300.0) / 30.0)
+    expected = MODEL.simulate(Record(drive, drive, MODEL.sample_period))[0]
+    np.testing.assert_array_equal(MODEL.simulate(drive), expected)
+    np.testing.assert_array_equal(MODEL.simulate(drive.tolist()), expected)

@@ -113,7 +113,7 @@ def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
     """
     loop = ExplicitBoucWen(**model[BoucWen.name].values)
     explicit = replace(model, effects=tuple(loop if e.name == BoucWen.name else e for e in model.effects))
-    pairs = zip(records, model.simulate(records), explicit.simulate(records), strict=True)
+    pairs = zip(records, model.free_run(records), explicit.free_run(records), strict=True)
     own = 1.001 * model.sample_period
     return [b - a if r.sample_period < own else np.zeros(r.size) for r, a, b in pairs]
 

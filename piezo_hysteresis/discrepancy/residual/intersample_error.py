@@ -50,11 +50,11 @@ def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
     """
     most = [min(PARTS, 2 * int(0.5005 * r.sample_period / model.sample_period)) for r in records]
     parts = [n if n > 1 and _turns_sharply(r) else 1 for r, n in zip(records, most, strict=True)]
-    straight = model.simulate(records)
+    straight = model.free_run(records)
     changes = []
     for abrupt in (False, True):
         sharp = [_sharpened(r, n, abrupt) if n > 1 else r for r, n in zip(records, parts, strict=True)]
-        pairs = zip(straight, model.simulate(sharp), strict=True)
+        pairs = zip(straight, model.free_run(sharp), strict=True)
         changes.append([y.reshape(x.size, -1).mean(axis=1) - x for x, y in pairs])
     off = [r.displacement - y for r, y in zip(records, straight, strict=True)]
     return [_better(e, a, b) for e, a, b in zip(off, *changes, strict=True)]

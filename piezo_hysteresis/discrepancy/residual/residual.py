@@ -7,7 +7,7 @@ of the measured displacement over the whole experiment. The paper's Table 1 uses
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,7 +161,7 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
             f"displacement is {experiment[0].displacement[0]:g} m in every sample, expected a stage that moves; "
             "check the sensor and its column"
         )
-    free_run = model.simulate(experiment)
+    free_run = model.free_run(experiment)
     if nuisance is None:
         means = np.array([np.mean(r.displacement - y) for r, y in zip(experiment, free_run, strict=True)])
         known = np.array([_has_known_start(r) for r in experiment])
@@ -179,6 +179,11 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
 def hum_of(model: Model) -> Nuisance:
     """The mains hum of a model, free in every record: nothing where the model has none."""
     return Nuisance(hum_frequency=model[MainsHum.name]["f"] if MainsHum.name in model else None)
+
+
+def zero_per_phase(model: Model) -> Nuisance:
+    """A zero of the sensor in every record, as in `identify`, and the hum of a model that has some."""
+    return replace(hum_of(model), offset=True)
 
 
 def _with_nuisance(record: Record, y: Array, nuisance: Nuisance) -> Array:

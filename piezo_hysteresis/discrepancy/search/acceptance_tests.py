@@ -130,8 +130,8 @@ def is_seen(candidate: FittedCandidate) -> bool:
     """
     training_data, model = candidate.training_data, candidate.fit.model
     with_it, without_it = (
-        model.simulate(training_data.records),
-        model.without(candidate.name).simulate(training_data.records),
+        model.free_run(training_data.records),
+        model.without(candidate.name).free_run(training_data.records),
     )
     changes = [first - second for first, second in zip(with_it, without_it, strict=True)]
     counted = [(c, floor) for c, floor in zip(changes, training_data.floors, strict=True) if np.isfinite(floor)]

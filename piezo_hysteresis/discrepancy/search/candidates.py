@@ -173,11 +173,11 @@ def _screen_off(model: Model, training_data: TrainingData, base: list[str], memb
 
 
 def _screen_moves(model: Model, training_data: TrainingData, base: list[str], moves: list[Effect]) -> list[Candidate]:
-    now = model.simulate(training_data.records)
+    now = model.free_run(training_data.records)
     usable, rows = [], []
     for effect in moves:
         try:
-            then = model.with_effect(effect).simulate(training_data.records)
+            then = model.with_effect(effect).free_run(training_data.records)
         except (DivergenceError, ParameterError, ModelError):
             continue
         usable.append(effect)
@@ -203,11 +203,11 @@ def alikeness(first: FittedCandidate, second: FittedCandidate, model: Model) -> 
     """
     training_data = first.training_data
     base = free_numbers(model, training_data)
-    now = model.simulate(training_data.records)
+    now = model.free_run(training_data.records)
     changes = []
     for candidate in (first, second):
         part = candidate.fit.model
-        changes.append([a - b for a, b in zip(part.simulate(training_data.records), now, strict=True)])
+        changes.append([a - b for a, b in zip(part.free_run(training_data.records), now, strict=True)])
     extra = [np.array([c[i] for c in changes]) for i in range(len(training_data.records))]
     products = grams(model, training_data.records, base, training_data.nuisance, extra)
     total = weighted_sum(products, training_data.floors)

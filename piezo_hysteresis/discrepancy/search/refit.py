@@ -220,7 +220,7 @@ def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Mod
     if not broadband or not isinstance(model[Arx.name], Arx):
         return None
     inputs = hysteresis_signals(model, training_data.records, broadband)
-    outputs = extended.simulate(training_data.records)
+    outputs = extended.free_run(training_data.records)
     signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
     try:
         found = identify_arx(signals, *form_of(model), ITERATIONS)

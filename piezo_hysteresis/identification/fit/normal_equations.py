@@ -137,7 +137,7 @@ def residuals(model: Model, records: Sequence[Record], nuisance: Nuisance | None
     """Measured minus free-run displacement of every record [m], nuisances removed."""
     nuisance = nuisance or Nuisance()
     result = []
-    for record, y in zip(records, model.simulate(records), strict=True):
+    for record, y in zip(records, model.free_run(records), strict=True):
         residual = record.displacement - y
         rows = nuisance.rows(record, slice(0, record.size))
         if len(rows):

@@ -31,7 +31,7 @@ def ringing_frequency(model: Model, pieces: Sequence[RecordPiece]) -> float | No
     if not any(steps):
         return None
     best: tuple[float, float] | None = None
-    for y, piece, wanted in zip(model.simulate([p.record for p in pieces]), pieces, steps, strict=True):
+    for y, piece, wanted in zip(model.free_run([p.record for p in pieces]), pieces, steps, strict=True):
         if not wanted:
             continue
         e = piece.record.displacement - y
