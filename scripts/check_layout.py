@@ -22,6 +22,7 @@ MOST_MODULES = 16
 MOST_LINES = 260
 """Lines of a module of the package at most."""
 LONGER = {
+    "piezo_hysteresis/model/model.py": 275,
     "piezo_hysteresis/online/predictor.py": 275,
     "piezo_hysteresis/record.py": 270,
     "piezo_hysteresis/recording/bag/rosbag2.py": 270,

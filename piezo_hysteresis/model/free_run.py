@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ModelError, UnknownStateWarning
 from ..record import Record
 from .chain import Chain, ChainState, ChainTangent
+from .samples import samples
 
 if TYPE_CHECKING:
     from .model import Model
@@ -35,6 +38,33 @@ def free_run(model: Model, records: Iterable[Record]) -> list[Array]:
         if index is not None:
             outputs.append(y)
     return outputs
+
+
+def simulated(
+    model: Model, given: Record | Iterable[Record] | Array | Sequence[float], phase: str | None
+) -> list[Array] | Array:
+    """What `Model.simulate` returns: displacement [m] of the records of one phase, or of a voltage from rest."""
+    if _is_voltage(given):
+        voltage = samples(cast(Array, given), "voltage")
+        return model.run(voltage, model.rest(voltage[0]))[0]
+    records = [given] if isinstance(given, Record) else list(cast(Iterable[Record], given))
+    wanted = [i for i, r in enumerate(records) if phase is None or phase in (r.phase, r.phase.split("_")[0])]
+    if phase is not None and not wanted:
+        held = ", ".join(dict.fromkeys(r.phase for r in records)) or "no record"
+        raise ModelError(f"phase: got {phase!r}, expected one of {held}")
+    if records and (records[0].continues or records[0].truncated):
+        warnings.warn(
+            f"record '{records[0].phase}' continues one that was not given; it is simulated from rest at "
+            f"{records[0].settled_voltage:g} V and is wrong at first; give the whole experiment and phase='…'",
+            UnknownStateWarning,
+            stacklevel=3,
+        )
+    outputs = free_run(model, records)
+    return [outputs[i] for i in wanted]
+
+
+def _is_voltage(given: object) -> bool:
+    return isinstance(given, np.ndarray) or (isinstance(given, list | tuple) and all(np.isscalar(x) for x in given[:1]))
 
 
 def linearised_run(

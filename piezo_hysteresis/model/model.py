@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import cast, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..effects import CHAIN, Discretisation, Effect, HysteresisOperator, Offset
-from ..errors import ModelError, UnknownStateWarning
+from ..errors import ModelError
 from ..parameter import Parameter, Value
 from ..record import Record
 from .chain import Chain, ChainState, Channels
-from .free_run import free_run, linearised_run
-from .samples import row, samples
+from .free_run import free_run, linearised_run, simulated
+from .samples import row
 
 Array = NDArray[np.float64]
-
-
-def _is_voltage(given: object) -> bool:
-    return isinstance(given, np.ndarray) or (isinstance(given, list | tuple) and all(np.isscalar(x) for x in given[:1]))
 
 
 def _place(effect: Effect) -> tuple[int, int]:
@@ -214,8 +209,7 @@ class Model:
     ) -> list[Array] | Array:
         """Free-run displacement [m] of every record, each at its own sample period; or of a voltage from rest.
 
-        A record starts from a stage at rest at its `settled_voltage`, unless it continues the one before it; between
-        two that continue, the last voltage was held.
+        A record starts at rest at its `settled_voltage`, unless it continues the one before it.
 
         Parameters
         ----------
@@ -239,23 +233,7 @@ class Model:
         UnknownStateWarning
             If the first record continues one that is not given: it was simulated from rest, and is wrong at first.
         """
-        if _is_voltage(records):
-            voltage = samples(cast(Array, records), "voltage")
-            return self.run(voltage, self.rest(voltage[0]))[0]
-        given = [records] if isinstance(records, Record) else list(cast(Iterable[Record], records))
-        wanted = [i for i, r in enumerate(given) if phase is None or phase in (r.phase, r.phase.split("_")[0])]
-        if not wanted:
-            held = ", ".join(dict.fromkeys(r.phase for r in given)) or "no record"
-            raise ModelError(f"phase: got {phase!r}, expected one of {held}")
-        if given[0].continues or given[0].truncated:
-            warnings.warn(
-                f"record '{given[0].phase}' continues one that was not given; it is simulated from rest at "
-                f"{given[0].settled_voltage:g} V and is wrong at first; give the whole experiment and phase='…'",
-                UnknownStateWarning,
-                stacklevel=2,
-            )
-        outputs = self.free_run(given)
-        return [outputs[i] for i in wanted]
+        return simulated(self, records, phase)
 
     def free_run(self, records: Iterable[Record]) -> list[Array]:
         """As `simulate`, of any records, without a word about where the first one begins."""
