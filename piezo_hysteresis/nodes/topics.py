@@ -87,6 +87,9 @@ class Topic:
         return QoSProfile(depth=DEEP.depth, reliability=self.quality.reliability, durability=self.quality.durability)
 
 
+QOS_OVERRIDES = "qos_overrides."
+"""Beginning of the names of the parameters that change quality of service."""
+
 DIAGNOSTICS = "/diagnostics"
 """Topic of the health of all nodes of a system."""
 

@@ -27,7 +27,7 @@ from ..runtime.guarded_node import GuardedNode
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..runtime.sending import send
-from ..topics import advertise
+from ..topics import QOS_OVERRIDES, advertise
 from .driver_client import DriverClient
 from .fit_process import FitProcess, Job, diagnosis, identification
 from .protocol_runner import Progress, run_protocol
@@ -232,6 +232,8 @@ class IdentificationNode(GuardedNode):
                     self._check_place(parameter)
                 elif parameter.name == "use_sim_time":
                     raise ParameterError(f"{parameter.name} is read at start; give it then")
+                elif parameter.name.startswith(QOS_OVERRIDES):
+                    continue  # declared when a recording subscribes, which is after the start
                 elif not (parameter.name.startswith(PREFIX) or self.has_parameter(parameter.name)):
                     raise ParameterError(f"{parameter.name} is no parameter of this node, expected {', '.join(rows)}")
         except PiezoError as error:
