@@ -12,7 +12,8 @@ from ..effects import Effect
 from ..errors import IdentificationError
 from ..identification.fit.fit import Progress
 from ..identification.fit.normal_equations import residuals
-from ..identification.records.roles import CARRYING
+from ..identification.records.conditioning_split import known_from_within
+from ..identification.records.roles import CARRYING, roles_of
 from ..model.model import Model
 from ..record import Experiment, Notice
 from .changes.same_stage import same_stage
@@ -75,7 +76,8 @@ class DiagnosisState:
     @property
     def usable(self) -> list[int]:
         """Indices of the records that may be compared with a model."""
-        return [i for i, r in enumerate(self.experiment) if r.phase not in IDLE and not r.truncated]
+        informative = [i for i, r in enumerate(self.experiment) if r.phase not in IDLE]
+        return [i for i in informative if not self.experiment[i].truncated] or informative
 
     @property
     def moving(self) -> list[int]:
@@ -120,6 +122,12 @@ def quiet_voltage(state: DiagnosisState) -> DiagnosisState:
     return replace(state, experiment=replace(experiment, records=records).noting(Notice(VOLTAGE_NOISE, message)))
 
 
+def carry_lead_in(state: DiagnosisState) -> DiagnosisState:
+    """Cut records that begin in an unknown state where a full loop makes it known, as `identify` does."""
+    experiment, notices = known_from_within(state.experiment)
+    return replace(state, experiment=experiment.noting(*notices)) if notices else state
+
+
 def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
     """Ends with "unknown" where the data are damaged.
 
@@ -147,10 +155,12 @@ def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosi
 
 
 def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:
-    """Ends with a model but no name where there are too few records to tell effects apart."""
-    if len(state.moving) >= FEWEST:
+    """Ends where records are few, or none is broadband: with what the choice of the structure decides."""
+    needs_structure = state.model is None and not roles_of(state.experiment).broadband
+    if len(state.moving) >= FEWEST and not needs_structure:
         return state
-    return diagnose_few(state.experiment, state.model, state.moving, state.effects, state.progress)
+    with ending_at(state.end):
+        return diagnose_few(state.experiment, state.model, state.moving, state.effects, state.progress)
 
 
 def fit_baseline(state: DiagnosisState) -> DiagnosisState:
@@ -216,6 +226,7 @@ def conclude(state: DiagnosisState) -> Diagnosis:
 
 PASSES: tuple[Pass, ...] = (
     quiet_voltage,
+    carry_lead_in,
     check_data,
     compare_with_given_model,
     answer_few_records,

@@ -17,6 +17,7 @@ from .steps.delay import Delay
 from .steps.dynamics import Dynamics
 from .steps.order_choice import OrderError
 from .steps.three_steps import ThreeSteps
+from .structure.structure_choice import StructureChoice
 
 CORRELATED = 0.95
 """Correlation from which two numbers are reported to be hard to separate."""
@@ -86,6 +87,8 @@ class Identification:
         Free-run error of every record.
     notices : tuple of Notice
         Warnings as data.
+    structure : StructureChoice or None
+        How the structure was chosen; None where it was not.
     """
 
     model: Model
@@ -97,6 +100,7 @@ class Identification:
     comparisons: tuple[InputComparison, ...]
     phases: tuple[PhaseError, ...]
     notices: tuple[Notice, ...]
+    structure: StructureChoice | None = None
 
     @property
     def judged(self) -> tuple[PhaseError, ...]:

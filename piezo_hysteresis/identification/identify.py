@@ -34,7 +34,7 @@ from .steps.linear_start import dynamics_of, hysteresis_signals
 from .steps.order_choice import OrderError, choose_order, compare_orders
 from .steps.remaining_lag import lag_notices
 from .steps.three_steps import ThreeSteps, named, three_steps
-from .structure.structure_choice import choose_structure
+from .structure.structure_choice import StructureChoice, choose_structure
 
 ADEQUATE = 3e-4
 """Share of the range below which a residual does not decide: no lab needs better."""
@@ -129,6 +129,7 @@ def identify(
     dynamics: Dynamics | None = None
     table: tuple[OrderError, ...] = ()
     comparisons: tuple[InputComparison, ...] = ()
+    structure: StructureChoice | None = None
     if roles.broadband:
         report("step 2: dynamics", 0.2)
         signals = hysteresis_signals(start, records, roles.broadband)
@@ -164,7 +165,7 @@ def identify(
         choice = choose_structure(
             start, records, quiet, roles.fitted, lambda word, part: report(word, 0.2 + 0.7 * part)
         )
-        joint = choice.fit
+        joint, structure = choice.fit, choice
         notices += choice.notices
     else:
         report("joint fit", 0.3)
@@ -193,7 +194,9 @@ def identify(
                 "all records were fitted, so that the errors are not prediction errors; hold out a phase to get them",
             )
         )
-    found = Identification(joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices))
+    found = Identification(
+        joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices), structure
+    )
     origin = provenance(experiment, found.free_run_error, found.free_run_percent)
     return replace(found, model=replace(joint.model, provenance=origin))
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 from ...effects import HYSTERESIS, Arx, Offset
 from ...errors import IdentificationError
 from ...identification.identify import identify
-from ...identification.records.roles import Roles, roles_of
+from ...identification.records.roles import CARRYING, Roles, roles_of
 from ...identification.steps.delay import identify_delay
 from ...identification.steps.dynamics import delay_of
 from ...identification.steps.hysteresis import fit_hysteresis
@@ -56,7 +57,7 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     loops = [i for i in roles.loops if i in fitted]
     broadband, moving = _telling_dynamics(roles, fitted, at_full_rate)
     if not loops or not broadband:
-        yield identify(Experiment(experiment.records[: max(fitted) + 1]), held_out=("validation",)).model
+        yield identify(_fitted_only(experiment, fitted)).model
         return
     fast = [records[i] for i in at_full_rate]
     try:
@@ -94,10 +95,18 @@ def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int
     """
     experiment = Experiment(tuple(records))
     broadband, moving = _telling_dynamics(roles_of(experiment), fitted, _at_full_rate(experiment, fitted))
+    if not broadband:
+        return
     for chosen in (broadband, moving) if moving != broadband else (broadband,):
         with suppress(IdentificationError):
             signals = hysteresis_signals(model, records, chosen)
             yield with_dynamics(model, identify_modes(signals, *form_of(model), ITERATIONS).arx)
+
+
+def _fitted_only(experiment: Experiment, fitted: Collection[int]) -> Experiment:
+    """The records up to the last that is fitted; the others among them only carry the state of the stage."""
+    records = enumerate(experiment.records[: max(fitted) + 1])
+    return Experiment(tuple(r if i in fitted else replace(r, phase=CARRYING[0]) for i, r in records))
 
 
 def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:
@@ -107,9 +116,9 @@ def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:
 def _telling_dynamics(
     roles: Roles, fitted: Collection[int], at_full_rate: Collection[int]
 ) -> tuple[list[int], list[int]]:
-    """Broadband records, and all at the full rate that move; many sines also determine the dynamics."""
-    moving = [i for i in at_full_rate if not roles.contents[i].is_slow]
-    return [i for i in roles.broadband if i in fitted] or moving, moving
+    """Broadband records, and beside them all at the full rate that move; sines alone determine no dynamics."""
+    broadband = [i for i in roles.broadband if i in fitted]
+    return broadband, [i for i in at_full_rate if broadband and not roles.contents[i].is_slow]
 
 
 def _with_dynamics(

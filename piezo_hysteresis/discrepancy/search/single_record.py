@@ -1,35 +1,45 @@
-"""Diagnosis of few records, or of one: the model that predicts best, without a name.
+"""Diagnosis of few records, or of records without a broadband one: from the best model that `identify` finds.
 
-Records that are cut into blocks show what keeps from one block to the next, and a model may be chosen by that. They do
-not show what a missing effect does under another drive, so none is named with confidence.
+The published model stays the baseline that measures the gap. The structure that predicts what was left out is where
+the search begins, and the least that is delivered. What it needs to predict other rates and amplitudes is named.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...effects import Effect, HysteresisMemory
-from ...identification.fit.fit import Progress
+from ...effects import Effect
+from ...errors import PiezoError
+from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.normal_equations import Nuisance, residuals
+from ...identification.identification import Identification
 from ...identification.identify import identify
 from ...identification.records.leading_step import step_length
+from ...identification.records.roles import CARRYING
+from ...identification.structure.left_out import has_several_drives, score_left_out
 from ...model.model import Model
-from ...record import Experiment, Record
+from ...model.provenance import provenance
+from ...record import Experiment, Notice, Record
 from ..diagnosis import Diagnosis, Verdict
 from ..excitation_check import missing_excitation
-from ..gap import measure_gap, stating
+from ..gap import Gap, measure_gap, stating
 from ..next_experiment import decide
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
+from ..residual.sampling import shortened
+from ..verdict import FEWEST as FEWEST_RECORDS
+from ..verdict import NAMED, verdict_of
 from .baseline import with_zero
-from .candidates import FittedCandidate, loop_is_off, score_model
-from .cross_validation import ADEQUATE
+from .candidates import loop_is_off, score_model
+from .cross_validation import ADEQUATE, Score
 from .refit import joint
 from .selection import select
 from .selection_result import Selection, Step, explained
+from .structure_steps import structure_steps
+from .test_records import reporting
 from .training_data import TrainingData, extent_of
 
 BLOCKS = 16
@@ -38,6 +48,19 @@ FEWEST = 256
 """Samples of a block at least."""
 LAST, PRECISE = 25, 1e-6
 """Linearisations of a fit, and relative decrease of the cost at which it has converged."""
+SEARCHED = 20_000
+"""Samples of a slow record that take part in the search."""
+EXTENDS = 0.1
+"""Gain on rates, amplitudes and records left out (mean ln R²) from which an extended model is delivered."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Delivered:
+    """The model that is written, its fit, and what is free per record under it."""
+
+    model: Model
+    fit: Fit | None
+    nuisance: Nuisance
 
 
 def diagnose_few(
@@ -47,7 +70,7 @@ def diagnose_few(
     effects: Collection[type[Effect]],
     progress: Progress,
 ) -> Diagnosis:
-    """Extend the model as far as blocks left out ask for it; the verdict is always unknown.
+    """Extend the best model as far as what is left out asks for it, and name what is decided.
 
     Parameters
     ----------
@@ -63,50 +86,126 @@ def diagnose_few(
         Called with a word and the fraction done.
     """
     records = experiment.records
-    known = Experiment(records, experiment.source)
+    aside = reporting(records, used) if len(used) >= FEWEST_RECORDS else ()
+    fitted = [i for i in used if i not in aside]
+    known = _without(experiment, aside)
     progress("baseline", 0.0)
-    state = model or identify(known, progress=lambda word, part: progress(word, 0.2 * part)).model
-    start = model or identify(known, memory=True, progress=lambda word, part: progress(word, 0.2 + 0.2 * part)).model
+    published = model or identify(known, progress=lambda word, part: progress(word, 0.15 * part)).model
+    found = None
+    if model is None:
+        found = identify(known, memory=True, progress=lambda word, part: progress(word, 0.15 + 0.35 * part))
+    start = model or (found.model if found else published)
     noise = noise_floors(records)
     least = floors(records, noise)
-    blocks, origin = blocks_of(records, used)
+    short = shortened(records, SEARCHED)
+    training_data = _training_data(short, fitted, least.tolist(), start)
+    null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
+    baseline = joint(with_zero(published), training_data, LAST, PRECISE)
+    before = score_model(baseline.model, training_data)
+    progress("where", 0.5)
+    left = residuals(baseline.model, records, Nuisance(offset=True))
+    where = localise([records[i] for i in fitted], [left[i] for i in fitted], [least[i] for i in fitted])
+
+    steps: list[Step] = []
+    now, score = (found.fit, score_model(start, training_data)) if found else (baseline, before)
+    if found and found.structure and before.excess > ADEQUATE and has_several_drives(records, fitted):
+        steps = structure_steps(found, before, training_data, short, least.tolist(), fitted)
+    fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
+    more = select(now.model, training_data, score, null, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part))
+    final, accepted = _delivered(more, now, model, found, records, least.tolist(), fitted)
+    further = more.steps if accepted else tuple(replace(s, accepted=False) for s in more.steps)
+    reached = more.score if accepted else score
+    selection = Selection(baseline.model, final.model, reached, (*steps, *further), null)
+
+    progress("gap", 0.9)
+    chosen = sorted(aside or fitted)
+    free = Nuisance(offset=True), replace(final.nuisance, offset=True)
+    models = baseline.model, final.model
+    gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), free, bool(aside))
+    missing = missing_excitation([records[i] for i in used])
+    verdict, reason = _verdict(selection, steps, before, gap, len(used), missing)
+    delivered = replace(final.model, provenance={**final.model.provenance, **provenance(experiment, 0.0, 0.0)})
+    return Diagnosis(
+        verdict=verdict,
+        reason=reason,
+        model=stating(delivered, gap.live, stroke(records)),
+        baseline=stating(baseline.model, gap.before, stroke(records)),
+        selection=selection,
+        fit=final.fit,
+        where=where,
+        gap=gap,
+        next_experiment=decide(selection, training_data),
+        experiment=experiment.noting(*missing),
+    )
+
+
+def _without(experiment: Experiment, aside: Collection[int]) -> Experiment:
+    """The experiment in which the records set aside only carry the state of the stage."""
+    records = tuple(replace(r, phase=CARRYING[0]) if i in aside else r for i, r in enumerate(experiment.records))
+    return Experiment(records, experiment.source)
+
+
+def _training_data(
+    records: Sequence[Record], fitted: Collection[int], least: Sequence[float], model: Model
+) -> TrainingData:
+    blocks, origin = blocks_of(records, fitted)
     weights = np.array([np.inf if k is None else least[k] for k in origin])
     runs = sum(not r.continues for r in records)
     jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
-    span = extent_of([records[i] for i in used], start)
-    training_data = TrainingData(tuple(blocks), weights, Nuisance(offset=runs > 1), span, jumps)
-    null = float(np.mean([(noise[i] / least[i]) ** 2 for i in used]))
-    baseline = joint(with_zero(state), training_data, LAST, PRECISE)
-    before = score_model(baseline.model, training_data)
-    steps: list[Step] = []
-    now, score = baseline, before
-    if HysteresisMemory.name in start and HysteresisMemory.name not in state:
-        now = joint(with_zero(start), training_data, LAST, PRECISE)
-        score = score_model(now.model, training_data)
-        memory = FittedCandidate(now.model[HysteresisMemory.name], training_data, score, now)
-        steps.append(Step(before, memory, True, (), ()))
-    progress("where", 0.45)
-    left = residuals(baseline.model, records, Nuisance(offset=True))
-    where = localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])
-    fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
-    found = select(now.model, training_data, score, null, fitting, lambda word, part: progress(word, 0.5 + 0.4 * part))
-    selection = Selection(baseline.model, found.model, found.score, (*steps, *found.steps), null)
-    final_training_data = found.accepted[-1].best.training_data if found.accepted else training_data
-    # what was judged on blocks left out is delivered: fitting on would bend it towards the few kinds of record
-    scored = selection.accepted[-1].best.fit if selection.accepted else None
-    final = scored or baseline
-    gap = measure_gap(
-        (baseline.model, final.model),
-        records,
-        sorted(used),
-        least.tolist(),
-        stroke(records),
-        (Nuisance(offset=True), replace(final_training_data.nuisance, offset=True)),
-        False,
-    )
+    span = extent_of([records[i] for i in fitted], model)
+    return TrainingData(tuple(blocks), weights, Nuisance(offset=runs > 1), span, jumps)
+
+
+def _delivered(
+    more: Selection,
+    now: Fit,
+    given: Model | None,
+    found: Identification | None,
+    records: Sequence[Record],
+    least: Sequence[float],
+    fitted: Collection[int],
+) -> tuple[_Delivered, bool]:
+    """What predicts rates, amplitudes and records left out best; a model that was there stays unless it is beaten."""
+    free = Nuisance(offset=True)
+    if found is not None:
+        start = _Delivered(found.model, found.fit, free)
+    else:
+        start = _Delivered(given or now.model, None, free)
+    contenders = [] if found is not None else [_Delivered(now.model, now, free)]
+    if more.accepted:
+        last = more.accepted[-1].best
+        contenders.append(_Delivered(last.fit.model, last.fit, last.training_data.nuisance))
+    best, extended = start, False
+    if contenders:
+        reached = score_left_out(start.model, records, least, fitted, adjusts=found is not None)
+        for contender in contenders:
+            try:
+                score = score_left_out(contender.model, records, least, fitted)
+            except PiezoError:
+                continue
+            if score < reached - EXTENDS:
+                best, reached = contender, score
+                extended = bool(more.accepted) and contender is contenders[-1]
+    return best, extended
+
+
+def _verdict(
+    selection: Selection, decided: Sequence[Step], before: Score, gap: Gap, count: int, missing: Sequence[Notice]
+) -> tuple[Verdict, str]:
+    """The verdict, and why."""
+    closed = explained(before.excess, selection.score.excess, selection.null)
     names = [s.best.effect.public_name() for s in selection.accepted]
-    closed = explained(before.excess, selection.score.excess, null)
-    missing = missing_excitation([records[i] for i in used])
+    if decided and gap.falls:
+        rivals = [n for s in selection.accepted for n in s.confusable_with]
+        said = (
+            f"The model misses {' and '.join(names)}, which the prediction of rates, amplitudes and records that were "
+            f"left out decides; together they explain {100 * closed:.0f} % of the gap."
+        )
+        alike = f" These data cannot tell {' or '.join(rivals)} from it." if rivals else ""
+        return Verdict.NAMED, said + alike
+    if count >= FEWEST_RECORDS and not decided:
+        named = bool(selection.accepted) and gap.falls and closed >= NAMED
+        return verdict_of(selection, named, gap.falls, gap)
     if before.excess <= ADEQUATE:
         message = "the published model reaches the floor, so that the data give no information on further effects"
     elif names:
@@ -115,23 +214,15 @@ def diagnose_few(
             "gap and was added to the model"
         )
     else:
-        message = "no effect of the catalogue improves the prediction of blocks that were left out"
-    count = "one record" if len(used) == 1 else f"{len(used)} records"
+        message = (
+            f"the model has the structure that predicts best what was left out, which closes {100 * closed:.0f} % of "
+            "the gap of the published model"
+        )
+    records = "one record" if count == 1 else f"{count} records"
     reason = "; ".join(
-        (f"No effect is named, because {count} cannot distinguish effects", message, *(n.message for n in missing))
+        (f"No effect is named, because {records} cannot distinguish effects", message, *(n.message for n in missing))
     )
-    return Diagnosis(
-        verdict=Verdict.UNKNOWN,
-        reason=f"{reason}.",
-        model=stating(final.model, gap.live, stroke(records)),
-        baseline=stating(baseline.model, gap.before, stroke(records)),
-        selection=selection,
-        fit=final,
-        where=where,
-        gap=gap,
-        next_experiment=decide(selection, training_data),
-        experiment=experiment.noting(*missing),
-    )
+    return Verdict.UNKNOWN, f"{reason}."
 
 
 def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Record], list[int | None]]:

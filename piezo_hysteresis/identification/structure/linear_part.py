@@ -52,7 +52,7 @@ def fit_structure(
 
 def fit_linear_part(
     model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]
-) -> tuple[PieceFit, list[Notice]]:
+) -> tuple[PieceFit, float, list[Notice]]:
     """Delay, then a mode where the stage rings or its gain rises with the frequency, then a pole where it helps.
 
     Parameters
@@ -68,13 +68,16 @@ def fit_linear_part(
     -------
     fit : PieceFit
         All free numbers at their best.
+    lead : float
+        ln of the factor by which a mode that rings lowers the cost; 0 where none does.
     notices : list of Notice
         ``ringing``, where a mode was taken.
     """
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
-    best = min(found, key=lambda f: f.cost)
-    best, notices = _with_mode(best, pieces, floors)
+    plain = min(found, key=lambda f: f.cost)
+    best, notices = _with_mode(plain, pieces, floors)
     held = held_by(best)
+    lead = float(np.log(plain.cost / best.cost)) if set(SHAPE) & set(best.names) else 0.0
     poles = []
     for pole in (0.3, 0.8):
         arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=best.model[Arx.name]["delay"])
@@ -82,7 +85,7 @@ def fit_linear_part(
         if tried.model.values()[POLE] < 0.0:
             poles.append(tried)
     lagging = min(poles, key=lambda f: f.cost, default=best)
-    return (lagging if lagging.cost < POLE_GAINS * best.cost else best), notices
+    return (lagging if lagging.cost < POLE_GAINS * best.cost else best), lead, notices
 
 
 def held_by(fit: PieceFit) -> tuple[str, ...]:

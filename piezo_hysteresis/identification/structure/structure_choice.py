@@ -7,7 +7,7 @@ or two, weights that depend on the level, a delay, one pole and one lightly damp
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from ...effects import (
     CreepTwoRates,
     Effect,
     EvenInputPolynomial,
+    ExtraResonance,
     HysteresisMemory,
     LevelDependentMemory,
 )
@@ -40,6 +41,8 @@ START_CREEP = 0.005
 """Creep per decade at which a fit begins."""
 TIE = 0.02
 """Difference of scores (mean ln R²) within which the structure with fewer numbers is taken."""
+CREEPS = (Creep.name, CreepTwoRates.name)
+"""Forms of creep."""
 LEADS = 0.35
 """Lead in score that a Bouc-Wen state needs over plays: they are bounded by what the loops show."""
 
@@ -54,12 +57,16 @@ class StructureChoice:
         Of the structure chosen; its covariance holds what folds left out and rival structures leave open.
     judged : tuple of Judged
         Every structure, best first.
+    leads : mapping of str to float
+        By how much in score (mean ln R²) every optional effect of the model predicts better what was left out than the
+        best structure without it; empty where a Bouc-Wen state was kept.
     notices : tuple of Notice
         ``structure``, ``memory``, ``ringing``.
     """
 
     fit: Fit
     judged: tuple[Judged, ...]
+    leads: Mapping[str, float]
     notices: tuple[Notice, ...]
 
 
@@ -85,7 +92,7 @@ def choose_structure(
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)
-    plain, notices = fit_linear_part(_with_plays(start, used), pieces, sizes)
+    plain, ringing, notices = fit_linear_part(_with_plays(start, used), pieces, sizes)
     progress("structure: effects", 0.4)
     held = held_by(plain)
     full = fit_structure(plain.model.with_effect(LevelDependentMemory()), pieces, sizes, held)
@@ -108,10 +115,21 @@ def choose_structure(
         factor = f"by a factor of {np.exp(0.5 * lead):.3g}"
         notices.append(Notice("memory", f"a Bouc-Wen state predicts what was left out better {factor}: it is kept"))
         nothing = np.zeros((len(rival.names),) * 2)
-        return StructureChoice(as_fit(rival, pieces, sizes, nothing), tuple(judged), tuple(notices))
+        return StructureChoice(as_fit(rival, pieces, sizes, nothing), tuple(judged), {}, tuple(notices))
     notices.append(Notice("memory", f"{HysteresisMemory.name} is taken: turning points are remembered"))
     spread = spread_of(full, final, chosen, judged)
-    return StructureChoice(as_fit(final, pieces, sizes, spread), tuple(judged), tuple(notices))
+    leads = {HysteresisMemory.name: -lead, ExtraResonance.name: ringing, **_leads(chosen, judged)}
+    return StructureChoice(as_fit(final, pieces, sizes, spread), tuple(judged), leads, tuple(notices))
+
+
+def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
+    """Lead of the chosen structure over the best one that lacks one of its effects, whatever its other effects."""
+    found = {}
+    for name in chosen.structure.effects:
+        family = CREEPS if name in CREEPS else (name,)
+        rest = [j.score for j in judged if not set(family) & set(j.structure.effects)]
+        found[name] = min(rest) - chosen.score
+    return found
 
 
 def _with_plays(start: Model, records: Sequence[Record]) -> Model:

@@ -1,0 +1,128 @@
+"""Steps from the published model to a structure that was chosen by what it predicts, effect by effect."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from ...effects import (
+    Creep,
+    CreepTwoRates,
+    EvenInputPolynomial,
+    ExtraResonance,
+    HysteresisMemory,
+    LevelDependentMemory,
+    ThermalDrift,
+)
+from ...errors import PiezoError
+from ...identification.fit.fit import Fit
+from ...identification.identification import Identification
+from ...identification.structure.left_out import score_left_out
+from ...identification.structure.linear_part import free_numbers
+from ...identification.structure.piece_fit import fit_pieces
+from ...identification.structure.pieces import pieces_of
+from ...identification.structure.uncertainty import as_fit
+from ...model.model import Model
+from ...record import Record
+from .candidates import FittedCandidate, score_model
+from .cross_validation import Score
+from .selection_result import Step
+from .training_data import TrainingData
+
+DECIDES = 0.35
+"""Lead in score (mean ln R²) from which what was left out decides that an effect is there: 1.2 in the error."""
+ORDER = (
+    HysteresisMemory.name,
+    ExtraResonance.name,
+    Creep.name,
+    CreepTwoRates.name,
+    EvenInputPolynomial.name,
+    LevelDependentMemory.name,
+)
+"""Optional effects of a structure, the largest first."""
+SLOW = (Creep.name, CreepTwoRates.name)
+"""Effects that a drift may imitate."""
+FEW = 8
+"""Linearisations of a model on the way: it begins next to its optimum."""
+
+
+def decided(found: Identification) -> list[str]:
+    """Effects of the chosen structure that what was left out asks for clearly, the largest first."""
+    if found.structure is None:
+        return []
+    leads = found.structure.leads
+    return [n for n in ORDER if leads.get(n, 0.0) >= DECIDES and n in found.model]
+
+
+def structure_steps(
+    found: Identification,
+    before: Score,
+    training_data: TrainingData,
+    records: Sequence[Record],
+    floors: Sequence[float],
+    fitted: Collection[int],
+) -> list[Step]:
+    """One accepted step for every effect that is decided, in the order of their size.
+
+    Parameters
+    ----------
+    found : Identification
+        With its structure chosen.
+    before : Score
+        Of the published model.
+    training_data : TrainingData
+        What scores are taken on.
+    records : sequence of Record
+        In order.
+    floors : sequence of float
+        Floor of every record [m].
+    fitted : collection of int
+        Indices of the records that were fitted.
+    """
+    names = decided(found)
+    steps: list[Step] = []
+    later = list(names)
+    for name in names:
+        later.remove(name)
+        model = found.model
+        for other in later:
+            model = model.without(other)
+        if LevelDependentMemory.name in model and HysteresisMemory.name not in model:
+            model = model.without(LevelDependentMemory.name)
+        try:
+            fit = found.fit if not later else _refitted(model, records, floors, fitted)
+            score = score_model(fit.model, training_data)
+            rivals = _rivals(found, name, training_data, records, floors, fitted)
+        except PiezoError:
+            continue
+        best = FittedCandidate(fit.model[name], training_data, score, fit)
+        steps.append(Step(before, best, True, rivals, ()))
+        before = score
+    return steps
+
+
+def _refitted(model: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Fit:
+    pieces = pieces_of(records, fitted)
+    found = fit_pieces(model, pieces, floors, free_numbers(model), FEW)
+    return as_fit(found, pieces, floors, np.zeros((len(found.names),) * 2))
+
+
+def _rivals(
+    found: Identification,
+    name: str,
+    training_data: TrainingData,
+    records: Sequence[Record],
+    floors: Sequence[float],
+    fitted: Collection[int],
+) -> tuple[FittedCandidate, ...]:
+    """A drift in the place of creep, where it predicts what was left out about as well."""
+    if name not in SLOW or ThermalDrift.name in found.model:
+        return ()
+    start = ThermalDrift.starts(training_data.extent)[0]
+    drift = _refitted(found.model.without(name).with_effect(start), records, floors, fitted)
+    behind = score_left_out(drift.model, records, floors, fitted) - score_left_out(found.model, records, floors, fitted)
+    if behind >= DECIDES:
+        return ()
+    score = score_model(drift.model, training_data)
+    return (FittedCandidate(drift.model[ThermalDrift.name], training_data, score, drift),)

@@ -1,0 +1,63 @@
+"""Records of a step and growing sines, without noise phases: the best model that is known is the least delivered."""
+
+import numpy as np
+import pytest
+
+from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.discrepancy import Verdict, diagnose
+from piezo_hysteresis.discrepancy.residual.residual import errors
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.record import Experiment, Record
+
+PERIOD = 5e-4
+STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
+HIDDEN = {"hysteresis_memory", "level_dependent_memory", "creep", "even_input_polynomial", "extra_resonance"}
+
+
+def played(stage, frequencies, levels=(0.4, 0.7, 1.0)):
+    drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD, levels)) for f in frequencies)
+    return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
+
+
+def percents(model, experiment):
+    return [row.percent for row in errors(model, experiment, Nuisance(offset=True)).rows]
+
+
+@pytest.mark.parametrize("frequencies", [(1.0, 60.0), (1.0, 3.0, 20.0, 60.0, 60.0)])
+def test_what_is_delivered_predicts_a_rate_left_out_as_well_as_the_best_model(frequencies):
+    recorded = played(STAGE, frequencies)
+    unseen = played(STAGE, (10.0,))
+    best = identify(recorded, memory=True).model
+    found = diagnose(recorded)
+    assert percents(found.model, unseen)[0] < 1.1 * percents(best, unseen)[0] + 0.01
+    assert found.gap.after < 0.2 * found.gap.before
+    assert found.gap.unseen is (len(frequencies) > 3)
+    assert found.verdict is Verdict.NAMED
+    assert {"hysteresis_memory", "creep"} <= set(found.names) <= HIDDEN
+    intervals = [row["parameters"] for row in found.effects()]
+    assert all(np.isfinite(p["interval_95"]).all() for row in intervals for p in row.values())
+
+
+def test_a_stage_of_the_published_form_gets_no_name():
+    loop = BoucWen(A=-0.7691, beta=4.6075, gamma=-0.8725, p1=-0.1085, p2=2.1925)
+    stage = Model((loop, Arx(a=(-0.5,), b=(0.2,), delay=1.0)), PERIOD, 10.0, 5e-5)
+    rng = np.random.default_rng(3)
+
+    def record(frequency):
+        drive = growing_sine(frequency, PERIOD, (0.4, 0.7, 1.0))
+        still = Record(drive, drive, PERIOD, f"sine_{frequency:g}hz", initial_voltage=0.0)
+        y = stage.simulate(still)[0]
+        return Record(drive, y + 2e-4 * np.ptp(y) * rng.normal(size=y.size), PERIOD, still.phase, initial_voltage=0.0)
+
+    assert diagnose(Experiment((record(1.0), record(20.0), record(60.0)))).names == ()
+
+
+def test_a_record_that_begins_in_mid_run_is_diagnosed_behind_its_first_full_loop():
+    whole = played(STAGE, (2.0,), (1.0, 1.0, 1.0)).records[0]
+    cut = Record(whole.voltage[1200:], whole.displacement[1200:], PERIOD, "sine_2hz", truncated=True)
+    found = diagnose(Experiment((cut,)))
+    assert any(n.kind == "conditioning_length" for n in found.experiment.notices)
+    assert found.gap.after < 0.2
