@@ -13,9 +13,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.hostile_texts import hostile_texts
 from piezo_hysteresis.cli.options.plant_option import _read as read_plant
 from piezo_hysteresis.effects import CHAIN
 from piezo_hysteresis.errors import PiezoError
+from piezo_hysteresis.model import parameter_file
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_file import dumps, load, loads
 from piezo_hysteresis.model.parameter_file import LONGEST_TEXT
@@ -97,6 +99,22 @@ def test_aliases_in_one_another_are_refused_at_once():
     rows += [f"x{k}: &x{k} {{{', '.join(f'{c}: *x{k - 1}' for c in 'abcdefghij')}}}" for k in range(1, 9)]
     with memory_below(20e6), pytest.raises(PiezoError, match="alias"):
         loads("/**: {ros__parameters: {model: {" + ", ".join(rows) + "}}}")
+
+
+@pytest.mark.parametrize("name", hostile_texts(TEXT))
+def test_a_text_made_to_harm_is_refused(name):
+    with memory_below(100e6), pytest.raises(PiezoError) as refusal:
+        loads(hostile_texts(TEXT)[name], "topic 'model'")
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 300
+
+
+@pytest.mark.parametrize("name", ["deep brackets", "keys without number", "a list without end", "merged aliases"])
+def test_a_text_that_is_long_to_parse_is_given_up_before_it_is_put_together(name, monkeypatch):
+    """The time of a parser grows with the square of depth and number: they are counted first."""
+    monkeypatch.setattr(parameter_file.yaml, "compose", lambda *_, **__: pytest.fail("was put together"))
+    with pytest.raises(PiezoError, match=r"too deeply|more than 50000 entries|alias"):
+        loads(hostile_texts(TEXT)[name])
 
 
 def test_texts_without_end_are_refused_unread():

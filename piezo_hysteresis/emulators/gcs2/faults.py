@@ -7,6 +7,7 @@ from ..fault import FaultCatalogue
 FAULTS = FaultCatalogue(
     once={
         "link_lost": ("DRR?", "half the answer, then the link is closed"),
+        "reset": ("DRR?", "half the answer, then the link is reset"),
         "gone": ("DRR?", "half the answer, then the link is closed and no new one accepted"),
         "partial_answer": ("DRR?", "half the answer, then silence"),
         "slow": ("POS?", "the answer comes late, by the number of seconds given after '=' (5)"),

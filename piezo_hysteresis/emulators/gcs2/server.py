@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import struct
 import threading
 from contextlib import suppress
 from typing import Self
@@ -111,7 +112,7 @@ class Gcs2Server:
         if "absurd" in struck and lines:
             lines[-1] = f"{lines[-1].rpartition('=')[0]}={struck['absurd']:g}".lstrip("=")
         text = " \n".join(lines).encode(_CODE_PAGE, errors="replace") + b"\n" if lines else b""
-        if struck.keys() & {"link_lost", "gone", "partial_answer"}:
+        if struck.keys() & {"link_lost", "reset", "gone", "partial_answer"}:
             text = text[: len(text) // 2]
         for byte in text if "trickle" in struck else b"":
             link.sendall(bytes([byte]))
@@ -120,7 +121,9 @@ class Gcs2Server:
         link.sendall(b"" if "trickle" in struck else text)
         if "gone" in struck:
             self._close_port()
-        if struck.keys() & {"link_lost", "gone"}:
+        if "reset" in struck:
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # closing sends a RST
+        if struck.keys() & {"link_lost", "reset", "gone"}:
             raise OSError("the fault that was asked for")
 
 

@@ -31,6 +31,15 @@ def test_a_link_lost_at_any_step_ends_at_the_safe_voltage(bench, play, step):
     work(b.stage, play)  # over the new link
 
 
+@pytest.mark.parametrize("step", ["ERR?:20", "WGO:1", "GWD?:2", "DRR?:2"])
+def test_a_link_reset_in_mid_stream_ends_at_the_safe_voltage(bench, play, step):
+    b = bench(f"reset@{step}", rows_per_answer=500)
+    with pytest.raises(StageError, match=r"(Connection reset|the link was closed).*brought to its safe voltage, 0 V"):
+        work(b.stage, play)
+    assert b.voltage == 0.0
+    work(b.stage, play)  # over the new link
+
+
 @pytest.mark.parametrize("step", ["VOL?:2", "WAV?:1", "DRR?:2"])
 def test_a_link_that_does_not_come_back_leaves_the_voltage_unknown_and_says_so(bench, play, step):
     b = bench(f"gone@{step}", rows_per_answer=500)
