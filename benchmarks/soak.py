@@ -6,6 +6,9 @@ must flow and predictions be good again. The exit code is 1 where a promise was 
 come, when and for how long.
 
     make soak SOAK="--minutes 1 --seed 3"
+    make soak SOAK="--minutes 10 --rate 100000 --no-faults"
+
+Without faults the processes are never started again, so that the growth of their memory can be told.
 """
 
 from __future__ import annotations
@@ -45,6 +48,10 @@ ALLOWED = 5000
 """Samples that may be on their way from a driver when it is killed: ten blocks."""
 LARGEST = 600.0
 """Resident size that no process may exceed [MB]."""
+SETTLED = 60.0
+"""Time after the start of a run from which the growth of memory counts [s]: buffers fill, kernels are loaded."""
+GROWTH = 1.0
+"""Growth of the resident size that no process may exceed in a run without faults [MB/min]."""
 
 
 class Traffic:
@@ -96,6 +103,7 @@ class Soak:
     def __init__(self, options: argparse.Namespace, folder: Path) -> None:
         period = 1.0 / options.rate
         self.minutes, self.chance = options.minutes, random.Random(options.seed)
+        self.has_faults = options.faults
         self.log = StageLog(folder / "voltages", period, **LIMITS)
         model = load(MODEL)
         model = Model(model.effects, period, model.voltage_scale, model.displacement_scale)
@@ -118,6 +126,9 @@ class Soak:
             self._recover("the start")
             begin = time.monotonic()
             while time.monotonic() - begin < 60.0 * self.minutes:
+                if not self.has_faults:
+                    self._rest(60.0 * self.minutes)
+                    break
                 self._rest(self.chance.uniform(0.5, 5.0))
                 fault = self.chance.choice(list(FAULTS))
                 self.struck[fault] += 1
@@ -153,6 +164,15 @@ class Soak:
                 return
         self.slowest = max(self.slowest, time.monotonic() - begin)
 
+    def _growth(self, name: str) -> float:
+        """Slope of the resident size of a process [MB/min], least squares from `SETTLED` on."""
+        times, sizes = np.array([(time, sizes[name]) for time, sizes in self.memory]).T
+        late = times > times[0] + SETTLED
+        slope = 60.0 * float(np.polyfit(times[late] - times[0], sizes[late], 1)[0])
+        if slope > GROWTH:
+            self.keeper.break_promise(f"{name} grows by {slope:.2f} MB/min")
+        return slope
+
     def balance(self) -> Figures:
         """The table."""
         for death in self.soaked.deaths:
@@ -175,6 +195,8 @@ class Soak:
         rows += [("slowest recovery, s", self.slowest)]
         for name in self.soaked.starts:
             rows.append((f"memory of {name}, largest, MB", max(sizes[name] for _, sizes in self.memory)))
+        if not self.has_faults:
+            rows += [(f"growth of {name}, MB/min", self._growth(name)) for name in self.soaked.starts]
         rows += [("promises broken", counts["promises broken"])]
         return Figures("Soak: what went in and what came out", ("", "count"), rows, tuple(self.keeper.broken))
 
@@ -187,7 +209,10 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=10.0, help="default: 10")
     parser.add_argument("--seed", type=int, default=0, help="fixes the faults; default: 0")
     parser.add_argument("--rate", type=float, default=50e3, help="samples per second; default: 50000")
+    parser.add_argument("--no-faults", dest="faults", action="store_false", help="let nothing strike")
     options = parser.parse_args()
+    if not options.faults and options.minutes < 3:
+        parser.error(f"--no-faults: got --minutes {options.minutes:g}, expected at least 3")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     os.environ.setdefault("FASTDDS_DEFAULT_PROFILES_FILE", str(LARGE_BLOCKS))
     console = Console()

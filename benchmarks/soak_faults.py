@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from diagnostic_msgs.msg import KeyValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -19,6 +20,8 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
+from benchmarks.hostile_texts import hostile_texts
+from benchmarks.mutated_commands import mutated
 from benchmarks.soak_keeper import Keeper
 from benchmarks.soak_processes import NAMESPACE, Soaked
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud
@@ -120,6 +123,43 @@ def models_ten_times_a_second(bench: Bench) -> None:
     models.publish(String(data=bench.models[0]))
 
 
+def hostile_models(bench: Bench) -> None:
+    """Texts made to cost the reader time or memory, on `model`."""
+    models = bench.keeper.publisher(String, "model", LATCHED)
+    for text in hostile_texts(bench.models[0]).values():
+        models.publish(String(data=text.encode(errors="ignore").decode()))
+        time.sleep(0.05)
+    models.publish(String(data=bench.models[0]))
+
+
+def mutated_commands(bench: Bench) -> None:
+    """Commands with sizes, offsets, types and bytes that contradict one another."""
+    command = bench.keeper.publisher(PointCloud2, "command", COMMAND)
+    for _ in range(200):
+        command.publish(mutated(bench.chance, bench.sample_period))
+        time.sleep(0.002)
+
+
+def calls_without_order(bench: Bench) -> None:
+    """Stop, cancel and release, a hundred times; and claims by those who do not repeat them."""
+    claims = bench.keeper.publisher(KeyValue, "claim", COMMAND)
+    for k in range(100):
+        word = bench.chance.choice(("stop", "cancel", "release"))
+        bench.keeper.client(Trigger, f"driver_node/{word}").call_async(Trigger.Request())
+        if k % 10 == 0:
+            claims.publish(KeyValue(key=bench.chance.choice(("a", "b", "", "x\ny")), value="claim"))
+        time.sleep(0.005)
+    for owner in ("a", "b"):
+        claims.publish(KeyValue(key=owner, value="release"))
+    bench.keeper.client(Trigger, "driver_node/release").call_async(Trigger.Request())
+
+
+def second_driver(bench: Bench) -> None:
+    """A driver of the same topics: it must refuse to stream."""
+    if not bench.soaked.refuses_second_driver():
+        bench.keeper.break_promise("a second driver on the same topics was not refused")
+
+
 def slow_subscriber(bench: Bench) -> None:
     """A reliable subscriber of depth 5, ten times slower than the stream, in a thread of its own."""
     node, executor = Node("slow"), SingleThreadedExecutor()
@@ -159,6 +199,10 @@ FAULTS: Mapping[str, Callable[[Bench], None]] = {
     "broken blocks": broken_blocks,
     "storm of parameters": storm_of_parameters,
     "models ten times a second": models_ten_times_a_second,
+    "hostile models": hostile_models,
+    "mutated commands": mutated_commands,
+    "calls without order": calls_without_order,
+    "second driver": second_driver,
     "slow subscriber": slow_subscriber,
     "200 foreign topics": foreign_topics,
     "stop": stop,

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from benchmarks.stage_log import StageLog
@@ -56,6 +57,24 @@ class Soaked:
             self._running[name] = subprocess.Popen(
                 command, stdout=output, stderr=subprocess.STDOUT, start_new_session=True, env=os.environ.copy()
             )
+
+    def refuses_second_driver(self) -> bool:
+        """Whether a driver of the same topics gives up and says why."""
+        command = [sys.executable, "-m", "piezo_hysteresis.nodes.driver.driver_node"]
+        command += ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
+        log, deadline = self.folder / "second_driver.log", time.monotonic() + 30.0
+        with log.open("wb") as output:
+            process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, env=os.environ.copy())
+        try:
+            while time.monotonic() < deadline:
+                text = log.read_text(errors="replace")
+                if "[ERROR]" in text or "active: samples flow" in text:
+                    return "held by process" in text or "published by another driver" in text
+                time.sleep(0.1)
+            return False
+        finally:
+            process.kill()
+            process.wait()
 
     def pid(self, name: str) -> int:
         """Process id."""

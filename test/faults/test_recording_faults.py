@@ -158,25 +158,35 @@ def test_abort_of_a_run_whose_recording_has_gone_ends_no_node(running):
     assert identification.process.is_running
 
 
-def test_a_real_disk_that_is_full_ends_the_run_and_not_the_node(lab):
-    """A file system of a megabyte, where the machine lets one be mounted."""
-    root = lab.folder / "small_disk"
-    root.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(root)], capture_output=True)
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ("size=1m", "No space left on device"),
+        ("nr_inodes=3", "No space left on device"),
+        ("ro", "Read-only file system"),
+    ],
+    ids=["full", "no more files", "read-only"],
+)
+def test_a_real_disk_that_takes_no_more_ends_the_run_and_not_the_node(running, options, reason):
+    """A file system of its own, where the machine lets one be mounted: root may write into any folder of another."""
+    lab, samples, identification = running
+    at_rest(lab, samples)
+    root = identification.root
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(root)], capture_output=True)
     if mounted.returncode:
         pytest.skip(f"no file system can be mounted here: {mounted.stderr.decode().strip()}")
     try:
-        lab.driver(sample_period=PERIOD)
-        samples = lab.streaming()
-        identification = Identification(lab, root)
         assert identification.ask("identify").success
-        assert "No space left on device" in identification.await_state("failed").message
+        assert reason in identification.await_state("failed").message
         at_rest(lab, samples)
-        assert read(identification.newest(), include=("idle", "hold")).records
+        if options == "size=1m":
+            assert read(identification.newest(), include=("idle", "hold")).records
         assert identification.process.is_running
-        identification.process.end()
     finally:
-        subprocess.run(["umount", str(root)], check=True)
+        subprocess.run(["umount", "--lazy", str(root)], check=True)
+    assert identification.ask("identify").success
+    identification.await_state("running")
+    assert identification.ask("abort").success
 
 
 def test_parameters_from_outside_choose_no_place(running):

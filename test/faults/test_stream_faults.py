@@ -17,6 +17,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import String
 
+from benchmarks.hostile_texts import hostile_texts
 from piezo_hysteresis.model.model_file import dumps, save
 from piezo_hysteresis.nodes.messages.conversions import to_stamp, values_of
 from piezo_hysteresis.nodes.messages.samples import samples_to_cloud
@@ -303,9 +304,10 @@ def test_models_many_times_a_second(bench):
     models = bench.lab.node.create_publisher(String, "model", LATCHED)
     others = [replace(MODEL, provenance={"name": name}) for name in ("one", "other")]
     files = [str(save(model, bench.lab.folder / f"{k}.yaml")) for k, model in enumerate(others)]
-    sent = []
-    for k in range(30):
-        models.publish(String(data=dumps(others[k % 2]) if k % 3 else "{[" * k))
+    sent, hostile = [], list(hostile_texts(dumps(others[0])).values())
+    for k in range(60):
+        text = hostile[k // 3 % len(hostile)].encode(errors="ignore").decode()
+        models.publish(String(data=dumps(others[k % 2]) if k % 3 else text))
         if k % 5 == 0:
             assert asked(bench, "model_file", files[k % 2])
         blocks = bench.stream.blocks(2)

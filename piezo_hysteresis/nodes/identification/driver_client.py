@@ -82,7 +82,7 @@ class DriverClient:
         self._sent: tuple[str, str] | None = None
         self._newest: float | None = None
         self._pending: Future | None = None
-        self._answered = -math.inf
+        self._asked = self._answered = -math.inf
         self._parameters = AsyncParameterClient(node, driver)
         self._stop = node.create_client(Trigger, f"{driver}/cancel")  # another one's stop stays as it is
         self._command = CommandSender(node)
@@ -174,16 +174,21 @@ class DriverClient:
         return self._stop.call_async(Trigger.Request()) if self._stop.service_is_ready() else None
 
     def _poll(self) -> None:
-        if self._pending is not None and not self._pending.done() and self._stop.service_is_ready():
-            return
+        if self._pending is not None and not self._pending.done():
+            if self._stop.service_is_ready() and time.monotonic() - self._asked < _FRESH:
+                return
+            self._pending.cancel()  # the driver was killed: the one that took its place has never heard the question
         self._pending = None
         if not self._parameters.services_are_ready():
             self.limits = None
             return
+        self._asked = time.monotonic()
         self._pending = self._parameters.get_parameters([f"in_force.{name}" for name in (*_NAMES, "stopped")])
         self._pending.add_done_callback(self._node.guarded(self._on_limits))
 
     def _on_limits(self, answer: Future) -> None:
+        if answer.cancelled():
+            return
         values = [parameter_value_to_python(value) for value in answer.result().values]
         stopped = values.pop() if len(values) > len(_NAMES) else False
         self.stopped = f"the driver was stopped, nothing moves; call {self._driver}/release first" if stopped else ""

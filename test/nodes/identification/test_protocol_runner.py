@@ -1,5 +1,6 @@
 """A stage that fails in mid-phase ends the protocol at once, with a recording that can be read."""
 
+import signal
 import time
 
 import numpy as np
@@ -121,3 +122,20 @@ def test_a_stop_between_two_phases_ends_the_protocol_with_its_reason(lab, stage)
     assert {record.phase for record in read(lab.folder / "run")} == {"long"}
     lab.call(Trigger, "driver_node/release")
     lab.wait(lambda: stage.voltage == 0.0, "the safe voltage")
+
+
+@pytest.mark.soak
+def test_a_driver_that_took_the_place_of_a_killed_one_is_asked_again(lab):
+    """Killed with a question unanswered: its services are known for a while, and those of the next one are the same."""
+    driver = lab.driver(sample_period=PERIOD)
+    lab.streaming()
+    link = lab.do(lambda: DriverClient(lab.node, "driver_node"))
+    lab.wait(lambda: link.limits is not None, "its limits")
+    driver.signal(signal.SIGSTOP)
+    lab.wait(lambda: link._pending is not None and not link._pending.done() and not link.is_fresh, "a question")
+    driver.signal(signal.SIGKILL)
+    driver.wait()
+    lab.forget()
+    lab.driver(sample_period=PERIOD, voltage_max=7.0)
+    lab.wait(lambda: link.limits is not None and link.limits.voltage_max == 7.0, "the limits of the next one")
+    assert link.is_fresh
