@@ -26,6 +26,7 @@ COMMANDS = {
     "compensate": "compute the drive voltage for a wanted displacement",
     "report": "write one page about an experiment and its models",
     "import": "convert a recording of other software into an experiment",
+    "follow": "show in one line what a node does, until it has finished; needs ROS 2",
     "effects": "list the catalogue of physical effects",
 }
 """Subcommand to what it does; each lives in a file of its own, loaded only when it is asked for."""

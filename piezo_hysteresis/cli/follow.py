@@ -1,0 +1,35 @@
+"""Show in one line what the identification node of an axis does, until it has finished; needs ROS 2."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from importlib.util import find_spec
+
+from ..errors import PiezoError
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("follow", description=__doc__)
+    parser.add_argument("namespace", nargs="?", default="", help="namespace of the axis, e.g. /stage_x")
+    parser.add_argument("ros", nargs=argparse.REMAINDER, help="arguments for ROS 2, from --ros-args on")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Follow the axis in a process that imports ROS; its exit status.
+
+    Raises
+    ------
+    PiezoError
+        Where ROS 2 is not installed.
+    """
+    if find_spec("rclpy") is None:
+        raise PiezoError("follow: got no rclpy, expected ROS 2; source its setup file, or install the wheels of rclpy")
+    program = [sys.executable, "-m", "piezo_hysteresis.nodes.follow", args.namespace, *args.ros]
+    try:
+        return subprocess.run(program, check=False).returncode
+    except KeyboardInterrupt:
+        return 130

@@ -1,0 +1,96 @@
+"""Follow a running node: one line on the terminal, from the topics `status` of an axis until the job under way ends."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.signals import SignalHandlerOptions
+
+from ..errors import printable
+from .messages.conversions import values_of
+from .runtime.executor import make_executor
+from .runtime.guarded_node import GuardedNode
+from .runtime.qos import LATCHED
+
+ENDED = {"done": 0, "failed": 1, "aborted": 1, "refused": 1}
+"""Last states of a job, and the exit status that each gives."""
+
+_IDLE = ("idle", "")
+"""States in which nothing is under way."""
+
+_WIDTH = 110
+"""Characters of a line at most: a longer one could not be written over."""
+
+
+class Follower(GuardedNode):
+    """Writes the newest status of an axis.
+
+    Parameters
+    ----------
+    namespace : str
+        Of the axis, e.g. ``/stage_x``.
+    """
+
+    def __init__(self, namespace: str) -> None:
+        super().__init__("follow", namespace=namespace, start_parameter_services=False)
+        self.exit_status: int | None = None
+        self._under_way = False
+        self._line = ""
+        self.create_subscription(DiagnosticStatus, "status", self._on_status, LATCHED)  # the newest is enough
+
+    def _on_status(self, status: DiagnosticStatus) -> None:
+        values = values_of(status)
+        state = values.get("state", "")
+        line = " ".join(
+            part
+            for part in (
+                f"{status.name.rpartition(': ')[0]}:",
+                state,
+                values.get("phase", ""),
+                f"{values['percent']} %" if values.get("percent", "0") != "0" else "",
+                status.message,
+            )
+            if part
+        )
+        self._show(printable(line)[:_WIDTH])
+        if state in ENDED and self._under_way:
+            self.exit_status = ENDED[state]
+        self._under_way = self._under_way or state not in (*_IDLE, *ENDED)
+
+    def _show(self, line: str) -> None:
+        """Write over the line before on a terminal; elsewhere a line for each change."""
+        if line == self._line:
+            return
+        self._line = line
+        if sys.stdout.isatty():
+            sys.stdout.write(f"\r\033[K{line}")
+        else:
+            sys.stdout.write(f"{line}\n")
+        sys.stdout.flush()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Follow an axis; 0 where its job ends well, 1 where it fails or is aborted, 130 on Ctrl-C."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    rclpy.init(args=given[1:], signal_handler_options=SignalHandlerOptions.NO)
+    node = Follower(given[0] if given else "")
+    executor = make_executor()
+    executor.add_node(node)
+    try:
+        while node.exit_status is None:
+            executor.spin_once(timeout_sec=0.2)
+    except KeyboardInterrupt:
+        return 130
+    finally:
+        if sys.stdout.isatty():
+            sys.stdout.write("\n")
+        executor.shutdown()
+        rclpy.try_shutdown()
+    return node.exit_status
+
+
+if __name__ == "__main__":
+    sys.exit(main())
