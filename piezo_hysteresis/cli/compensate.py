@@ -19,6 +19,7 @@ from ..model import model_file
 from ..recording.formats.wanted_path import read_path
 from ..report.json_file import write_json
 from ..report.tables.table import Table
+from .options.destination import add_force, require_new_file, require_new_folder
 from .terminal import console, show
 
 MOST_PARTS = 3
@@ -50,6 +51,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--figures", metavar="FOLDER", help="folder for the figure and its data")
     parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -61,6 +63,9 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On a model or a path that cannot be read, or a chain that cannot be turned round.
     """
+    require_new_file("-o", args.output, args.force)
+    require_new_file("--json", args.json, args.force)
+    require_new_folder("--figures", args.figures, args.force)
     model = model_file.load(args.model)
     wanted, period = read_path(args.path)
     resampled = period is not None and abs(period - model.sample_period) > 1e-6 * model.sample_period

@@ -13,7 +13,11 @@ from ..report.page import page
 from ..report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
 from ..report.verdict import answer_verdict
 from .options import reading_options
+from .options.destination import add_force, require_new_file
 from .terminal import console, progress, show, show_notices
+
+USUAL_TIME = "5 s to 2 min"
+"""How long it takes, as `docs/performance.md` measures it, on a busy computer too."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -36,6 +40,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         action="store_true",
         help="do not look for the explicit step of Eq. (7), which only simulated data can hold",
     )
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -47,9 +52,12 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On bad input, or data that do not even determine a baseline.
     """
+    require_new_file("-o", args.output, args.force)
+    require_new_file("--report", args.report, args.force)
+    require_new_file("--json", args.json, args.force)
     start = None if args.model is None else model_file.load(args.model)
     experiment = reading_options.read(args)
-    with progress("diagnose") as report_progress:
+    with progress("diagnose", f"{experiment.size} samples; this usually takes {USUAL_TIME}") as report_progress:
         found = diagnose(
             experiment,
             start,

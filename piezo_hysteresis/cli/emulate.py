@@ -37,8 +37,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         choices=tuple(_PORT),
         help="gcs2: a PI GCS 2.0 controller; nidaqmx: an NI gRPC device server with a card",
     )
+    defaults = ", ".join(f"{port} for {device}" for device, port in _PORT.items())
     parser.add_argument("--host", default="127.0.0.1", help="address to listen at (default: this machine only)")
-    parser.add_argument("--port", type=int, help=f"TCP port, 0 for any free one (default: {_PORT})")
+    parser.add_argument("--port", type=int, help=f"TCP port, 0 for any free one (default: {defaults})")
     add_plant_arguments(parser)
     parser.add_argument(
         "--servo-time", metavar="S", type=float, default=50e-6, help="servo time of gcs2 [s] (default: 5e-05)"

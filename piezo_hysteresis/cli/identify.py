@@ -13,8 +13,13 @@ from ..model import model_file
 from ..report.json_file import write_json
 from ..report.tables.parameter_table import correlation_table, parameter_table
 from ..report.tables.table import Table
+from ..report.words import error_sentence
 from .options import reading_options
+from .options.destination import add_force, require_new_file
 from .terminal import console, progress, show, show_notices
+
+USUAL_TIME = "2 s to 1 min"
+"""How long it takes, as `docs/performance.md` measures it, on a busy computer too."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -53,6 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         action="append",
         help=f"phase that is not fitted and judges the model (default: {', '.join(HELD_OUT)})",
     )
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -64,9 +70,11 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On bad input, or data that do not determine the model.
     """
+    require_new_file("-o", args.output, args.force)
+    require_new_file("--json", args.json, args.force)
     experiment = reading_options.read(args)
     orders = None if args.choose_orders else tuple(args.orders or (8, 8))
-    with progress("identify") as report_progress:
+    with progress("identify", f"{experiment.size} samples; this usually takes {USUAL_TIME}") as report_progress:
         found = identify(
             experiment,
             orders=orders,
@@ -86,7 +94,24 @@ def run(args: argparse.Namespace) -> int:
         out.print(str(comparison))
     show_notices(found.notices)
     out.print(f"wrote {path}")
+    out.print(verdict_line(found), style="bold")
     return 0 if found.fit.converged else 1
+
+
+def verdict_line(found: Identification) -> str:
+    """What came out, in one sentence."""
+    fit, percent = found.fit, found.free_run_percent
+    if not fit.converged:
+        return (
+            f"Verdict: not determined. The fit did not converge in {fit.iterations} linearisations, so the values "
+            "above are no estimates; give phases that move the stage over its range at several rates."
+        )
+    severe = sum(n.severe for n in found.notices)
+    doubt = (
+        f" {severe} severe finding{'s' * (severe > 1)} above make{'s' * (severe == 1)} it doubtful." if severe else ""
+    )
+    at_bounds = f" At a bound, so undetermined: {', '.join(fit.at_bounds)}." if fit.at_bounds else ""
+    return f"Verdict: {error_sentence(percent)}{doubt}{at_bounds}"
 
 
 def answer(found: Identification, path: str) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from ..report.figures.comparison import compare
 from ..report.json_file import read_json
 from ..report.page import page
 from .options import reading_options
+from .options.destination import add_force, require_new_file
 from .terminal import console, progress
 
 
@@ -33,6 +34,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--one-zero", action="store_true", help="one sensor zero for all phases instead of one for each"
     )
     parser.add_argument("--title", default="Piezo stage: model against measurement", help="heading of the page")
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -44,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On files that cannot be read or written.
     """
+    require_new_file("-o", args.output, args.force)
     models = {}
     for text in args.model:
         label, equals, path = text.rpartition("=")

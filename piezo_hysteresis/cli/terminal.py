@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shutil
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
@@ -17,6 +19,8 @@ from ..report.tables.table import Table
 
 WIDTH = 140
 """Columns where standard output is no terminal."""
+LINE_INTERVAL = 10.0
+"""Time between two lines of progress where standard error is no terminal [s]."""
 
 
 def console() -> Console:
@@ -51,8 +55,27 @@ def show_notices(notices: Iterable[Notice]) -> None:
 
 
 @contextmanager
-def progress(task: str) -> Iterator[Callable[[str, float], None]]:
-    """A bar on standard error while something takes long; gives the function to call with a word and a fraction."""
+def progress(task: str, expected: str = "") -> Iterator[Callable[[str, float], None]]:
+    """What is being done, on standard error, while something takes long: a bar, or without a terminal a line each 10 s.
+
+    Parameters
+    ----------
+    task : str
+        What is done, e.g. ``"identify"``.
+    expected : str
+        How long it usually takes, said at the start.
+
+    Yields
+    ------
+    callable
+        To be called with a word and a fraction.
+    """
+    if expected:
+        print(f"{task}: {expected}", file=sys.stderr, flush=True)
+    if not sys.stderr.isatty():
+        with _lines(task) as report_line:
+            yield report_line
+        return
     bar = Progress(
         TextColumn("{task.description:32s}"),
         BarColumn(),
@@ -60,7 +83,6 @@ def progress(task: str) -> Iterator[Callable[[str, float], None]]:
         TimeElapsedColumn(),
         console=Console(file=sys.stderr),
         transient=True,
-        disable=not sys.stderr.isatty(),
     )
     with bar:
         number = bar.add_task(task, total=1.0)
@@ -69,3 +91,28 @@ def progress(task: str) -> Iterator[Callable[[str, float], None]]:
             bar.update(number, description=f"{task}: {word}", completed=min(max(fraction, 0.0), 1.0))
 
         yield report_progress
+
+
+@contextmanager
+def _lines(task: str) -> Iterator[Callable[[str, float], None]]:
+    """A line every `LINE_INTERVAL`, also while one step takes longer than that."""
+    began, ended = time.monotonic(), threading.Event()
+    latest = ("", 0.0)
+
+    def report_progress(word: str, fraction: float) -> None:
+        nonlocal latest
+        latest = word, min(max(fraction, 0.0), 1.0)
+
+    def write_lines() -> None:
+        while not ended.wait(LINE_INTERVAL):
+            word, fraction = latest
+            elapsed = time.monotonic() - began
+            print(f"{task}: {word}, {100 * fraction:.0f} %, {elapsed:.0f} s", file=sys.stderr, flush=True)
+
+    writer = threading.Thread(target=write_lines, daemon=True)
+    writer.start()
+    try:
+        yield report_progress
+    finally:
+        ended.set()
+        writer.join()

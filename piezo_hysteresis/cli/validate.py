@@ -10,12 +10,16 @@ from ..discrepancy.residual.correlation import CAPTION, correlate
 from ..discrepancy.residual.residual import zero_per_phase
 from ..errors import RecordError
 from ..identification.records.conditioning_split import known_from_within
+from ..identification.records.roles import CARRYING
 from ..model import model_file
+from ..record import Experiment
 from ..report.figures.comparison import ModelComparison, compare
 from ..report.json_file import write_json
 from ..report.tables.error_table import error_table, frequency_table
 from ..report.tables.table import Table
+from ..report.words import error_sentence
 from .options import reading_options
+from .options.destination import add_force, require_new_file, require_new_folder
 from .terminal import console, show, show_notices
 
 
@@ -29,6 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--figures", metavar="FOLDER", help="folder for the figures and their data")
     parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -40,6 +45,8 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On a model or an experiment that cannot be read, or that do not fit each other.
     """
+    require_new_file("--json", args.json, args.force)
+    require_new_folder("--figures", args.figures, args.force)
     model = model_file.load(args.model)
     experiment, conditioned = known_from_within(reading_options.read(args))
     nuisances = None if args.one_zero else {"error": zero_per_phase(model)}
@@ -53,7 +60,16 @@ def run(args: argparse.Namespace) -> int:
     show_notices((*experiment.notices, *conditioned))
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
+    assert comparison.now is not None
+    console().print(f"Verdict: {error_sentence(comparison.now.percent)}{_doubts(experiment)}", style="bold")
     return 0
+
+
+def _doubts(experiment: Experiment) -> str:
+    severe = list(dict.fromkeys(n.phase or "all" for n in experiment.notices if n.severe))
+    unknown = [r.phase for r in experiment if r.truncated and r.phase not in CARRYING]
+    message = f" Severe findings in the data make this doubtful: {', '.join(severe)}." if severe else ""
+    return message + (f" The state at the start is unknown: {', '.join(unknown)}." if unknown else "")
 
 
 def answer(comparison: ModelComparison, tests: list[dict[str, Any]]) -> dict[str, Any]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+USELESS, POOR = 30.0, 3.0
+"""Free-run errors [% of range] from which a model describes nothing, and from which it is poor."""
+
 
 def nanometre(metres: float) -> str:
     """A length for reading: nm below a micrometre, else µm.
@@ -22,3 +25,19 @@ def duration(seconds: float) -> str:
         if seconds * factor >= 1.0:
             return f"{seconds * factor:.4g} {unit}"
     return f"{seconds * 1e9:.4g} ns"
+
+
+def error_sentence(percent: float) -> str:
+    """A free-run error in words.
+
+    >>> error_sentence(126.0)
+    'The model does not describe this stage: its error is 126 % of the range. Check columns, units and sample period.'
+    """
+    if not percent < USELESS:
+        return (
+            f"The model does not describe this stage: its error is {percent:.3g} % of the range. Check columns, units "
+            "and sample period."
+        )
+    if percent > POOR:
+        return f"The model describes this stage poorly: its error is {percent:.3g} % of the range; see piezo diagnose."
+    return f"The model describes this stage; its error in free run is {percent:.3g} % of the range."

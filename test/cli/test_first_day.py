@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
 
 from piezo_hysteresis import recording
+from piezo_hysteresis.cli import terminal
+from piezo_hysteresis.stage.simulated import SimulatedStage
 
 TIME = np.arange(400) * 5e-3
 VOLTAGE = 1.8 - 1.8 * np.cos(2 * np.pi * TIME)
@@ -164,3 +167,88 @@ def test_preview_replaces_nothing_and_without_it_an_output_is_needed(tmp_path, p
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "other.svg").read_text().lstrip().startswith("<?xml")
     assert len(recording.read(tmp_path / "out")) == 1
+
+
+def test_results_never_replace_a_file_without_force(tmp_path, plain):
+    (tmp_path / "model.yaml").write_text("mine")
+    for command, option in (
+        (("identify", plain, "-o"), "-o"),
+        (("identify", plain, "--json"), "--json"),
+        (("diagnose", plain, "-o"), "-o"),
+        (("diagnose", plain, "--report"), "--report"),
+        (("report", plain, "-o"), "-o"),
+        (("validate", tmp_path / "absent.yaml", plain, "--json"), "--json"),
+    ):
+        line = refused(*command, tmp_path / "model.yaml")
+        assert f"{option}: {tmp_path}/model.yaml exists already" in line
+        assert "give --force to replace it" in line
+    assert (tmp_path / "model.yaml").read_text() == "mine"
+    figures = tmp_path / "figures"
+    figures.mkdir()
+    (figures / "mine.png").touch()
+    assert "holds files already" in refused("validate", tmp_path / "m.yaml", plain, "--figures", figures)
+
+
+def test_the_verdict_is_the_last_line_and_force_replaces(tmp_path, plain):
+    (tmp_path / "model.yaml").write_text("mine")
+    done = piezo("identify", plain, "-o", tmp_path / "model.yaml", "--force")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1].startswith("Verdict: The model describes this stage")
+    assert "identify: 400 samples; this usually takes" in done.stderr
+    assert (tmp_path / "model.yaml").read_text() != "mine"
+    rows = np.column_stack((TIME, VOLTAGE, -40.0 * np.cos(2 * np.pi * 7 * TIME)))
+    other = table(tmp_path / "other.csv", "time_s,voltage_V,displacement_um\n", rows)
+    done = piezo("validate", tmp_path / "model.yaml", other)
+    assert done.stdout.splitlines()[-1].startswith("Verdict: The model does not describe this stage: its error is ")
+
+
+def test_an_undetermined_fit_says_so_beside_status_1(tmp_path):
+    from types import SimpleNamespace
+
+    from piezo_hysteresis.cli.identify import verdict_line
+
+    fit = SimpleNamespace(converged=False, iterations=40, at_bounds=())
+    said = verdict_line(SimpleNamespace(fit=fit, free_run_percent=5.0, notices=()))
+    assert said.startswith("Verdict: not determined. The fit did not converge in 40 linearisations")
+
+
+def test_swapped_channels_are_found(tmp_path):
+    stage = SimulatedStage(seed=1, sample_period=1e-3)
+    drive = np.concatenate((np.zeros(500), 5 - 5 * np.cos(2 * np.pi * 2 * np.arange(3000) * 1e-3)))
+    record = stage.play(drive, "x")
+    swapped = np.column_stack((record.time, record.displacement * 2e5, record.voltage * 5))
+    done = piezo(
+        "import", table(tmp_path / "s.csv", "time_s,voltage_V,displacement_um\n", swapped), "-o", tmp_path / "o"
+    )
+    (line,) = (line for line in done.stdout.splitlines() if line.startswith("leads"))
+    assert "both are swapped" in done.stdout
+    assert "severe" in line
+
+
+def test_three_phases_in_one_file_become_three(tmp_path):
+    t = np.arange(3000) * 1e-3
+    rest = np.zeros(500)
+    ramp = np.interp(t % 1, [0, 0.5, 1], [0, 8, 0])
+    drive = np.concatenate((rest, 5 - 5 * np.cos(4 * np.pi * t), rest, ramp, rest, np.repeat([0.0, 3, 6, 3, 0], 600)))
+    rows = np.column_stack((np.arange(drive.size) * 1e-3, drive, 5.0 * drive))
+    path = table(tmp_path / "three.csv", "time_s,voltage_V,displacement_um\n", rows)
+    done = piezo("import", path, "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    names = [r.phase for r in recording.read(tmp_path / "out") if r.phase != "rest"]
+    assert names == ["sine_2hz", "triangle", "staircase"]
+
+
+def test_help_of_emulate_names_the_ports():
+    said = " ".join(piezo("emulate", "--help").stdout.split())
+    assert "default: 50000 for gcs2, 31763 for nidaqmx" in said
+    assert "{'" not in said
+
+
+def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, monkeypatch):
+    monkeypatch.setattr(terminal, "LINE_INTERVAL", 0.02)
+    with terminal.progress("identify", "this usually takes a while") as report_progress:
+        report_progress("dynamics", 0.25)
+        while "dynamics" not in (said := capsys.readouterr().err):
+            time.sleep(0.01)
+            report_progress("dynamics", 0.25)
+    assert "identify: dynamics, 25 %, 0 s" in said

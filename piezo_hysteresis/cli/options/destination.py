@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 from ...errors import RecordingError
 
 
-def require_new_file(option: str, path: str | None) -> None:
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--force``."""
+    parser.add_argument("--force", action="store_true", help="replace files that exist")
+
+
+def require_new_file(option: str, path: str | None, force: bool | None = None) -> None:
     """Refuse a file that exists.
 
     Parameters
@@ -16,6 +22,8 @@ def require_new_file(option: str, path: str | None) -> None:
         What the user typed before it, e.g. ``"--truth"``.
     path : str or None
         The file; None where none was asked for.
+    force : bool, optional
+        Whether ``--force`` was given; None where the command does not have it.
 
     Raises
     ------
@@ -25,8 +33,9 @@ def require_new_file(option: str, path: str | None) -> None:
     if path is None:
         return
     place = Path(path).expanduser()
-    if place.exists():
-        raise RecordingError(f"{option}: {place} exists already, expected a new file; choose another name or remove it")
+    if place.exists() and not (force and place.is_file()):
+        way_out = "remove it" if force is None or not place.is_file() else "give --force to replace it"
+        raise RecordingError(f"{option}: {place} exists already, expected a new file; choose another name or {way_out}")
     if not place.absolute().parent.is_dir():
         raise RecordingError(f"{option}: {place.parent} is no folder, expected one that exists; create it")
 
@@ -51,3 +60,32 @@ def require_new_experiment(option: str, path: str) -> None:
     empty = place.is_dir() and place.suffix not in (".csv", ".mat") and not any(place.iterdir())
     if (place.exists() or place.is_symlink()) and not empty:
         raise RecordingError(f"{option}: {place} exists already, expected a new name; choose another one or remove it")
+
+
+def require_new_folder(option: str, path: str | None, force: bool) -> None:
+    """Refuse a folder that has something in it.
+
+    Parameters
+    ----------
+    option : str
+        What the user typed before it, e.g. ``"--figures"``.
+    path : str or None
+        The folder; None where none was asked for.
+    force : bool
+        Whether files in it may be replaced.
+
+    Raises
+    ------
+    RecordingError
+        If it is a file, or holds something.
+    """
+    if path is None:
+        return
+    place = Path(path).expanduser()
+    if place.exists() and not place.is_dir():
+        raise RecordingError(f"{option}: {place} is a file, expected a folder; choose another name")
+    if place.is_dir() and any(place.iterdir()) and not force:
+        raise RecordingError(
+            f"{option}: {place} holds files already, expected an empty or a new folder; choose another name or give "
+            "--force to write into it"
+        )
