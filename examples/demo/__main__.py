@@ -165,7 +165,7 @@ class Demo:
             command += ["--model", f"{label}={experiment / file}"]
         if (experiment / "answer.json").exists():
             command += ["--answer", experiment / "answer.json"]
-        subprocess.run([*command, "-o", self.folder / "report.html"], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([*command, "--force", "-o", self.folder / "report.html"], check=True, stdout=subprocess.DEVNULL)
         self.say(f"written: {os.path.relpath(self.folder)}/report.html, residual.png, scan.png, scan.csv")
 
     def reveal(self) -> None:
@@ -196,6 +196,8 @@ def main() -> int:
     arguments = parser.parse_args()
 
     folder = arguments.output.resolve()
+    if (folder / "experiments").exists():
+        print(f"The results of an earlier demo in {folder} are replaced; --output FOLDER keeps them.")
     shutil.rmtree(folder / "experiments", ignore_errors=True)
     folder.mkdir(parents=True, exist_ok=True)
     hide = [sys.executable, ROOT / "examples" / "hide_effect.py", str(arguments.seed), folder / "plant.yaml"]

@@ -62,7 +62,7 @@ def test_a_slower_path_is_interpolated_and_a_faster_one_refused(piezo, model, tm
     done = piezo("compensate", model, tmp_path / "slow.csv", "-o", tmp_path / "c.npz")
     assert done.status == 0 and "interpolated" in done.out
     write(tmp_path / "fast.csv", 1.0, 3.0, period=1e-5)
-    done = piezo("compensate", model, tmp_path / "fast.csv", "-o", tmp_path / "c.npz")
+    done = piezo("compensate", model, tmp_path / "fast.csv", "-o", tmp_path / "other.npz")
     assert done.status == 2 and "or more" in done.err
 
 
