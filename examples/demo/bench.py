@@ -24,6 +24,7 @@ from piezo_hysteresis.nodes.messages.cloud import from_cloud, to_cloud
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.messages.samples import SampleReader
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES, STATUS
+from piezo_hysteresis.nodes.topics import TOPICS
 
 Array = NDArray[np.float64]
 
@@ -73,15 +74,12 @@ class Recording:
         return bool(self._blocks) and (int(self._blocks[-1].index[-1]) - index) % 2**32 < 2**31
 
     def displacement(self, first: int, size: int) -> Array:
-        """Displacement of `size` samples from index `first` on [m]."""
+        """Displacement of `size` samples from index `first` on, NaN where one was lost on the way [m]."""
         found = np.full(size, np.nan)
         for block in self._blocks:
             number = block.index - np.uint32(first % 2**32)
             inside = number < size
             found[number[inside]] = block.displacement[inside]
-        lost = int(np.isnan(found).sum())
-        if lost:
-            raise RuntimeError(f"{lost} of {size} samples of the scan were lost on the way")
         return found
 
 
@@ -119,7 +117,7 @@ class Bench:
         subscribe(String, "model", lambda message: self.models.append(message.data), LATCHED)
         subscribe(Float64, "residual_rms", self._on_rms, COMMAND)
         subscribe(PointCloud2, "predicted_samples", self._on_predicted, SAMPLES)
-        subscribe(PointCloud2, "samples", self._samples.take, SAMPLES, raw=True)
+        subscribe(PointCloud2, "samples", self._samples.take, TOPICS["samples"].deep, raw=True)
         self._services = {
             service: self.node.create_client(Trigger, f"{owner}/{service}")
             for owner, services in SERVICES.items()
@@ -212,12 +210,12 @@ class Bench:
         return Trace(self._sample_period * number[inside], residual[inside], live)
 
     def play_measured(self, voltage: Array, name: str, timeout: float = 120.0) -> Array:
-        """Play a waveform [V] and return the displacement of every sample, shape as `voltage` [m].
+        """Play a waveform [V] and return the displacement of every sample, shape as `voltage` [m]; NaN: lost.
 
         Raises
         ------
         RuntimeError
-            If the driver does not play it to its end, or samples were lost.
+            If the driver does not play it to its end.
         TimeoutError
             If that takes too long.
         """
@@ -249,13 +247,7 @@ class Bench:
         return min(rounds, key=lambda status: float(values_of(status)["rms"]), default=end)
 
     def measured(self, first: int, size: int) -> Array:
-        """Displacement of `size` samples from index `first` on [m].
-
-        Raises
-        ------
-        RuntimeError
-            If samples were lost on the way.
-        """
+        """Displacement of `size` samples from index `first` on, NaN where one was lost on the way [m]."""
         self.wait(lambda: self._samples.holds(first + size - 1), "the last sample", 30.0)
         return self._samples.displacement(first, size)
 

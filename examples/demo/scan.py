@@ -57,7 +57,7 @@ class Run:
     method : str
         How the drive was found.
     error : (n,) ndarray
-        Measured minus wanted displacement along the scan [m]; empty where it was refused.
+        Measured minus wanted displacement along the scan, NaN where a sample was lost [m]; empty where it was refused.
     expected : float
         Rms error that was expected before it was played [m].
     reason : str
@@ -72,7 +72,7 @@ class Run:
     @property
     def rms(self) -> float:
         """Measured, the noise of the sensor included [m]."""
-        return float(np.sqrt(np.mean(self.error**2))) if self.error.size else float("nan")
+        return float(np.sqrt(np.nanmean(self.error**2))) if self.error.size else float("nan")
 
 
 class Scan:

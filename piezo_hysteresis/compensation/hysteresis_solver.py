@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import copysign
 
 from ..blocks.bouc_wen_kernel import BETA, GAMMA, A, general_step, plain_step
-from ..blocks.kernel import kernel
+from ..blocks.kernel import inlined
 from ..effects.hysteresis.published_bouc_wen import step as published_step
 
 NO_LOOP, PLAIN, GENERAL, PUBLISHED = range(4)
@@ -23,7 +23,7 @@ MOST = 80
 """Steps of the search at most; the bracket is halved at every sixth."""
 
 
-@kernel
+@inlined
 def loop_end(kind, p, periods, h, last, v):
     """h after the loop of `kind` has gone from `last` to v."""
     if kind == NO_LOOP or v == last:
@@ -35,14 +35,14 @@ def loop_end(kind, p, periods, h, last, v):
     return published_step(h, v - last, p[0], p[1], p[2], p[3])
 
 
-@kernel
+@inlined
 def static_part(poly, v):
     """p1 v³ + p2 v + p_e v² + p_4 v⁴."""
     square = v * v
     return poly[P1] * v * v * v + poly[P2] * v + (poly[SQUARE] + poly[FOURTH] * square) * square
 
 
-@kernel
+@inlined
 def plays_end(c, radii, plays, v):
     """Σ c_j (p_j + b_j p_j²) at v."""
     total = 0.0
@@ -52,7 +52,7 @@ def plays_end(c, radii, plays, v):
     return total
 
 
-@kernel
+@inlined
 def output(kind, p, periods, poly, c, radii, h, last, plays, v):
     """w at v."""
     w = static_part(poly, v) + loop_end(kind, p, periods, h, last, v)
@@ -61,7 +61,7 @@ def output(kind, p, periods, poly, c, radii, h, last, plays, v):
     return w
 
 
-@kernel
+@inlined
 def slope_at(kind, p, poly, c, radii, h, last, plays, s):
     """∂w/∂v where v leaves `last` in the direction s."""
     v = last
@@ -74,7 +74,7 @@ def slope_at(kind, p, poly, c, radii, h, last, plays, s):
     return slope
 
 
-@kernel
+@inlined
 def solve(kind, p, periods, poly, c, radii, h, last, plays, wanted, now, orientation, low, high):
     """v in [low, high] with w(v) = wanted; the nearer end where there is none. `now` is w at `last`."""
     gap = wanted - now

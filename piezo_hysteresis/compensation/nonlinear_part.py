@@ -141,7 +141,7 @@ class NonlinearPart:
     def _bank(
         banks: list[tuple[float, Array, Array, Array]],
     ) -> tuple[NDArray[Any], ...]:
-        starts = np.cumsum([0, *(b[1].size for b in banks)]).astype(np.int64)
+        starts = np.cumsum([0, *(b[1].size for b in banks)]).astype(np.uint64)
         direct = np.array([b[0] for b in banks])
         fade, lead, weights = (np.concatenate([np.zeros(0), *(b[k] for b in banks)]) for k in (1, 2, 3))
         gains = np.array([1.0 + b[0] + float(b[3] @ b[2]) for b in banks])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ..blocks.kernel import kernel
+from ..blocks.kernel import inlined, kernel
 from .hysteresis_solver import loop_end, solve, static_part
 
 PER_VOLT, LEFT, LEAD, BACK, PLAY, REACH, LOWER, UPPER, CORNER, LOWEST, HIGHEST, STEP, LOW, HIGH, TURN, RESOLUTION = (
@@ -30,7 +30,7 @@ def saturated(u, lower, upper, corner):
     return u - ramp(u - upper, corner) + ramp(lower - u, corner)
 
 
-@kernel
+@inlined
 def ramp(excess, corner):
     """Ramp with a bend of half width `corner`."""
     if abs(excess) < corner:
@@ -38,7 +38,7 @@ def ramp(excess, corner):
     return max(excess, 0.0)
 
 
-@kernel
+@inlined
 def before_saturation(v, lower, upper, corner):
     """The voltage that `saturated` turns into v; where v is beyond the end, where the end is reached."""
     if v > upper - corner:
@@ -48,7 +48,7 @@ def before_saturation(v, lower, upper, corner):
     return v
 
 
-@kernel
+@inlined
 def voltage_for(v, d, state):
     """Drive voltage inside the limits for a voltage v behind the play."""
     pushed = v
@@ -67,7 +67,7 @@ def voltage_for(v, d, state):
     return min(max(u, d[LOWEST]), d[HIGHEST])
 
 
-@kernel
+@inlined
 def drive(u, d, state):
     """Voltage behind the play for the drive u; the state follows."""
     state[VOLTAGE] = u
@@ -80,7 +80,7 @@ def drive(u, d, state):
     return state[HELD]
 
 
-@kernel
+@inlined
 def settle_before(target, starts, direct, fade, lead, weights, lasts, banks, gains, ahead):
     """w that gives `target` behind the relaxation banks; ahead (s,) becomes their states for an unchanged input."""
     for b in range(direct.size - 1, -1, -1):
@@ -92,7 +92,7 @@ def settle_before(target, starts, direct, fade, lead, weights, lasts, banks, gai
     return target
 
 
-@kernel
+@inlined
 def relax_to(w, starts, direct, lead, weights, lasts, banks, ahead):
     """States of the banks for the w that comes."""
     for b in range(direct.size):
