@@ -230,8 +230,8 @@ class Bench:
         self._trajectory.publish(to_cloud(columns, {"displacement": "f8"}, stamp, name))
         return self._driven_to_end(name, timeout)
 
-    def learn(self, timeout: float = 120.0) -> DiagnosticStatus:
-        """Let the compensation node play the last path in rounds; its status after the best of them.
+    def learn(self, timeout: float = 120.0) -> tuple[DiagnosticStatus, DiagnosticStatus]:
+        """Let the compensation node play the last path in rounds; its status after the best of them, and at the end.
 
         Raises
         ------
@@ -244,7 +244,7 @@ class Bench:
             raise RuntimeError(f"learn: {answer.message}")
         end = self._driven_to_end("", timeout)
         rounds = [status for status in self._driven if values_of(status)["state"] == "learning"]
-        return min(rounds, key=lambda status: float(values_of(status)["rms"]), default=end)
+        return min(rounds, key=lambda status: float(values_of(status)["rms"]), default=end), end
 
     def measured(self, first: int, size: int) -> Array:
         """Displacement of `size` samples from index `first` on, NaN where one was lost on the way [m]."""

@@ -60,14 +60,14 @@ class Run:
         Measured minus wanted displacement along the scan, NaN where a sample was lost [m]; empty where it was refused.
     expected : float
         Rms error that was expected before it was played [m].
-    reason : str
-        Why it was refused; empty where it was played.
+    note : str
+        Why it was refused, or what learning says of its rounds; empty elsewhere.
     """
 
     method: str
     error: Array = field(default_factory=lambda: np.empty(0))
     expected: float = float("nan")
-    reason: str = ""
+    note: str = ""
 
     @property
     def rms(self) -> float:
@@ -115,21 +115,24 @@ class Scan:
         for name, wanted in self.wanted.items():
             phase = f"{method.split()[0]}_{name}"
             status = self._bench.follow(wanted, phase)
-            self.runs[name].append(self._run(method, wanted, values_of(status), status.message))
+            refused = "" if values_of(status)["state"] == "done" else status.message
+            self.runs[name].append(self._run(method, wanted, values_of(status), refused))
 
-    def learn(self, method: str, extended: str) -> None:
+    def learn(self, method: str) -> None:
         """Send the paths once more, and let the node correct what it measures; the best round counts, as there."""
         for name, wanted in self.wanted.items():
-            status = self._bench.follow(wanted, f"{extended}_{name}")
-            if values_of(status)["state"] == "done":
-                status = self._bench.learn()
-            self.runs[name].append(self._run(method, wanted, values_of(status), status.message))
+            best = end = self._bench.follow(wanted, f"learning_{name}")
+            if values_of(best)["state"] == "done":
+                best, end = self._bench.learn()
+            number = values_of(best)["phase"].rpartition("_")[2]
+            label = f"{method}, after {number} corrections" if number.isdecimal() else method
+            self.runs[name].append(self._run(label, wanted, values_of(best), end.message))
 
-    def _run(self, method: str, wanted: Array, values: dict[str, str], reason: str) -> Run:
+    def _run(self, method: str, wanted: Array, values: dict[str, str], note: str) -> Run:
         if "first_index" not in values:
-            return Run(method, reason=reason)
+            return Run(method, note=note)
         measured = self._bench.measured(int(values["first_index"]), wanted.size)
-        return Run(method, measured - wanted, float(values["expected"]))
+        return Run(method, measured - wanted, float(values["expected"]), note)
 
     def show(self, console: Console) -> None:
         """One table: the error expected beside the one that was measured, of both paths."""
@@ -141,12 +144,12 @@ class Scan:
                 table.add_column(f"{TITLES[name]}\n{word}", justify="right", no_wrap=True)
         for rows in zip(*self.runs.values(), strict=True):
             cells = [text for run in rows for text in (self._percent(run.expected), self._percent(run.rms))]
-            table.add_row(rows[0].method, *cells)
+            table.add_row(rows[0].method.partition(",")[0], *cells)
         console.print(table)
         for name, runs in self.runs.items():
             for run in runs:
-                if run.reason:
-                    console.print(f"          {TITLES[name]}, {run.method}: not played: {run.reason}")
+                if run.note:
+                    console.print(f"          {TITLES[name]}, {run.method}: {run.note}")
 
     def _percent(self, error: float) -> str:
         return f"{100.0 * error / ((HIGH - LOW) * self.stroke):.3g}" if np.isfinite(error) else "refused"

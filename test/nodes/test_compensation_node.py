@@ -34,10 +34,10 @@ MODEL = Model(
 class Compensation:
     """A driver, a compensation node, and its status."""
 
-    def __init__(self, lab, known=MODEL, **parameters):
+    def __init__(self, lab, known=MODEL, driver=None, **parameters):
         self.lab = lab
         self.statuses = lab.listen(DiagnosticStatus, "status", STATUS)
-        self.driver = lab.driver(**DRIVER, real_time_factor=1.0)
+        self.driver = lab.driver(**(driver or {**DRIVER, "real_time_factor": 1.0}))
         self.samples = lab.streaming()
         model = str(save(known, lab.folder / "model.yaml")) if known is not None else ""
         self.process = lab.start(NODE, **{"model_file": model, "approach": 0.05, **parameters})
