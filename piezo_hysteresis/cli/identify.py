@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..effects import HYSTERESIS, OPERATORS, PublishedBoucWen
+from ..effects import HYSTERESIS, MEMORY, OPERATORS, PublishedBoucWen
 from ..identification.identification import Identification
 from ..identification.identify import identify
 from ..identification.records.roles import HELD_OUT
@@ -50,7 +50,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="Bouc-Wen in the discrete form of the paper, Eq. (7)",
     )
     parser.add_argument(
-        "--no-memory", action="store_true", help="use the Bouc-Wen state even if play operators predict better"
+        "--no-memory",
+        action="store_true",
+        help=f"keep the state of the operator even if {MEMORY.name} predicts better",
     )
     parser.add_argument(
         "--held-out",

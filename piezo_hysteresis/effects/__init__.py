@@ -78,6 +78,9 @@ CHAIN: tuple[type[Effect], ...] = (
 HYSTERESIS: type[HysteresisOperator] = BoucWen
 """The hysteresis that is identified unless another one is asked for."""
 
+MEMORY: type[HysteresisMemory] = HysteresisMemory
+"""What takes the place of an operator's state where the stage remembers its turning points."""
+
 OPERATORS: dict[str, type[HysteresisOperator]] = {e.name: e for e in CHAIN if issubclass(e, HysteresisOperator)}
 """Every operator that can play the role of the hysteresis, by its identifier."""
 
@@ -114,6 +117,7 @@ __all__ = [
     "CHAIN",
     "FINER_FORMS",
     "HYSTERESIS",
+    "MEMORY",
     "OPERATORS",
     "AmplifierBandwidth",
     "AmplifierSaturation",

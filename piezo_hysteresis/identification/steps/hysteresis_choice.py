@@ -1,9 +1,9 @@
-"""Plays or one Bouc-Wen state: which of them predicts the blocks of the experiment that were left out.
+"""Choice between play operators and the state of the hysteresis operator, by cross-validation over blocks of samples.
 
-On loops of one amplitude both fit alike. They differ in what they foretell for another: a Bouc-Wen state has no memory
-of turning points, so its loop of one amplitude says little about the next; plays with weights that are not negative
-(a Prandtl-Ishlinskii operator) hold all smaller loops within the largest. Blocks left out, the first one with its way
-from rest among them, show the difference.
+Both fit loops of one amplitude equally well, but they predict different loops for another amplitude. A Bouc-Wen state
+has no memory of turning points, so a loop of one amplitude determines little about the next. Play operators with
+weights that are not negative (a Prandtl-Ishlinskii operator) keep all smaller loops inside the largest one. Blocks that
+were left out of the fit decide; the first block contains the way from rest.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import Arx, HysteresisMemory
+from ...effects import MEMORY, Arx
 from ...model.model import Model
 from ...record import Notice, Record
 from ..fit.fit import Fit, fit
@@ -53,14 +53,14 @@ def with_plays(model: Model, records: Sequence[Record]) -> Model | None:
         return None
     low = min(min(float(r.voltage.min()), r.settled_voltage) for r in records)
     high = max(max(float(r.voltage.max()), r.settled_voltage) for r in records)
-    plays = HysteresisMemory(c=(0.0,) * PLAYS, reach=WIDEST * (high - low) / model.voltage_scale)
+    plays = MEMORY(c=(0.0,) * PLAYS, reach=WIDEST * (high - low) / model.voltage_scale)
     return model.with_hysteresis(loop).with_effect(plays)
 
 
 def linear_numbers(model: Model) -> list[str]:
     """Numbers of the plays and of the polynomial beside them."""
     polynomial = [f"{model.hysteresis.name}.{n}" for n in model.hysteresis.linear_numbers()]
-    return polynomial + [f"{HysteresisMemory.name}.c[{j}]" for j in range(PLAYS)]
+    return polynomial + [f"{MEMORY.name}.c[{j}]" for j in range(PLAYS)]
 
 
 def choose_memory(
@@ -96,11 +96,11 @@ def choose_memory(
     of_plays, of_state = (float(np.mean(np.log(np.maximum(e, 1.0)))) for e in (plays_error, state_error))
     message = (
         f"in cross-validation play operators reach {np.exp(of_plays):.3g} times the floor and "
-        f"a Bouc-Wen state reaches {np.exp(of_state):.3g} times the floor (geometric means)"
+        f"{joint.model.hysteresis.name} reaches {np.exp(of_state):.3g} times the floor (geometric means)"
     )
     lead = of_plays - of_state
     if lead > np.log(TIE):
-        return joint, (Notice("memory", f"{message}; the Bouc-Wen state is used"),)
+        return joint, (Notice("memory", f"{message}; {joint.model.hysteresis.name} is used"),)
     clear = lead < -np.log(TIE)
     because = (
         "the stage remembers its turning points"
@@ -110,7 +110,7 @@ def choose_memory(
     kept, kept_floors = select(records, floors, fitted)
     free = [*linear_numbers(plays), *(n for n in joint.names if n.startswith(f"{Arx.name}."))]
     found = fit(plays, kept, free, floors=kept_floors, nuisance=Nuisance(offset=True))
-    return found, (Notice("memory", f"{message}; {because}, so hysteresis_memory is used"),)
+    return found, (Notice("memory", f"{message}; {because}, so {MEMORY.name} is used"),)
 
 
 def left_out(blocks: Sequence[Record], floors: Sequence[float], fitted_to: Callable[[list[int]], Model]) -> Array:
