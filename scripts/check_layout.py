@@ -19,14 +19,13 @@ PACKAGE = ROOT / "piezo_hysteresis"
 """The Python package."""
 MOST_MODULES = 16
 """Modules in a folder of the package at most, `__init__.py` aside."""
-MOST_LINES = 260
+MOST_LINES = 250
 """Lines of a module of the package at most."""
 LONGER = {
+    "piezo_hysteresis/discrepancy/passes.py": 260,
+    "piezo_hysteresis/discrepancy/search/single_record.py": 260,
     "piezo_hysteresis/model/model.py": 275,
     "piezo_hysteresis/online/predictor.py": 275,
-    "piezo_hysteresis/record.py": 270,
-    "piezo_hysteresis/recording/bag/rosbag2.py": 270,
-    "piezo_hysteresis/recording/table/text_cells.py": 270,
 }
 """Modules that are longer, and how long they may be."""
 LONGEST_SUBJECT = 72

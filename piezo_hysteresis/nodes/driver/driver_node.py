@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,13 +10,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from rclpy.wait_for_message import wait_for_message
-from sensor_msgs.msg import PointCloud2
 
 from ...acquisition.safety.stop_latch import StopLatch
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DRIVER, IN_FORCE, DriverSettings
-from ...errors import ParameterError, PiezoError, StageError, reason_of
+from ...errors import ParameterError, PiezoError, reason_of
 from ...record import Record
 from ...stage.back_ends import BACK_ENDS
 from ..messages.frame import frame_name
@@ -25,13 +22,10 @@ from ..runtime.guarded_node import GuardedNode
 from ..runtime.node_clock import now
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
-from ..runtime.qos import SAMPLES
 from .commands import DriverCommands
 from .diagnostics import DriverDiagnostics
 from .publishers import DriverTopics
-
-_SILENCE = 1.0
-"""Time without a block after which a publisher of samples is taken for dead [s]."""
+from .second_driver import refuse_second_driver
 
 _SIMULATED_TIME = "use_sim_time"
 """Parameter of every ROS node: its clock follows /clock."""
@@ -65,7 +59,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         self._session: DriverSession | None = None
         self._topics: DriverTopics | None = None
         self._failure: PiezoError | None = None
-        self._telling = False
+        self._in_force_changes = False
         self._latch = StopLatch()
         self._diagnostics = DriverDiagnostics(self, self._latch)
         self.add_on_set_parameters_callback(self._refuse_while_configured)
@@ -94,7 +88,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             place = f"{self.resolve_topic_name('samples')} of domain {self.context.get_domain_id()}"
             session = DriverSession(settings, values, place, _records, self._latch)
             try:
-                self._refuse_second_driver(settings.discovery_time)
+                refuse_second_driver(self, settings.discovery_time)
                 name = session.limits.name
                 self._topics = DriverTopics(self, name, frame, session.sample_period, settings.live_rate)
             except Exception:
@@ -201,24 +195,9 @@ class DriverNode(GuardedNode, LifecycleNode):
         self._diagnostics.state(DiagnosticStatus.ERROR, reason)
 
     def _publish_in_force(self, values: Mapping[str, object]) -> None:
-        self._telling = True
+        self._in_force_changes = True
         self.set_parameters([Parameter(f"in_force.{name}", value=value) for name, value in values.items()])
-        self._telling = False
-
-    def _refuse_second_driver(self, discovery_time: float) -> None:
-        """A publisher of samples that really sends is another driver, on this machine or another one."""
-        deadline = time.monotonic() + discovery_time
-        while self.count_publishers("samples") == 0:
-            if time.monotonic() > deadline:
-                return
-            time.sleep(0.02)
-        sends, _ = wait_for_message(PointCloud2, self, "samples", qos_profile=SAMPLES, time_to_wait=_SILENCE)
-        if sends:
-            topic = self.resolve_topic_name("samples")
-            raise StageError(f"{topic} is published by another driver; stop that one or take another namespace")
-        self.get_logger().warning(
-            "another publisher of samples exists but is silent; it is taken for a driver that was killed"
-        )
+        self._in_force_changes = False
 
     def _refuse_while_configured(self, parameters: list[Parameter]) -> SetParametersResult:
         """Parameters are read at configure; a change that would have no effect is not accepted."""
@@ -228,7 +207,11 @@ class DriverNode(GuardedNode, LifecycleNode):
             if name == _SIMULATED_TIME:
                 reason = f"{name}: {_OWN_CLOCK}"
             elif name.startswith("in_force."):
-                reason = "" if self._telling else f"{name} is read only; set {name.removeprefix('in_force.')} instead"
+                reason = (
+                    ""
+                    if self._in_force_changes
+                    else f"{name} is read only; set {name.removeprefix('in_force.')} instead"
+                )
             elif self._session is not None and (name in ours or name.split(".")[0] in BACK_ENDS):
                 reason = (
                     f"{name} is read when the driver is configured; deactivate and clean up the driver, set it, "

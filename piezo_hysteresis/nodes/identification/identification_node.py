@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Generator, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 
 from rcl_interfaces.msg import SetParametersResult
@@ -29,6 +28,7 @@ from ..runtime.process import run
 from ..runtime.sending import send
 from ..topics import QOS_OVERRIDES, advertise
 from .driver_client import DriverClient
+from .experiment_folder import ExperimentFolder
 from .fit_process import FitProcess, Job, diagnosis, identification
 from .protocol_runner import Progress, run_protocol
 from .served_model import ServedModel
@@ -69,7 +69,7 @@ class IdentificationNode(GuardedNode):
         self._models = advertise(self, "model")
         self._job: Generator[Progress] | None = None
         self._moves = False
-        self._last: Path | None = None
+        self._folder = ExperimentFolder(self._value("experiment_root"), self.get_namespace())
         self._served = ServedModel(self, START)
         try:
             self._served.resume({name: p.value for name, p in self._parameter_overrides.items()})
@@ -112,7 +112,7 @@ class IdentificationNode(GuardedNode):
         if self._driver.stopped:
             response.message = self._driver.stopped
             return response
-        path = self._root() / datetime.now(UTC).strftime("%Y%m%dT%H%M%S%fZ")
+        path = self._folder.new()
         if self._driver.is_fresh and self._driver.limits is not None:
             try:
                 self._protocol(self._driver.limits)
@@ -122,9 +122,9 @@ class IdentificationNode(GuardedNode):
         return self._begin(response, self._identify(path), f"recording to {path}")
 
     def _on_diagnose(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        path = self._experiment()
+        path = self._folder.chosen(self._value("experiment"))
         if path is None:
-            response.message = f"no experiment in {self._root()}; set 'experiment', or identify first"
+            response.message = f"no experiment in {self._folder.root}; set 'experiment', or identify first"
             return response
         return self._begin(response, self._fit(diagnosis, path), f"diagnosing {path}")
 
@@ -183,7 +183,7 @@ class IdentificationNode(GuardedNode):
         self._status.owner = self._driver.owner
         yield from run_protocol(self, self._driver, plan, path)
         save_decimation(path, {phase.name: phase.stored_every for phase in planned[0]})
-        self._last = path
+        self._folder.last = path
         yield from self._fit(identification, path)
 
     def _fit(self, job: Job, path: Path) -> Generator[Progress]:
@@ -212,17 +212,6 @@ class IdentificationNode(GuardedNode):
     def _value(self, name: str) -> str:
         return str(self.get_parameter(name).value)
 
-    def _root(self) -> Path:
-        given = self._value("experiment_root")
-        return Path(given or Path("~/.ros/piezo_hysteresis") / self.get_namespace().strip("/")).expanduser()
-
-    def _experiment(self) -> Path | None:
-        given = self._value("experiment")
-        if given or self._last is not None:
-            return Path(given).expanduser() if given else self._last
-        recorded = sorted(path.parent for path in self._root().glob("*/metadata.yaml"))
-        return recorded[-1] if recorded else None
-
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         rows = {row.name: row for row in IDENTIFICATION}
         try:
@@ -244,11 +233,8 @@ class IdentificationNode(GuardedNode):
         """Others shall not choose where this node writes: a diagnosis leaves files beside its recording."""
         if parameter.name in ("driver", "experiment_root"):
             raise ParameterError(f"{parameter.name} is read at start; give it then")
-        root = self._root().resolve()
         if parameter.name == "experiment" and parameter.value:
-            place = Path(parameter.value).expanduser().resolve()
-            if not (place.is_relative_to(root) and place.exists()):
-                raise ParameterError(f"experiment: got {place}, expected a recording inside {root}")
+            self._folder.check(parameter.value)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,26 +10,16 @@ import numpy as np
 from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
-from ..checks.split_at_gaps import split_at_gaps
-from ..segmentation.decimating_buffer import averaged_notice, shared_averages
-from ..segmentation.phases import labelled
-from ..segmentation.segment import Segment
-from ..segmentation.waveform import phase_name
+from ..segmentation.decimating_buffer import shared_averages
 from ..table.read_options import ReadOptions
 from .bag import STORAGES, Bag
 from .bag_writer import BagWriter
 from .block_message import TYPE, BlockMessage, typestore
 from .foreign_topics import read_topics
 from .phase_topic import STRING, PhaseNames
+from .recorded_phases import IDLE, records_of
 from .sample_stream import SampleStream
 
-IDLE, HOLD = "idle", "hold"
-"""What the stage does before the first and after every phase; left out unless `ReadOptions.include` names it."""
-
-_MOVED = 0.01
-"""Share of the largest movement below which a segment counts as resting."""
-_SEVERE_SHARE = 0.05
-"""Share of lost samples from which a phase is not to be trusted."""
 _BLOCK_DURATION = 0.01
 """Length of the messages that are written [s]."""
 
@@ -155,97 +145,8 @@ def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[No
     (space, stream), *_ = streams.items()
     segments, more_notices = stream.segments(split_phases=options.phases is None)
     averages = shared_averages([s.size for s in segments], options.average)
-    records, more = _records(segments, averages, names.get(space, PhaseNames()), options)
+    records, more = records_of(segments, averages, names.get(space, PhaseNames()), options)
     return records, [*notices, *more_notices, *more]
-
-
-def _records(
-    segments: list[Segment], averages: list[int], names: PhaseNames, options: ReadOptions
-) -> tuple[list[Record], list[Notice]]:
-    unlabelled = options.phases is not None or (not names and all(s.phase == 0 for s in segments))
-    records: list[Record] = []
-    notices: list[Notice] = []
-    moving = _MOVED * max(_travel(segment) for segment in segments)
-    before: Segment | None = None
-    kept = excited = False
-    for segment, average in zip(segments, averages, strict=True):
-        if segment.first:
-            before, kept, excited = None, False, False
-        slow = segment.averaged(average)
-        name = "record" if unlabelled else _name(slow if slow.size else segment, names, notices)
-        moves = _travel(segment) > moving
-        left_out = name in (IDLE, HOLD) and name not in options.include and not (name == HOLD and moves and kept)
-        if missing := segment.lost + sum(segment.breaks.values()):
-            lost = f"{missing} samples ({missing * segment.sample_period:.3g} s) were lost"
-            places = len(segment.breaks) + (segment.lost > 0)
-            severe = not left_out and missing > _SEVERE_SHARE * (segment.size + missing)
-            notices.append(Notice("gap", f"{lost} in {places} places", name, severe))
-        if paused := sum(n for at, n in segment.pauses.items() if at):
-            held = f"{paused} samples ({paused * segment.sample_period:.3g} s) were not measured"
-            notices.append(Notice("pause", f"{held} while the device held its voltage and its memory was read", name))
-        if left_out and moves:
-            text = (
-                f"the drive moved by {_travel(segment):.3g} V before the first phase; the stage is "
-                "assumed to have settled afterwards"
-            )
-            notices.append(Notice("moved", text, name))
-        if not left_out:
-            begins = segment.phase == 0 if segment.first else segment.lost == 0
-            if excited and not kept:
-                notices.append(
-                    Notice("history", "earlier phases were not recorded; the stage is assumed to have settled", name)
-                )
-            if not slow.size:
-                text = f"its {segment.size} samples are fewer than the {average} to be averaged; the phase was left out"
-                notices.append(Notice("averaged", text, name))
-                continue
-            if options.average is None and average > 1:
-                notices.append(averaged_notice(average, slow.sample_period, name))
-            parts, more_notices = split_at_gaps(
-                slow.channels,
-                slow.sample_period,
-                slow.breaks,
-                slow.pauses,
-                phase=name,
-                start_time=segment.start_time,
-                continues=kept,
-                truncated=not begins,
-                initial_voltage=float(before.channels["voltage"][-1]) if before and begins and not kept else None,
-            )
-            if not begins:
-                notices.append(
-                    Notice("truncated", "its beginning was not recorded; the initial state is unknown", name)
-                )
-            records += parts
-            notices += more_notices
-            kept = True
-        excited |= name != IDLE
-        before = segment
-    if not records:
-        raise RecordingError(f"holds only {IDLE} and {HOLD}, expected phases; `include` keeps those")
-    origin = records[0].start_time
-    records = [replace(r, start_time=r.start_time - origin) for r in records]
-    if unlabelled:
-        records, more_notices = labelled(records, options.phases)
-        notices += more_notices
-    return records, notices
-
-
-def _travel(segment: Segment) -> float:
-    """Range of the drive [V]."""
-    voltage = segment.channels["voltage"]
-    return float(np.ptp(voltage)) if np.isfinite(voltage).all() else 0.0
-
-
-def _name(segment: Segment, names: PhaseNames, notices: list[Notice]) -> str:
-    """Recorded name of a segment, or a proposed one."""
-    name = names.at(segment.phase, segment.received_ns) or (IDLE if segment.phase == 0 else "")
-    if not name:
-        name = phase_name(segment.channels["voltage"], segment.sample_period)
-        notices.append(
-            Notice("proposed", f"phase number {segment.phase} has no recorded name; '{name}' is assumed", name)
-        )
-    return name
 
 
 def _write_blocks(bag: BagWriter, record: Record, number: int, clock_ns: int, index: int) -> tuple[int, int]:

@@ -11,9 +11,10 @@ from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
+from ..table.dialect import Dialect
 from ..table.read_options import LABELS, ReadOptions, is_channel
 from ..table.table import resolve, table_records
-from ..table.text_cells import Dialect, read_cells
+from ..table.text_cells import read_cells
 from ..table.time_column import TimeColumn
 
 _ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")

@@ -10,9 +10,10 @@ from ...errors import RecordingError
 from ...record import Experiment, Notice
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
+from ..table.dialect import Dialect, decoded
 from ..table.read_options import ReadOptions, is_channel
 from ..table.table import resolve, table_records
-from ..table.text_cells import BLOCK_BYTES, Dialect, decoded, read_cells
+from ..table.text_cells import BLOCK_BYTES, read_cells
 
 _END = "# END_HEADER"
 """Last line of the header."""

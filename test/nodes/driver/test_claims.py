@@ -63,7 +63,8 @@ def test_foreign_motion_is_kept_out_of_a_protocol(lab):
         assert lab.wait(lambda: identification.ask("identify").success, "the start")
         reported = identification.await_state("running", "failed")
         owner = values_of(reported)["owner"]
-        assert axis.holders[-1].data == owner != ""
+        assert owner
+        axis.held_by(owner)
         reports = lab.diagnostics()
         lab.wait(
             lambda: (values_of(identification.statuses[-1])["phase"] or "0").startswith("4 of"), "the fourth phase"

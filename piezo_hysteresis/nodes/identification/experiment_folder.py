@@ -1,0 +1,52 @@
+"""`ExperimentFolder`: where the recordings of the identification node are, and which one is meant."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from ...errors import ParameterError
+
+
+class ExperimentFolder:
+    """Folder of the recordings of one axis.
+
+    Parameters
+    ----------
+    root : str
+        Parameter `experiment_root`; empty for the default.
+    namespace : str
+        Namespace of the node, which the default contains.
+
+    Attributes
+    ----------
+    last : Path or None
+        The newest recording of this node.
+    """
+
+    def __init__(self, root: str, namespace: str) -> None:
+        self.root = Path(root or Path("~/.ros/piezo_hysteresis") / namespace.strip("/")).expanduser()
+        self.last: Path | None = None
+
+    def new(self) -> Path:
+        """Path of a new recording, named by the time (UTC)."""
+        return self.root / datetime.now(UTC).strftime("%Y%m%dT%H%M%S%fZ")
+
+    def chosen(self, given: str) -> Path | None:
+        """The recording of this path; if it is empty, the last one. None if there is none."""
+        if given or self.last is not None:
+            return Path(given).expanduser() if given else self.last
+        recorded = sorted(path.parent for path in self.root.glob("*/metadata.yaml"))
+        return recorded[-1] if recorded else None
+
+    def check(self, given: str) -> None:
+        """Refuse a path outside the folder: a diagnosis writes files beside its recording.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such recording.
+        """
+        root, place = self.root.resolve(), Path(given).expanduser().resolve()
+        if not (place.is_relative_to(root) and place.exists()):
+            raise ParameterError(f"experiment: got {place}, expected a recording inside {root}")
