@@ -8,7 +8,7 @@ come, when and for how long.
     make soak SOAK="--minutes 1 --seed 3"
     make soak SOAK="--minutes 10 --rate 100000 --no-faults"
 
-Without faults the processes are never started again, so that the growth of their memory can be told.
+Without faults the processes are never started again, so that the growth of their memory can be measured.
 """
 
 from __future__ import annotations

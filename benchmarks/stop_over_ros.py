@@ -201,7 +201,7 @@ class StopBench:
 
 
 def _heard(controller: Controller) -> list[str]:
-    """The lines that an emulated controller is told from now on."""
+    """The lines that an emulated controller receives from now on."""
     lines: list[str] = []
     carry_out = controller.carry_out
 

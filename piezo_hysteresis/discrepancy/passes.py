@@ -187,7 +187,7 @@ def search_effects(state: DiagnosisState) -> DiagnosisState:
 
 
 def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
-    """Searches once more where the model that was found tells otherwise what slow samples have lost."""
+    """Searches once more if the model that was found corrects averaged samples differently."""
     selection = state.searched
     leaves_a_gap = bool(selection.accepted) and selection.score.excess > ADEQUATE
     if selection.in_time and leaves_a_gap and state.sharpens and state.fitted.is_coarse(selection.model):

@@ -59,7 +59,7 @@ def faults_of(word):
 
 
 class Motions:
-    """A session that moves as it is told, whatever fails."""
+    """A session that carries out every command, whatever fails."""
 
     def __init__(self, session):
         self.session = session

@@ -201,7 +201,7 @@ def _verdict(
             f"The model misses {' and '.join(names)}, which the prediction of rates, amplitudes and records that were "
             f"left out decides; together they explain {100 * closed:.0f} % of the gap."
         )
-        alike = f" These data cannot tell {' or '.join(rivals)} from it." if rivals else ""
+        alike = f" These data cannot distinguish {' or '.join(rivals)} from it." if rivals else ""
         return Verdict.NAMED, said + alike
     if count >= FEWEST_RECORDS and not decided:
         named = bool(selection.accepted) and gap.falls and closed >= NAMED

@@ -123,7 +123,7 @@ def choose_structure(
 
 
 def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
-    """Lead of the chosen structure over the best one that lacks one of its effects, whatever its other effects."""
+    """Lead of the chosen structure over the best structure without one of its effects."""
     found = {}
     for name in chosen.structure.effects:
         family = CREEPS if name in CREEPS else (name,)
