@@ -1,6 +1,7 @@
 """Build script of the ROS 2 package; colcon and pip read it."""
 
 import re
+import xml.etree.ElementTree as ElementTree
 from glob import glob
 from pathlib import Path
 
@@ -11,6 +12,9 @@ HERE = Path(__file__).parent
 README = HERE / "README.md"  # not in the folder in which colcon builds
 SOURCE = (HERE / NAME / "__init__.py").read_text(encoding="utf-8")
 VERSION = re.search(r'^__version__ = "(.+)"$', SOURCE, re.MULTILINE)[1]
+EXAMPLES = ("send_scan", "send_waveform", "set_voltage")  # `ros2 run piezo_hysteresis send_waveform`
+MANIFEST = ElementTree.parse(HERE / "package.xml").getroot()  # maintainer and address are written down there alone
+MAINTAINER = MANIFEST.find("maintainer")
 
 setup(
     name=NAME,
@@ -20,8 +24,9 @@ setup(
     long_description_content_type="text/markdown",
     license="Apache-2.0",
     license_files=["LICENSE"],
-    maintainer="piezo_hysteresis maintainers",
-    maintainer_email="piezo-hysteresis@users.noreply.github.com",
+    maintainer=MAINTAINER.text,
+    maintainer_email=MAINTAINER.get("email"),
+    url=MANIFEST.findtext("url"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={NAME: ["py.typed"], f"{NAME}.report": ["page.css", "page.html.jinja"]},
     data_files=[
@@ -29,6 +34,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", glob("config/*")),
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),
+        (f"share/{NAME}/examples", [f"examples/{name}.py" for name in EXAMPLES]),
     ],
     python_requires=">=3.11",
     install_requires=[
@@ -70,6 +76,7 @@ setup(
             f"compensation_node = {NAME}.nodes.start:compensation_node",
             f"keeper = {NAME}.acquisition.safety.keeper:main",
             f"piezo = {NAME}.cli.main:main",
+            *(f"{name} = {NAME}.nodes.examples:{name}" for name in EXAMPLES),
         ]
     },
 )

@@ -11,6 +11,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from piezo_hysteresis.nodes.messages.conversions import values_of
 from piezo_hysteresis.nodes.runtime.qos import LATCHED
 
+from .lab import _command
+
 pytestmark = pytest.mark.nodes
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -18,7 +20,9 @@ NAMESPACE = "/stage_x"
 
 
 def run(lab, script, *arguments):
-    command = [sys.executable, EXAMPLES / script, *arguments, "--ros-args", "-r", f"__ns:={NAMESPACE}"]
+    """A script of the repository, or the executable that `ros2 run` finds."""
+    program = [sys.executable, EXAMPLES / script] if script.endswith(".py") else [_command(script)[0]]
+    command = [*program, *arguments, "--ros-args", "-r", f"__ns:={NAMESPACE}"]
     environment = {**os.environ, "ROS_DOMAIN_ID": str(lab.domain), "ROS_LOG_DIR": str(lab.folder)}
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=60)
 
@@ -26,7 +30,7 @@ def run(lab, script, *arguments):
 def test_a_voltage_is_set(lab):
     lab.driver(namespace=NAMESPACE, ramp_rate=100.0, real_time_factor=5.0)
     samples = lab.streaming(f"{NAMESPACE}/samples")
-    done = run(lab, "set_voltage.py", "3.5")
+    done = run(lab, "set_voltage", "3.5")
     assert done.returncode == 0, done.stderr
     lab.wait(lambda: abs(samples.newest.voltage[-1] - 3.5) < 1e-3, "3.5 V")
 
