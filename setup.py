@@ -28,7 +28,11 @@ setup(
     maintainer_email=MAINTAINER.get("email"),
     url=MANIFEST.findtext("url"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"], f"{NAME}.report": ["page.css", "page.html.jinja"]},
+    package_data={
+        NAME: ["py.typed"],
+        f"{NAME}.report": ["page.css", "page.html.jinja"],
+        f"{NAME}.report.live": ["page.css", "page.html.jinja", "panels.css"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -38,6 +42,7 @@ setup(
     ],
     python_requires=">=3.11",
     install_requires=[
+        "bokeh",
         "h5py",
         "jinja2",
         "matplotlib",
@@ -50,6 +55,7 @@ setup(
         "rosbags",
         "scipy",
         "threadpoolctl",
+        "tornado",
         "zstandard",
     ],
     extras_require={
@@ -74,6 +80,7 @@ setup(
             f"model_node = {NAME}.nodes.start:model_node",
             f"identification_node = {NAME}.nodes.start:identification_node",
             f"compensation_node = {NAME}.nodes.start:compensation_node",
+            f"page_node = {NAME}.nodes.start:page_node",
             f"keeper = {NAME}.acquisition.safety.keeper:main",
             f"piezo = {NAME}.cli.main:main",
             *(f"{name} = {NAME}.nodes.examples:{name}" for name in EXAMPLES),

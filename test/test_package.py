@@ -15,7 +15,7 @@ import piezo_hysteresis
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
-ROSDEP = {"yaml": "python3-yaml", "rosbags": "python3-rosbags-pip"}
+ROSDEP = {"yaml": "python3-yaml", "rosbags": "python3-rosbags-pip", "bokeh": "python3-bokeh-pip"}
 NO_KEY = {"lz4", "mcap", "threadpoolctl", "zstandard"}
 """No rosdep key; the README names them for pip, but for what mcap itself needs: lz4 and zstandard."""
 
@@ -65,7 +65,7 @@ def test_every_dependency_that_pip_brings_is_pinned():
 
 
 @pytest.mark.parametrize(
-    "name", ["driver_node", "model_node", "identification_node", "compensation_node", "keeper", "piezo"]
+    "name", ["driver_node", "model_node", "identification_node", "compensation_node", "page_node", "keeper", "piezo"]
 )
 def test_executables_name_a_function_that_exists(name):
     entry = re.search(rf"{name} = {{NAME}}\.([\w.]+):(\w+)", (ROOT / "setup.py").read_text())

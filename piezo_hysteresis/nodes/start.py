@@ -35,6 +35,11 @@ def compensation_node() -> int:
     return _run("compensation.compensation_node")
 
 
+def page_node() -> int:
+    """Run a live page."""
+    return _run("page.page_node")
+
+
 def _run(module: str) -> int:
     try:
         return int(import_module(f".{module}", __package__).main())

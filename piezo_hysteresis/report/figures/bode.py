@@ -12,9 +12,10 @@ from ...errors import IdentificationError
 from ...identification.steps.frequency_response import FrequencyResponse, swept, welch
 from ...model.model import Model
 from ...record import Record
+from ..palette import BLACK, GREEN, SKY
 from .comparison import ModelComparison
 from .drawing import Drawing
-from .style import BLACK, GREEN, PREDICTED, SKY, canvas, handles_of, legend_above, plain_log, styled
+from .style import PREDICTED, canvas, handles_of, legend_above, plain_log, styled
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,10 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ..palette import BLUE, GREY, ORANGE
 from .comparison import ModelComparison
 from .drawing import Drawing
-from .style import BLUE, GREY, ORANGE, canvas, handles_of, legend_above, styled
+from .style import canvas, handles_of, legend_above, styled
 
 Array = NDArray[np.float64]
 

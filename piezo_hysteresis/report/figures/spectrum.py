@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
+from ..density import density
 from ..words import duration
 from .comparison import ModelComparison
 from .drawing import Drawing
@@ -37,12 +37,12 @@ def residual_spectrum(comparison: ModelComparison) -> Drawing | None:
     for axis, period in zip(axes.flat, periods, strict=True):
         members = groups[period]
         name = duration(period).replace(" ", "").replace("µ", "u")
-        f, moved = _density([comparison.experiment[i].displacement for i in members], period)
-        _, left = _density([now.residuals[i] for i in members], period)
+        f, moved = density([comparison.experiment[i].displacement for i in members], period)
+        _, left = density([now.residuals[i] for i in members], period)
         axis.loglog(f, 1e9 * moved, label="displacement", **MEASURED)
         data |= {f"frequency_Hz_{name}": f, f"displacement_m_per_rtHz_{name}": moved}
         if before is not None:
-            _, old = _density([before.residuals[i] for i in members], period)
+            _, old = density([before.residuals[i] for i in members], period)
             axis.loglog(f, 1e9 * old, label="residual before", **BEFORE)
             data[f"residual_before_m_per_rtHz_{name}"] = old
         axis.loglog(f, 1e9 * left, label="residual", **PREDICTED)
@@ -68,16 +68,3 @@ def residual_spectrum(comparison: ModelComparison) -> Drawing | None:
         figure,
         data,
     )
-
-
-def _density(signals: list[Array], period: float) -> tuple[Array, Array]:
-    """Root of the mean power density over the signals, on one frequency axis without dc, smoothed on a log axis."""
-    segment = min(1 << 14, max(64, min(s.size for s in signals)))
-    spectra = [welch(s, 1.0 / period, nperseg=segment, detrend="constant") for s in signals]
-    frequency, power = spectra[0][0][1:], np.mean([p for _, p in spectra], axis=0)[1:]
-    edges = np.geomspace(frequency[0], frequency[-1], 161)
-    place = np.clip(np.digitize(frequency, edges) - 1, 0, 159)
-    count = np.bincount(place, minlength=160)
-    good = count > 0
-    f = np.bincount(place, frequency, 160)[good] / count[good]
-    return f, np.sqrt(np.bincount(place, power, 160)[good] / count[good])

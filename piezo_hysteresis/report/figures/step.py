@@ -11,10 +11,11 @@ from ...effects import Arx
 from ...errors import IdentificationError
 from ...identification.steps.delay import identify_delay
 from ...identification.steps.step_response import StepResponse, step_response
+from ..palette import BLUE, GREEN
 from ..words import duration
 from .comparison import ModelComparison
 from .drawing import Drawing
-from .style import BLUE, GREEN, MEASURED, PREDICTED, canvas, styled
+from .style import MEASURED, PREDICTED, canvas, styled
 
 ZOOM = 24
 """Samples drawn around the onset."""

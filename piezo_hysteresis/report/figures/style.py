@@ -1,6 +1,6 @@
-"""How every figure looks: a palette that colour-blind people can read, line styles that survive a grey print.
+"""How every figure on paper looks: colours of `palette`, line styles that survive a grey print.
 
-Colours are those of Okabe and Ito; what is measured is always the grey solid line, what is predicted the dashed one.
+What is measured is always the grey solid line, what is predicted the dashed one.
 """
 
 from __future__ import annotations
@@ -14,13 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
+from ..palette import BLACK, BLUE, GREY, ORANGE
+
 P = ParamSpec("P")
 R = TypeVar("R")
-
-BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY = "#1a1a1a", "#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9"
-"""Colours that colour-blind readers distinguish."""
-GREY = "#8c8c8c"
-"""Colour of what stands behind."""
 
 MEASURED: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.4}
 """Line of what was measured."""

@@ -6,9 +6,10 @@ import numpy as np
 
 from ...discrepancy.residual.correlation import CAPTION, FEWEST_INDEPENDENT, correlate
 from ...errors import RecordError
+from ..palette import BLACK, GREY
 from .comparison import ModelComparison
 from .drawing import Drawing
-from .style import BLACK, GREY, canvas, styled
+from .style import canvas, styled
 from .thinning import thinned
 
 SHARE = 40

@@ -1,0 +1,107 @@
+"""`page_node`: shows running axes in a browser; it only subscribes and calls services."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future as Reply
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
+
+from ...parameter import Row, Setting
+from ...report.live.access import read_token
+from ...report.live.axis_state import AxisState
+from ...report.live.live_page import LivePage
+from ...report.live.server import PageServer
+from ...report.live.source import Answer
+from ..runtime.guarded_node import GuardedNode
+from ..runtime.parameters import declare, read
+from ..runtime.process import run
+from ..topics import DIAGNOSTICS, TOPICS, subscribe
+from .axis_feed import AxisFeed
+
+PAGE: tuple[Row, ...] = (
+    Setting("address", "127.0.0.1", "address to listen on; one that other machines reach needs token_file"),
+    Setting("port", 5006, "port to listen on; 0 takes a free one", lower=0, upper=65535),
+    Setting("token_file", "", "file with the token that a visitor has to give; empty: none"),
+    Setting("hosts", "", "names, with commas between, under which browsers reach the page besides address"),
+    Setting("axes", "", "namespaces to show, with commas between; empty: every axis that publishes samples"),
+)
+"""Parameters of the page node, all read at start."""
+
+_SEARCH_INTERVAL = 1.0
+"""Time between two looks for new axes [s]."""
+
+_MOST_AXES = 16
+"""Axes that are found by themselves at most."""
+
+
+class PageNode(GuardedNode):
+    """Source of the live page: topics, services and parameters stand in docs/ros."""
+
+    def __init__(self) -> None:
+        super().__init__("page_node")
+        declare(self, PAGE)
+        values = read(self, PAGE)
+        self._named = _split(values["axes"])
+        self._feeds: dict[str, AxisFeed] = {}
+        for axis in self._named:
+            self._follow(axis)
+        subscribe(self, DIAGNOSTICS, self._on_diagnostics)
+        self.create_timer(_SEARCH_INTERVAL, self._search, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        token = read_token(values["token_file"]) if values["token_file"] else ""
+        self._server = PageServer(
+            lambda document: LivePage(document, self),
+            values["address"],
+            values["port"],
+            token,
+            _split(values["hosts"]),
+        )
+        self.get_logger().info(f"open {self._server.url} in a browser")
+
+    def end(self) -> None:
+        """Stop serving pages."""
+        self._server.close()
+
+    def axes(self) -> Mapping[str, AxisState]:
+        """The axes known so far, by name; from any thread."""
+        return {name: feed.state for name, feed in sorted(self._feeds.items())}
+
+    def call(self, axis: str, service: str) -> Reply[Answer]:
+        """Call a service of an axis; from any thread."""
+        return self._feeds[axis].call(service)
+
+    def _follow(self, axis: str) -> None:
+        name = "/" + axis.strip("/")
+        self._feeds = {**self._feeds, name: AxisFeed(self, name)}
+
+    def _search(self) -> None:
+        for feed in self._feeds.values():
+            feed.expire()
+        if self._named:
+            return
+        kind = TOPICS["samples"].type_name
+        for name, kinds in self.get_topic_names_and_types():
+            axis, _, topic = name.rpartition("/")
+            known = (axis or "/") in self._feeds
+            if topic == "samples" and kind in kinds and not known and len(self._feeds) < _MOST_AXES:
+                self.get_logger().info(f"found the axis {axis or '/'}")
+                self._follow(axis)
+
+    def _on_diagnostics(self, array: DiagnosticArray) -> None:
+        for status in array.status:
+            any(feed.report(status) for feed in self._feeds.values())
+
+
+def _split(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a page node; its exit code is 2 where its parameters make no sense, or its port is taken."""
+    return run(PageNode, arguments, end=PageNode.end)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,40 @@
+"""`density`: amplitude density of signals on a logarithmic frequency axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+Array = NDArray[np.float64]
+
+BINS = 160
+"""Frequencies of a density at most, evenly spaced on the logarithmic axis."""
+
+
+def density(signals: Sequence[Array], period: float) -> tuple[Array, Array]:
+    """Root of the mean power density over the signals, on one frequency axis without dc, smoothed on a log axis.
+
+    Parameters
+    ----------
+    signals : sequence of (n,) ndarray
+        At least 64 samples each [m].
+    period : float
+        Time between samples [s].
+
+    Returns
+    -------
+    frequency, density : (k,) ndarray
+        Frequency [Hz] and amplitude density [m/√Hz], one-sided.
+    """
+    segment = min(1 << 14, max(64, min(s.size for s in signals)))
+    spectra = [welch(s, 1.0 / period, nperseg=segment, detrend="constant") for s in signals]
+    frequency, power = spectra[0][0][1:], np.mean([p for _, p in spectra], axis=0)[1:]
+    edges = np.geomspace(frequency[0], frequency[-1], BINS + 1)
+    place = np.clip(np.digitize(frequency, edges) - 1, 0, BINS - 1)
+    count = np.bincount(place, minlength=BINS)
+    good = count > 0
+    f = np.bincount(place, frequency, BINS)[good] / count[good]
+    return f, np.sqrt(np.bincount(place, power, BINS)[good] / count[good])

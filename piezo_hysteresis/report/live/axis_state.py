@@ -1,0 +1,215 @@
+"""`AxisState`: what is known of one axis while it runs: samples, statuses, models; written by nodes, read by pages."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ...errors import PiezoError
+from ...model.model import Model
+from ...model.model_file import loads
+from ...model.model_parameters import model_hash
+from .sample_window import SampleWindow
+
+OK, WARN, ERROR, STALE = range(4)
+"""Levels of a status, as in diagnostic_msgs/DiagnosticStatus."""
+
+VERDICTS = ("named", "nothing_missing", "unknown")
+"""Words that the verdict of a diagnosis begins with."""
+
+HISTORY = 20
+"""Models, and alarms, that are remembered."""
+
+SILENT = 3.0
+"""Time without a message after which a node counts as gone [s]: three reports on /diagnostics."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """One status of a node.
+
+    Parameters
+    ----------
+    name : str
+        Name of the node and, after a colon, of what it reports about.
+    level : int
+        `OK`, `WARN`, `ERROR` or `STALE`.
+    message : str
+        What it says.
+    values : mapping of str to str
+        Its values.
+    received : float
+        When it came, on the steady clock [s].
+    """
+
+    name: str
+    level: int
+    message: str
+    values: Mapping[str, str] = field(default_factory=dict)
+    received: float = field(default_factory=time.monotonic)
+
+    @property
+    def age(self) -> float:
+        """Time since it came [s]."""
+        return time.monotonic() - self.received
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """A status that was worse than OK, from when to when.
+
+    Parameters
+    ----------
+    name, message : str
+        As in the status that raised it.
+    level : int
+        The worst level so far.
+    began : float
+        Time since the epoch [s].
+    """
+
+    name: str
+    message: str
+    level: int
+    began: float
+
+
+@dataclass(frozen=True, slots=True)
+class KnownModel:
+    """A model that came on the topic `model`.
+
+    Parameters
+    ----------
+    model : Model
+        The model itself.
+    hash : str
+        Of everything but its provenance.
+    received : float
+        When it came, since the epoch [s].
+    """
+
+    model: Model
+    hash: str
+    received: float
+
+    @property
+    def free_run_error(self) -> float | None:
+        """RMS of its free-run error where it was fitted [m]; None where the model does not say."""
+        try:
+            return float(self.model.provenance["free_run_error"])
+        except (KeyError, ValueError):
+            return None
+
+
+class AxisState:
+    """One axis.
+
+    Every attribute is replaced as a whole, so that another thread may read it at any time.
+
+    Parameters
+    ----------
+    name : str
+        Namespace of the axis, ``/`` for none.
+
+    Attributes
+    ----------
+    window : SampleWindow
+        Its newest samples.
+    heard : float
+        When the last block of samples came, on the steady clock [s].
+    phase : str
+        Phase under way, as the driver names it.
+    residual_rms : float or None
+        RMS residual over the last second [m].
+    statuses : dict of str to Status
+        Newest report of every part of every node, by name.
+    identification, change : Status or None
+        Newest messages of `status` and of `change`.
+    verdict : str
+        What the last diagnosis found; empty before there is one.
+    models : tuple of KnownModel
+        The newest last.
+    refused_model : str
+        Why the newest text on `model` is none; empty where it is one.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.window = SampleWindow()
+        self.heard = float("-inf")
+        self.phase = ""
+        self.residual_rms: float | None = None
+        self.statuses: dict[str, Status] = {}
+        self.identification: Status | None = None
+        self.change: Status | None = None
+        self.verdict = ""
+        self.models: tuple[KnownModel, ...] = ()
+        self.refused_model = ""
+        self._active: dict[str, Alarm] = {}
+        self._over: deque[Alarm] = deque(maxlen=HISTORY)
+
+    @property
+    def is_streaming(self) -> bool:
+        """True while samples come."""
+        return time.monotonic() - self.heard < SILENT
+
+    @property
+    def model(self) -> KnownModel | None:
+        """The newest model."""
+        return self.models[-1] if self.models else None
+
+    @property
+    def free_run_error(self) -> float | None:
+        """RMS error that the model in use promises [m]; None where it promises none."""
+        prediction = self.part("prediction")
+        try:
+            return None if prediction is None else float(prediction.values["free_run_error"])
+        except (KeyError, ValueError):
+            return None
+
+    def part(self, word: str) -> Status | None:
+        """The report about one part: ``stage``, ``prediction``, ``identification``, ``change``; None before it came."""
+        return next((s for name, s in list(self.statuses.items()) if name.endswith(f": {word}")), None)
+
+    def report(self, status: Status) -> None:
+        """Take a report of /diagnostics; one that is worse than OK raises an alarm, and the next good one ends it."""
+        self.statuses = {**self.statuses, status.name: status}
+        active = dict(self._active)
+        before = active.get(status.name)
+        if status.level in (WARN, ERROR):
+            began = time.time() if before is None else before.began
+            worst = max(status.level, OK if before is None else before.level)
+            active[status.name] = Alarm(status.name, status.message, worst, began)
+        elif before is not None:
+            self._over.append(active.pop(status.name))
+        self._active = active
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Alarms that last, the newest first."""
+        return tuple(sorted(self._active.values(), key=lambda alarm: -alarm.began))
+
+    @property
+    def past_alarms(self) -> tuple[Alarm, ...]:
+        """Alarms that are over, the newest first."""
+        return tuple(reversed(list(self._over)))
+
+    def report_identification(self, status: Status) -> None:
+        """Take a message of `status`."""
+        self.identification = status
+        if status.values.get("state") == "done" and status.message.partition(":")[0] in VERDICTS:
+            self.verdict = status.message
+
+    def follow(self, text: str) -> None:
+        """Take a model file; one that is not acceptable is reported as such."""
+        try:
+            model = loads(text, "topic 'model'")
+        except PiezoError as error:
+            self.refused_model = str(error)
+            return
+        self.refused_model = ""
+        known = KnownModel(model, model_hash(model), time.time())
+        if self.model is None or self.model.hash != known.hash:
+            self.models = (*self.models, known)[-HISTORY:]

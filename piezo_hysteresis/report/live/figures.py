@@ -1,0 +1,214 @@
+"""The four figures of the page: loop, displacement, residual and its spectrum; arrays in, Bokeh figures out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from bokeh.models import ColumnDataSource, Legend, Range1d
+from bokeh.plotting import figure
+from numpy.typing import NDArray
+
+from ..density import density
+from ..palette import BLACK, BLUE, GREY, ORANGE
+from .points import extremes, loop_places, newest_cycles, with_gaps
+from .sample_window import Window
+
+Array = NDArray[np.float64]
+
+HEIGHT = 300
+"""Height of a figure [px]."""
+
+SPECTRUM_SAMPLES = 1 << 16
+"""Samples of the newest part of which the spectrum is taken."""
+
+_FEWEST = 64
+"""Samples below which there is no spectrum."""
+
+TOOLS = "pan,box_zoom,wheel_zoom,reset,save"
+"""Tools beside a figure."""
+
+MEASURED: dict[str, Any] = {"color": BLACK, "line_width": 1.4, "legend_label": "measured"}
+"""Line of what was measured."""
+PREDICTED: dict[str, Any] = {
+    "color": ORANGE,
+    "line_width": 1.6,
+    "line_dash": [6, 3],
+    "legend_label": "predicted",
+}
+"""Line of what the model predicts."""
+FLOOR: dict[str, Any] = {
+    "color": GREY,
+    "line_width": 1.6,
+    "line_dash": [8, 3, 2, 3],
+    "legend_label": "noise of the sensor",
+}
+"""Line of the noise floor."""
+PROMISED: dict[str, Any] = {"color": BLUE, "line_width": 1.4, "line_dash": [2, 3], "legend_label": "error of the model"}
+"""Line of the free-run error that the model file states."""
+
+
+class WindowFigures:
+    """Draws a window of samples; what is shown follows the range of the time axes.
+
+    Attributes
+    ----------
+    loop, displacement, residual, spectrum : bokeh figure
+        In this order on the page.
+    """
+
+    def __init__(self) -> None:
+        self._time = Range1d(0.0, 1.0, bounds=None)
+        self._loop = ColumnDataSource({"voltage": [], "measured": [], "predicted": []}, name="loop_data")
+        self._measured = ColumnDataSource({"time": [], "measured": []}, name="measured_data")
+        self._predicted = ColumnDataSource({"time": [], "predicted": []}, name="predicted_data")
+        self._residual = ColumnDataSource({"time": [], "residual": []}, name="residual_data")
+        self._limits = ColumnDataSource({"time": [], "noise": [], "minus_noise": [], "error": [], "minus_error": []})
+        self._spectrum = ColumnDataSource({"frequency": [], "residual": []}, name="spectrum_data")
+        self._moved = ColumnDataSource({"frequency": [], "displacement": []})
+        self._white = ColumnDataSource({"frequency": [], "noise": []})
+        self.loop = _figure("loop", "Hysteresis loop", "drive voltage [V]", "displacement [µm]")
+        self.loop.line("voltage", "measured", source=self._loop, **MEASURED)
+        self.loop.line("voltage", "predicted", source=self._loop, **PREDICTED)
+        over_time = {"x_range": self._time}
+        label = "time before now [s]"
+        self.displacement = _figure("displacement", "Displacement", label, "displacement [µm]", **over_time)
+        self.displacement.line("time", "measured", source=self._measured, **MEASURED)
+        self.displacement.line("time", "predicted", source=self._predicted, **PREDICTED)
+        self.residual = _figure("residual", "Residual: measured minus predicted", label, "residual [nm]", **over_time)
+        self.residual.line("time", "residual", source=self._residual, color=ORANGE, legend_label="residual")
+        for name, style in (("noise", FLOOR), ("error", PROMISED)):
+            self.residual.line("time", name, source=self._limits, **style)
+            self.residual.line("time", f"minus_{name}", source=self._limits, **style)
+        self.spectrum = _figure(
+            "spectrum",
+            "Spectrum of the residual",
+            "frequency [Hz]",
+            "amplitude density [nm/√Hz]",
+            x_axis_type="log",
+            y_axis_type="log",
+        )
+        self.spectrum.line("frequency", "displacement", source=self._moved, color=BLACK, legend_label="displacement")
+        self.spectrum.line("frequency", "residual", source=self._spectrum, color=ORANGE, legend_label="residual")
+        self.spectrum.line("frequency", "noise", source=self._white, **FLOOR)
+        for drawn in self.all:
+            _legend_above(drawn)
+
+    @property
+    def all(self) -> tuple[figure, ...]:
+        """The figures, in the order of the page."""
+        return self.loop, self.displacement, self.residual, self.spectrum
+
+    @property
+    def shown(self) -> tuple[float, float]:
+        """Part of the time axis that is shown [s]."""
+        return float(self._time.start), float(self._time.end)
+
+    def span(self, start: float, end: float) -> None:
+        """Show a part of the time axis [s], which is also where a reset leads back to."""
+        self._time.update(start=start, end=end, reset_start=start, reset_end=end)
+
+    def draw(self, window: Window, origin: float, noise: float | None, error: float | None) -> None:
+        """Draw loop, displacement and residual of the part of a window that the time axes show.
+
+        Parameters
+        ----------
+        window : Window
+            Samples.
+        origin : float
+            Time that stands as zero on the time axes [s].
+        noise : float or None
+            RMS noise of the sensor [m], where it is known.
+        error : float or None
+            RMS error that the model states [m], where it does.
+        """
+        part = _between(window, *(origin + edge for edge in self.shown))
+        time, residual = part.time - origin, part.residual
+        for source, name, values, scale in (
+            (self._measured, "measured", part.displacement, 1e6),
+            (self._predicted, "predicted", part.prediction, 1e6),
+            (self._residual, "residual", residual, 1e9),
+        ):
+            at, drawn = with_gaps(extremes(values), np.isfinite(values), time, values)
+            source.data = {"time": at, name: scale * drawn}
+        cycles = newest_cycles(part)
+        u, y, p = with_gaps(
+            loop_places(cycles),
+            np.isfinite(cycles.displacement),
+            cycles.voltage,
+            cycles.displacement,
+            cycles.prediction,
+        )
+        self._loop.data = {"voltage": u, "measured": 1e6 * y, "predicted": 1e6 * p}
+        self._draw_limits(noise, error)
+
+    def _draw_limits(self, noise: float | None, error: float | None) -> None:
+        n, e = (np.nan if value is None else 1e9 * value for value in (noise, error))
+        self._limits.data = {
+            "time": list(self.shown),
+            "noise": [n, n],
+            "minus_noise": [-n, -n],
+            "error": [e, e],
+            "minus_error": [-e, -e],
+        }
+
+    def draw_spectrum(self, window: Window, noise: float | None) -> None:
+        """Draw the spectrum of the newest samples of a window; parameters as for `draw`."""
+        part = window.part(max(0, window.size - SPECTRUM_SAMPLES))
+        for source, name, values in (
+            (self._spectrum, "residual", part.residual),
+            (self._moved, "displacement", part.displacement),
+        ):
+            values = _newest_finite(values)
+            if values.size < _FEWEST:
+                source.data = {"frequency": [], name: []}
+                continue
+            frequency, height = density([values], window.sample_period)
+            source.data = {"frequency": frequency, name: 1e9 * height}
+        across = [] if noise is None else [1e9 * noise * np.sqrt(2.0 * window.sample_period)] * 2
+        ends = self._moved.data["frequency"]
+        self._white.data = {
+            "frequency": [ends[0], ends[-1]] if across and len(ends) else [],
+            "noise": across if len(ends) else [],
+        }
+
+
+def _between(window: Window, start: float, end: float) -> Window:
+    inside = np.flatnonzero((window.time >= start) & (window.time <= end))
+    return window.part(int(inside[0]), int(inside[-1]) + 1) if inside.size else window.part(0, 0)
+
+
+def _newest_finite(values: Array) -> Array:
+    """The samples after the last missing one, or after the one before where too few are left."""
+    missing = np.flatnonzero(~np.isfinite(values))
+    edges = np.concatenate(([-1], missing, [values.size]))
+    lengths = np.diff(edges) - 1
+    enough = np.flatnonzero(lengths >= min(_FEWEST, int(lengths.max())))
+    k = int(enough[-1])
+    return values[edges[k] + 1 : edges[k + 1]]
+
+
+def _figure(name: str, title: str, x_label: str, y_label: str, **options: Any) -> figure:
+    made = figure(
+        name=name,
+        title=title,
+        x_axis_label=x_label,
+        y_axis_label=y_label,
+        height=HEIGHT,
+        sizing_mode="stretch_width",
+        tools=TOOLS,
+        **options,
+    )
+    made.toolbar.logo = None
+    made.toolbar.autohide = True
+    made.grid.grid_line_color = "#e4e4e4"
+    made.outline_line_color = None
+    return made
+
+
+def _legend_above(drawn: figure) -> None:
+    legend = drawn.legend[0]
+    drawn.center = [part for part in drawn.center if not isinstance(part, Legend)]
+    legend.update(orientation="horizontal", border_line_color=None, padding=0, margin=2, click_policy="hide")
+    legend.label_text_font_size = "12px"
+    drawn.add_layout(legend, "above")

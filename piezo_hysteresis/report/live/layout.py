@@ -1,0 +1,73 @@
+"""`lay_out`: parts of a page in their places, by one template for the live page and for recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from bokeh.document import Document
+from bokeh.models import Div, InlineStyleSheet, UIElement
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One box of the page.
+
+    Parameters
+    ----------
+    part : bokeh UIElement
+        What stands in it; it needs a name.
+    title : str
+        Heading of the box.
+    classes : str
+        ``half`` takes half of the width of a wide window, ``screen-only`` is not printed.
+    """
+
+    part: UIElement
+    title: str = ""
+    classes: str = ""
+
+    @property
+    def root(self) -> str:
+        """Name by which the template finds the part."""
+        return str(self.part.name)
+
+
+def lay_out(document: Document, heading: str, top: Sequence[UIElement], sections: Sequence[Section]) -> None:
+    """Fill a document.
+
+    Parameters
+    ----------
+    document : bokeh Document
+        Empty so far.
+    heading : str
+        Title of the page, plain text.
+    top : sequence of bokeh UIElement
+        Stand in the head of the page, which does not scroll away on a wide screen.
+    sections : sequence of Section
+        Boxes, in order.
+    """
+    for part in (*top, *(section.part for section in sections)):
+        document.add_root(part)
+    document.title = heading
+    document.template = _text("page.html.jinja")
+    document.template_variables.update(
+        heading=heading, page_css=_text("page.css"), top=[part.name for part in top], sections=list(sections)
+    )
+
+
+def text_panel(name: str, styles: InlineStyleSheet) -> Div:
+    """A place for text, `styles` from `panel_styles` of the same document."""
+    return Div(text="", name=name, stylesheets=[styles], sizing_mode="stretch_width")
+
+
+def panel_styles() -> InlineStyleSheet:
+    """How texts look; one per document."""
+    return InlineStyleSheet(css=_text("panels.css"))
+
+
+@cache
+def _text(name: str) -> str:
+    return (files(__package__) / name).read_text(encoding="utf-8")

@@ -1,0 +1,191 @@
+"""Texts of the page: state, alarms, model and its history, identification; from an `AxisState` to HTML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from html import escape
+
+from ...errors import printable
+from ..words import nanometre
+from .axis_state import OK, SILENT, STALE, Alarm, AxisState, Status
+
+LEVELS = ("ok", "warn", "error", "stale")
+"""Words of the levels of a status, which are also the names of their styles."""
+
+
+def badge(level: int, word: str = "") -> str:
+    """A coloured word."""
+    return f"<span class='badge {LEVELS[level]}'>{escape(word or LEVELS[level])}</span>"
+
+
+def state(axis: AxisState, noise: float | None) -> str:
+    """Driver, phase under way, newest numbers.
+
+    Parameters
+    ----------
+    axis : AxisState
+        The axis that is shown.
+    noise : float or None
+        RMS noise of the sensor [m].
+    """
+    newest = axis.window.newest(2.0 * axis.window.sample_period)
+    numbers: list[tuple[str, str, str]] = [("phase", "phase", escape(printable(axis.phase)) or "—")]
+    if newest.size:
+        numbers += [
+            ("voltage", "drive voltage", f"{newest.voltage[-1]:.3f} V"),
+            ("displacement", "displacement", _micrometre(newest.displacement[-1])),
+            ("prediction", "predicted", _micrometre(_last_finite(newest.prediction))),
+            ("residual", "residual", _length(_last_finite(newest.residual))),
+        ]
+    numbers += [
+        ("residual_rms", "residual, RMS", _length(axis.residual_rms)),
+        ("noise", "noise of the sensor", _length(noise)),
+    ]
+    cells = "".join(f"<div><dt>{label}</dt><dd id='{key}'>{text}</dd></div>" for key, label, text in numbers)
+    return f"{_driver(axis)}<dl>{cells}</dl>"
+
+
+def _driver(axis: AxisState) -> str:
+    driver = axis.part("stage")
+    if driver is None or driver.age > SILENT:
+        gone = "no driver has reported yet" if driver is None else f"the driver has been silent for {driver.age:.0f} s"
+        return f"<p id='driver'>{badge(STALE, 'no driver')} {gone}</p>"
+    claimed = driver.values.get("claimed_by", "")
+    words = [escape(driver.message)]
+    if claimed:
+        words.append(f"claimed by {escape(claimed)}")
+    if rate := driver.values.get("rate"):
+        words.append(f"{_count(rate)} of {_count(driver.values.get('rate_expected', ''))} samples/s")
+    if not axis.is_streaming:
+        words.append("no samples arrive")
+    return f"<p id='driver'>{badge(driver.level, 'driver')} {'; '.join(words)}</p>"
+
+
+def alarms(axis: AxisState) -> str:
+    """What is wrong at present, what was, and the change watch."""
+    silent = [s for s in axis.statuses.values() if s.age > SILENT]
+    rows = [_alarm_row(alarm) for alarm in axis.alarms if axis.statuses[alarm.name].age <= SILENT]
+    rows += [_row(badge(STALE, "silent"), escape(s.name), f"no report for {s.age:.0f} s") for s in silent]
+    present = _table(rows) if rows else f"<p>{badge(OK)} nothing is reported</p>"
+    past = [_alarm_row(alarm) for alarm in axis.past_alarms]
+    over = f"<details><summary>{len(past)} earlier</summary>{_table(past)}</details>" if past else ""
+    return f"<div id='alarms'>{present}{over}</div>{_change(axis.change)}"
+
+
+def _alarm_row(alarm: Alarm) -> str:
+    return _row(badge(alarm.level), _clock(alarm.began), f"<b>{escape(alarm.name)}</b> {escape(alarm.message)}")
+
+
+def _change(change: Status | None) -> str:
+    if change is None:
+        return "<h4>Change watch</h4><p>no report yet</p>"
+    words = [f"{badge(change.level, 'change')} {escape(change.message)}"]
+    values = change.values
+    if "statistic" in values:
+        words.append(f"statistic {escape(values['statistic'])} of threshold 1")
+    if "group" in values:
+        unit = escape(values.get("unit", ""))
+        words.append(
+            f"{escape(values['group'])}: {escape(values.get('change', ''))} {unit} "
+            f"({escape(values.get('change_low', ''))} to {escape(values.get('change_high', ''))})"
+        )
+    if "onset" in values:
+        words.append(f"since {_clock(_number(values['onset']))}")
+    return f"<h4>Change watch</h4><p id='change'>{'; '.join(words)}</p>"
+
+
+def identification(axis: AxisState) -> str:
+    """The job under way and the verdict of the last diagnosis."""
+    status = axis.identification
+    lines = []
+    if status is None:
+        lines.append("<p>no identification node has reported yet</p>")
+    else:
+        values = status.values
+        percent = min(max(_number(values.get("percent", "0")), 0.0), 100.0)
+        word, phase = values.get("state", ""), values.get("phase", "")
+        lines.append(f"<p id='job'>{badge(status.level, word)} {escape(phase)} {escape(status.message)}</p>")
+        if 0.0 < percent < 100.0:
+            lines.append(f"<div class='progress'><div style='width:{percent:.0f}%'></div></div>")
+        if values.get("experiment"):
+            lines.append(f"<p class='path'>{escape(values['experiment'])}</p>")
+    verdict = escape(axis.verdict) or "no diagnosis since the identification node was started"
+    return f"{''.join(lines)}<h4>Verdict of the last diagnosis</h4><p id='verdict'>{verdict}</p>"
+
+
+def model(axis: AxisState) -> str:
+    """The model in use and the ones before it."""
+    refused = f"<p>{badge(2, 'refused')} {escape(axis.refused_model)}</p>" if axis.refused_model else ""
+    in_use = _in_use(axis)
+    if axis.model is None:
+        return f"{refused}{in_use}"
+    rows = []
+    for entry in reversed(axis.models):
+        chain = ", ".join(effect.name.replace("_", " ") for effect in entry.model.effects)
+        date = entry.model.provenance.get("date", "")
+        rows.append(
+            f"<tr><td>{_clock(entry.received)}</td><td><code>{escape(_short(entry.hash))}</code></td>"
+            f"<td>{_length(entry.free_run_error)}</td><td>{escape(str(date))}</td><td>{escape(chain)}</td></tr>"
+        )
+    head = "<tr><th>received</th><th>model</th><th>free-run error</th><th>fitted</th><th>effects</th></tr>"
+    table = f"<div class='table'><table>{head}{''.join(rows)}</table></div>"
+    return f"{refused}{in_use}<h4>Models of the identification node</h4>{table}"
+
+
+def _in_use(axis: AxisState) -> str:
+    prediction = axis.part("prediction")
+    if prediction is None:
+        return "<p>no model node has reported yet</p>"
+    used = prediction.values.get("model", "")
+    if not used:
+        return f"<p>{badge(prediction.level, 'prediction')} {escape(prediction.message)}</p>"
+    error = axis.free_run_error
+    promise = "" if error is None else f", free-run error {_length(error)}"
+    return (
+        f"<p id='model'>{badge(prediction.level, 'prediction')} {escape(prediction.message)}; "
+        f"in use: <code>{escape(_short(used))}</code>{promise}</p>"
+    )
+
+
+def _short(model_hash: str) -> str:
+    return model_hash.removeprefix("sha256:")[:12]
+
+
+def _row(*cells: str) -> str:
+    return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+
+def _table(rows: Iterable[str]) -> str:
+    return f"<div class='table'><table>{''.join(rows)}</table></div>"
+
+
+def _clock(seconds: float) -> str:
+    if not math.isfinite(seconds):
+        return "—"
+    return datetime.fromtimestamp(seconds, UTC).strftime("%H:%M:%S UTC")
+
+
+def _count(text: str) -> str:
+    number = _number(text)
+    return f"{number:,.0f}".replace(",", "\u202f") if math.isfinite(number) else "—"
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _last_finite(values: Iterable[float]) -> float | None:
+    return next((float(v) for v in reversed(list(values)) if math.isfinite(v)), None)
+
+
+def _micrometre(metres: float | None) -> str:
+    return "—" if metres is None or not math.isfinite(metres) else f"{1e6 * metres:.4f} µm"
+
+
+def _length(metres: float | None) -> str:
+    return "—" if metres is None or not math.isfinite(metres) else nanometre(metres)

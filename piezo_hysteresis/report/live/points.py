@@ -1,0 +1,86 @@
+"""Points to draw of many samples: the extremes of every bin, and a gap in the line where samples are missing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from ..figures.thinning import thinned
+from .sample_window import Window
+
+Array = NDArray[np.float64]
+
+LINE_POINTS = 1200
+"""Points of a line over time."""
+
+LOOP_POINTS = 1200
+"""Points of a loop."""
+
+CYCLES = 4
+"""Cycles of the drive that are drawn as loops, the newest ones."""
+
+_PROMINENCE = 0.05
+"""Share of the span of the drive by which a trough must stand out to count as the end of a cycle."""
+
+
+def extremes(values: Array, points: int = LINE_POINTS) -> NDArray[np.intp]:
+    """Indices of finite samples to draw, smallest and largest of every bin among them; both sides of every gap, too.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        Samples; NaN where there is none.
+    points : int
+        About how many indices to return.
+    """
+    finite = np.flatnonzero(np.isfinite(values))
+    if finite.size == 0:
+        return finite
+    kept = finite[thinned(values[finite], points)]
+    breaks = np.flatnonzero(np.diff(finite) > 1)
+    return np.union1d(kept, np.concatenate((finite[breaks], finite[breaks + 1]))) if breaks.size else kept
+
+
+def with_gaps(places: NDArray[np.intp], valid: NDArray[np.bool_], *columns: Array) -> list[Array]:
+    """Columns at some places, with a NaN wherever samples between two of these places are missing.
+
+    Parameters
+    ----------
+    places : (k,) ndarray of int
+        Increasing indices.
+    valid : (n,) ndarray of bool
+        Which samples exist.
+    *columns : (n,) ndarray
+        What is drawn.
+    """
+    missing = np.concatenate(([0], np.cumsum(~valid)))
+    after = 1 + np.flatnonzero(np.diff(missing[places]))
+    return [np.insert(column[places], after, np.nan) for column in columns]
+
+
+def newest_cycles(window: Window) -> Window:
+    """The last few cycles of the drive, or all of the window where it holds fewer.
+
+    A window of very many cycles is halved before they are looked for, so that they can be told apart after thinning.
+    """
+    while window.size > 64:
+        places = extremes(window.voltage)
+        drive = window.voltage[places]
+        span = float(np.ptp(drive)) if drive.size else 0.0
+        if span == 0.0:
+            return window
+        troughs = find_peaks(-drive, prominence=_PROMINENCE * span)[0]
+        if troughs.size <= LINE_POINTS // 20:
+            return window.part(int(places[troughs[-CYCLES - 1]])) if troughs.size > CYCLES else window
+        window = window.part(window.size // 2)
+    return window
+
+
+def loop_places(window: Window) -> NDArray[np.intp]:
+    """Indices to draw of a loop: extremes of drive and displacement, and even steps in between."""
+    even = np.flatnonzero(np.isfinite(window.displacement))[:: max(1, window.size // (LOOP_POINTS // 2))]
+    return np.union1d(
+        even,
+        np.union1d(extremes(window.voltage, LOOP_POINTS // 4), extremes(window.displacement, LOOP_POINTS // 4)),
+    )

@@ -1,0 +1,156 @@
+"""`SampleWindow`: the newest samples of a stream, measured and predicted, each in the place of its running number."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CAPACITY = 1 << 19
+"""Samples that are kept: 10 s at 50 kHz, in 21 MB."""
+
+_TURN = 1 << 32
+"""The running number of a sample is counted modulo this."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Window:
+    """Samples that follow one another; NaN where nothing was measured or predicted.
+
+    Parameters
+    ----------
+    time : (n,) ndarray
+        Time of every sample since the epoch, or since the start of a recording [s].
+    voltage : (n,) ndarray
+        Drive voltage [V].
+    displacement : (n,) ndarray
+        Measured displacement [m].
+    prediction : (n,) ndarray
+        Free-run prediction [m].
+    sample_period : float
+        Time between samples [s].
+    """
+
+    time: Array
+    voltage: Array
+    displacement: Array
+    prediction: Array
+    sample_period: float
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return int(self.time.size)
+
+    @property
+    def residual(self) -> Array:
+        """Measured minus predicted displacement [m]."""
+        return self.displacement - self.prediction
+
+    def part(self, first: int, end: int | None = None) -> Window:
+        """Samples `first` to `end`, that one left out."""
+        cut = slice(first, end)
+        return Window(
+            self.time[cut], self.voltage[cut], self.displacement[cut], self.prediction[cut], self.sample_period
+        )
+
+
+class SampleWindow:
+    """A ring of samples, written by one thread and read by another.
+
+    Parameters
+    ----------
+    capacity : int
+        Samples that are kept at most, a power of two.
+
+    Attributes
+    ----------
+    received : int
+        Samples that have come in.
+    """
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self._capacity = capacity
+        self._lock = threading.Lock()
+        self._rows = np.full((4, capacity), np.nan)
+        self._period = 0.0
+        self._end = 0
+        self._filled = 0
+        self.received = 0
+
+    def add(self, index: NDArray[np.uint32], time: Array, voltage: Array, displacement: Array) -> None:
+        """Take a block of samples that follow one another.
+
+        A block that does not continue the stream within the capacity of the window starts it anew: the driver was
+        restarted, or was silent for long.
+
+        Parameters
+        ----------
+        index : (n,) ndarray of uint32
+            Running numbers modulo 2^32.
+        time : (n,) ndarray
+            Time of every sample since the epoch [s].
+        voltage : (n,) ndarray
+            Drive voltage [V].
+        displacement : (n,) ndarray
+            Measured displacement [m].
+        """
+        size = min(index.size, self._capacity)
+        period = float(time[-1] - time[0]) / (time.size - 1) if time.size > 1 else self._period
+        with self._lock:
+            step = (int(index[0]) - self._end) % _TURN
+            changed = bool(self._period) and abs(period / self._period - 1.0) > 0.01
+            if changed or not 0 <= step < self._capacity:
+                self._filled, step = 0, 0
+                self._end = int(index[0])
+            if step:
+                self._write(self._end, np.full((4, step), np.nan))
+            self._period = period
+            values = np.array([time, voltage, displacement, np.full(index.size, np.nan)])
+            self._end = (int(index[-1]) + 1) % _TURN
+            self._write(self._end - size, values[:, -size:])
+            self._filled = min(self._filled + step + size, self._capacity)
+            self.received += int(index.size)
+
+    def add_prediction(self, index: NDArray[np.uint32], prediction: Array) -> None:
+        """Take the predictions of samples; those that the window does not hold are left out.
+
+        Parameters
+        ----------
+        index : (n,) ndarray of uint32
+            Running numbers modulo 2^32, one after the other.
+        prediction : (n,) ndarray
+            Free-run prediction [m].
+        """
+        with self._lock:
+            back = (self._end - int(index[0])) % _TURN
+            if back > self._filled:
+                return
+            size = min(index.size, back)
+            places = (int(index[0]) + np.arange(size)) % self._capacity
+            self._rows[3, places] = prediction[:size]
+
+    def _write(self, start: int, values: Array) -> None:
+        start %= self._capacity
+        ahead = min(values.shape[1], self._capacity - start)
+        self._rows[:, start : start + ahead] = values[:, :ahead]
+        self._rows[:, : values.shape[1] - ahead] = values[:, ahead:]
+
+    @property
+    def sample_period(self) -> float:
+        """Time between samples [s]; 0 before the first block."""
+        return self._period
+
+    def newest(self, duration: float) -> Window:
+        """The samples of the last `duration` [s], or as many as are held, oldest first."""
+        with self._lock:
+            count = min(self._filled, round(duration / self._period) if self._period else 0)
+            start = (self._end - count) % self._capacity
+            rows = np.concatenate(
+                (self._rows[:, start : start + count], self._rows[:, : max(0, start + count - self._capacity)]), axis=1
+            )
+        return Window(rows[0], rows[1], rows[2], rows[3], self._period)

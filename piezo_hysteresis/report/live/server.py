@@ -1,0 +1,137 @@
+"""`PageServer`: an HTTP server of its own thread, on this machine only where no token is given."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from bokeh.application import Application
+from bokeh.application.handlers.function import FunctionHandler
+from bokeh.document import Document
+from bokeh.server.server import BaseServer
+from bokeh.server.tornado import BokehTornado
+from bokeh.server.util import bind_sockets
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import IOLoop
+
+from ...errors import ParameterError
+from .access import TokenAccess, is_local
+
+
+class PageServer:
+    """Serves one kind of page at ``/``.
+
+    Parameters
+    ----------
+    fill : callable
+        Fills the document of a browser window.
+    address : str
+        Address to listen on; one that other machines reach needs a token.
+    port : int
+        Port to listen on; 0 takes a free one.
+    token : str
+        What a visitor has to give; empty: nothing, on this machine only.
+    origins : iterable of str
+        Names, with or without a port, under which browsers may reach the page besides `address` and localhost.
+
+    Raises
+    ------
+    ParameterError
+        On an address that others reach without a token, or one that cannot be listened on.
+    """
+
+    def __init__(
+        self,
+        fill: Callable[[Document], Any],
+        address: str = "127.0.0.1",
+        port: int = 5006,
+        token: str = "",
+        origins: Iterable[str] = (),
+    ) -> None:
+        if not token and not is_local(address):
+            raise ParameterError(
+                f"address: got {address}, which other machines reach, without a token; give token_file, or 127.0.0.1"
+            )
+        self._application = Application(FunctionHandler(fill))
+        self._address, self._port, self._access = address, port, TokenAccess(token) if token else None
+        self._origins = tuple(origins)
+        self._loop = asyncio.new_event_loop()
+        self._ready = threading.Event()
+        self._failure: BaseException | None = None
+        self._server: BaseServer | None = None
+        self._thread = threading.Thread(target=self._serve, name="page", daemon=True)
+        self._thread.start()
+        self._ready.wait()
+        if self._failure is not None:
+            raise ParameterError(
+                f"address {address}, port {port}: {getattr(self._failure, 'strerror', None) or self._failure}; "
+                "give another one where a page is open there already"
+            ) from self._failure
+
+    @property
+    def port(self) -> int:
+        """Port that is listened on."""
+        assert self._server is not None
+        return int(self._server.port or 0)
+
+    @property
+    def url(self) -> str:
+        """Where a browser on this machine finds the page."""
+        host = f"[{self._address}]" if ":" in self._address else self._address
+        return f"http://{'127.0.0.1' if host in ('0.0.0.0', '[::]') else host}:{self.port}/"
+
+    def close(self) -> None:
+        """Stop serving."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join()
+
+    def wait(self) -> None:
+        """Serve until the process is interrupted."""
+        self._thread.join()
+
+    def _serve(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._server = self._listen()
+        except BaseException as error:
+            self._failure = error
+            return
+        finally:
+            self._ready.set()
+        self._server.start()
+        self._loop.run_forever()
+        self._server.stop(wait=False)
+
+    def _listen(self) -> BaseServer:
+        options: dict[str, Any] = {}
+        if self._access is not None:
+            options = {"auth_provider": self._access, "cookie_secret": self._access.cookie_secret}
+        sockets, port = bind_sockets(self._address, self._port)
+        try:
+            tornado = BokehTornado(
+                {"/": self._application},
+                extra_websocket_origins=self._allowed(port),
+                check_unused_sessions_milliseconds=2000,
+                unused_session_lifetime_milliseconds=5000,
+                **options,
+            )
+            http = HTTPServer(tornado)
+            http.add_sockets(sockets)
+        except BaseException:
+            for listening in sockets:
+                listening.close()
+            raise
+        return BaseServer(IOLoop.current(), tornado, http)
+
+    def _allowed(self, port: int) -> list[str]:
+        """Host and port of the pages that may talk to the server: a page of another site may not."""
+        hosts = [*dict.fromkeys((self._address, "127.0.0.1", "localhost"))]
+        own = [f"[{host}]" if ":" in host else host for host in hosts if host not in ("0.0.0.0", "::")]
+        return [host if _names_port(host) else f"{host}:{port}" for host in (*own, *self._origins)]
+
+
+def _names_port(host: str) -> bool:
+    return ":" in host.rpartition("]")[2]

@@ -1,0 +1,36 @@
+"""`LiveSource`: what a page needs of the world of nodes: the axes that are there, and an answer from their services."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Protocol
+
+from .axis_state import AxisState
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a service said.
+
+    Parameters
+    ----------
+    success : bool
+        Whether it did, or began, what it was asked for.
+    message : str
+        In words.
+    """
+
+    success: bool
+    message: str
+
+
+class LiveSource(Protocol):
+    """Axes by name, and their services."""
+
+    def axes(self) -> Mapping[str, AxisState]:
+        """The axes known so far, by name."""
+
+    def call(self, axis: str, service: str) -> Future[Answer]:
+        """Call a service of an axis; the future always gets an answer, also where nobody serves it."""

@@ -1,0 +1,127 @@
+"""The live page in a real browser, beside running nodes: what it shows is what they say, and its buttons act."""
+
+from __future__ import annotations
+
+import re
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import PointCloud2
+from std_srvs.srv import Trigger
+
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, diagnostic, values_of
+from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES
+
+from ..lab import DEEP
+
+pytestmark = pytest.mark.nodes
+
+ROOT = Path(__file__).parents[3]
+PERIOD = 2e-5
+AXIS = "/stage_x"
+
+
+@pytest.fixture(scope="module")
+def nodes(shared_lab, browser):
+    """The nodes of an axis that is driven, and the page of it, open."""
+    lab = shared_lab
+    lab.driver(namespace=AXIS)
+    lab.start("model_node", namespace=AXIS, model_file=str(ROOT / "config" / "published_stage.yaml"))
+    lab.start("identification_node", namespace=AXIS, experiment_root=str(lab.folder / "experiments"))
+    page = lab.start("page_node", port=0)
+    url = lab.wait(lambda: re.search(r"http://127\.0\.0\.1:\d+/", page.output), "the address of the page").group()
+    lab.page = page
+    lab.measured = lab.samples(f"{AXIS}/samples")
+    lab.predicted = lab.listen(PointCloud2, f"{AXIS}/predicted_samples", DEEP)
+    lab.health = lab.diagnostics()
+    lab.wait(lambda: lab.measured.blocks and lab.predicted, "samples and predictions")
+    browser.open(url)
+    browser.wait(lambda: "idle" in browser.text("phase"), "the phase")
+    return lab
+
+
+def scan(lab, duration=60.0):
+    """Drive the stage for a while."""
+    time = PERIOD * np.arange(round(duration / PERIOD))
+    publisher = lab.publisher(PointCloud2, f"{AXIS}/command")
+    publisher.publish(command_to_cloud(4.0 * (1.0 - np.cos(2 * np.pi * 5.0 * time)), PERIOD, "scan"))
+
+
+def test_the_page_draws_the_loop_and_its_points_are_those_of_the_topics(nodes, browser):
+    scan(nodes)
+    browser.wait(lambda: "scan" in browser.text("phase"), "the phase 'scan'")
+    browser.wait(lambda: max(browser.source("loop").get("voltage") or [0], key=abs) > 7.9, "the loop")
+    browser.click("Pause")
+    seen = nodes.measured.so_far()
+    drawn = {name: np.array(values, dtype=float) for name, values in browser.source("loop").items()}
+    real = np.isfinite(drawn["voltage"])
+    assert real.sum() > 300
+    assert np.ptp(drawn["voltage"][real]) > 7.9
+    heard = set(zip(seen.voltage.tolist(), (1e6 * seen.displacement).tolist(), strict=True))
+    assert {(u, y) for u, y, _ in zip(*drawn.values(), strict=True) if np.isfinite(u)} <= heard
+    clouds = [from_cloud(cloud, PREDICTED_SAMPLES) for cloud in nodes.predicted]
+    said = {(1e6 * y, 1e6 * p) for c in clouds for y, p in zip(c["displacement"], c["prediction"], strict=True)}
+    known = np.isfinite(drawn["predicted"])
+    assert known.sum() > 0.9 * real.sum()
+    assert set(zip(drawn["measured"][known], drawn["predicted"][known], strict=True)) <= said
+    browser.click("Pause")
+
+
+def test_stop_stops_and_raises_an_alarm_and_release_asks_first(nodes, browser):
+    browser.click("Stop")
+    nodes.wait(lambda: nodes.measured.newest.voltage[-1] == 0.0, "the safe voltage")
+    browser.wait(lambda: "stopped" in browser.text("alarms"), "the alarm")
+    assert "stopped" in driver_report(nodes).message
+    browser.click("Release …")
+    browser.click("Do not")
+    assert values_of(driver_report(nodes))["stopped"] == "True"
+    browser.click("Release …")
+    browser.click("Release")
+    browser.wait(lambda: "stopped" not in browser.text("driver"), "the end of the stop")
+    assert values_of(driver_report(nodes))["stopped"] == "False"
+
+
+def driver_report(lab):
+    """Newest report of the driver."""
+    reports = [status for array in lab.health for status in array.status if status.name.endswith(": stage")]
+    return reports[-1]
+
+
+def test_identify_shows_the_plan_and_moves_nothing_before_it_is_confirmed(nodes, browser):
+    plan = nodes.call(Trigger, f"{AXIS}/identification_node/plan").message
+    browser.click("Identify …")
+    browser.wait(lambda: plan in browser.text("question"), "the plan")
+    assert nodes.measured.newest.voltage[-1] == 0.0
+    browser.click("Identify")
+    nodes.wait(lambda: nodes.measured.newest.voltage[-1] > 0.1, "the first move of the identification")
+    browser.click("Abort …")
+    browser.click("Abort")
+    browser.wait(lambda: "aborted" in browser.text("job"), "the end of the identification")
+
+
+def test_a_change_of_the_stage_appears(nodes, browser):
+    publisher = nodes.publisher(DiagnosticStatus, f"{AXIS}/change")
+    name = f"{AXIS.strip('/')}/model_node: change"
+    values = {"statistic": 5.2, "group": "gain", "change": 0.013, "unit": "1"}
+    publisher.publish(diagnostic(DiagnosticStatus.WARN, name, "the stage has changed: gain", **values))
+    browser.wait(lambda: "has changed: gain" in browser.text("change"), "the change")
+
+
+def test_the_page_fits_a_telephone(nodes, browser):
+    browser.size(420, 900)
+    browser.wait(lambda: browser.value("document.scrollingElement.scrollWidth") <= 420, "a page of 420 px")
+    browser.size(1200, 1000)
+
+
+def test_a_killed_page_disturbs_nobody(nodes, browser):
+    before = nodes.measured.lost
+    nodes.page.signal(signal.SIGKILL)
+    nodes.page.wait()
+    at = nodes.measured.place()[-1]
+    nodes.wait(lambda: nodes.measured.place()[-1] > at + 50_000, "one second more of samples")
+    assert nodes.measured.lost == before
+    assert all(process.is_running for process in nodes.processes if process is not nodes.page)
