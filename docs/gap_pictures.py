@@ -29,17 +29,8 @@ from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.protocol import protocol
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.record import Experiment, Record
-from piezo_hysteresis.report.figures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    MEASURED,
-    ORANGE,
-    PREDICTED,
-    SETTINGS,
-    canvas,
-)
+from piezo_hysteresis.report.figures.style import MEASURED, PREDICTED, SETTINGS, canvas
+from piezo_hysteresis.report.palette import BLACK, BLUE, GREEN, GREY, ORANGE
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 

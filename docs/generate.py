@@ -23,6 +23,7 @@ from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
 from piezo_hysteresis.nodes.compensation.settings import COMPENSATION
 from piezo_hysteresis.nodes.identification.identification_node import IDENTIFICATION
 from piezo_hysteresis.nodes.model.model_node import MODEL
+from piezo_hysteresis.nodes.page.page_node import PAGE
 from piezo_hysteresis.parameter import Parameter, Row, Setting
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
 from piezo_hysteresis.stage.plant import PlantParameters
@@ -145,6 +146,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "model_node": lambda: settings(MODEL),
     "identification_node": lambda: settings(IDENTIFICATION),
     "compensation_node": lambda: settings(COMPENSATION),
+    "page_node": lambda: settings(PAGE),
     "topics": lambda: table("topic | type | unit | QoS | rate | by", topics.rows()),
     "services": lambda: from_ros("Services"),
     "plant": lambda: settings(PlantParameters.table()),

@@ -19,7 +19,8 @@ from matplotlib.figure import Figure
 
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.identification.protocol.excitation import hold, sine, steps, triangle
-from piezo_hysteresis.report.figures.style import BLACK, BLUE, GREEN, ORANGE, SETTINGS, canvas
+from piezo_hysteresis.report.figures.style import SETTINGS, canvas
+from piezo_hysteresis.report.palette import BLACK, BLUE, GREEN, ORANGE
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 

@@ -1,4 +1,4 @@
-"""One axis: its driver, the model node that predicts as soon as it has a model, and compensation where asked."""
+"""One axis: its driver, the model node that predicts as soon as it has a model; compensation and page where asked."""
 
 from pathlib import Path
 
@@ -25,6 +25,7 @@ ARGUMENTS = (
     ("real_time_factor", "", "speed of a simulated or replayed stage; empty: as the parameter files say", None),
     ("autostart", "true", "configure and activate the driver at start", list(SWITCH)),
     ("compensation", "false", "start the compensation node, too: it follows trajectories in metres", list(SWITCH)),
+    ("page", "false", "show every axis on a page in the browser, http://127.0.0.1:5006", list(SWITCH)),
 )  # fmt: skip
 
 
@@ -67,4 +68,11 @@ def nodes(context: LaunchContext) -> list[Node]:
     ]
     if switch("compensation", value["compensation"]):
         started.append(node("compensation_node", "compensation.yaml", model_file=value["model_file"]))
+    if switch("page", value["page"]):
+        started.append(page_node(config / "page.yaml"))
     return started
+
+
+def page_node(file: Path) -> Node:
+    """The page is one for all axes, and belongs to none."""
+    return Node(package="piezo_hysteresis", executable="page_node", parameters=[str(file)], output="screen")

@@ -11,7 +11,7 @@ from launch_ros.utilities import evaluate_parameters  # noqa: E402
 
 STAGE_ARGUMENTS = {
     "namespace", "params_file", "use_sim_time", "model_file", "stage", "experiment", "real_time_factor", "autostart",
-    "compensation",
+    "compensation", "page",
 }  # fmt: skip
 FOLDER = Path(__file__).parents[1] / "launch"
 
@@ -28,6 +28,7 @@ def load(name):
     [
         ("stage", STAGE_ARGUMENTS),
         ("identify", STAGE_ARGUMENTS),
+        ("watch", {"axes", "address", "port", "token_file", "params_file"}),
         ("replay", {"bag", "axis", "rate", "namespace", "params_file", "use_sim_time", "model_file"}),
     ],
 )

@@ -10,7 +10,8 @@ import numpy as np
 from bench import Trace
 from numpy.typing import NDArray
 
-from piezo_hysteresis.report.figures.style import BLACK, SETTINGS, canvas
+from piezo_hysteresis.report.figures.style import SETTINGS, canvas
+from piezo_hysteresis.report.palette import BLACK
 
 
 def save(path: Path, voltage: NDArray, sample_period: float, traces: Mapping[str, Trace]) -> None:

@@ -60,6 +60,20 @@ def number(name: str, text: str) -> float:
         raise ParameterError(f"{name}: got '{printable(text)}', expected a number") from None
 
 
+def whole_number(name: str, text: str) -> int:
+    """A whole number.
+
+    Raises
+    ------
+    ParameterError
+        On any other text.
+    """
+    try:
+        return int(text)
+    except ValueError:
+        raise ParameterError(f"{name}: got '{printable(text)}', expected a whole number") from None
+
+
 def replayed(stage: str) -> str:
     """The back end that plays a recording, where none or this one is named.
 

@@ -104,7 +104,7 @@ class SampleWindow:
         with self._lock:
             step = (int(index[0]) - self._end) % _TURN
             changed = bool(self._period) and abs(period / self._period - 1.0) > 0.01
-            if changed or not 0 <= step < self._capacity:
+            if changed or not self._filled or step >= self._capacity:
                 self._filled, step = 0, 0
                 self._end = int(index[0])
             if step:

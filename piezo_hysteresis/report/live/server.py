@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import threading
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -12,7 +13,6 @@ from bokeh.application.handlers.function import FunctionHandler
 from bokeh.document import Document
 from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
-from bokeh.server.util import bind_sockets
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
 
@@ -98,18 +98,24 @@ class PageServer:
             self._server = self._listen()
         except BaseException as error:
             self._failure = error
-            return
         finally:
             self._ready.set()
-        self._server.start()
-        self._loop.run_forever()
-        self._server.stop(wait=False)
+        if self._server is not None:
+            self._server.start()
+            self._loop.run_forever()
+            self._server.stop(wait=False)
+            self._loop.run_until_complete(self._server._http.close_all_connections())
+        asyncio.set_event_loop(None)
+        self._loop.close()
 
     def _listen(self) -> BaseServer:
         options: dict[str, Any] = {}
         if self._access is not None:
             options = {"auth_provider": self._access, "cookie_secret": self._access.cookie_secret}
-        sockets, port = bind_sockets(self._address, self._port)
+        family = socket.AF_INET6 if ":" in self._address else socket.AF_INET
+        listening = socket.create_server((self._address, self._port), family=family)
+        listening.setblocking(False)
+        port = listening.getsockname()[1]
         try:
             tornado = BokehTornado(
                 {"/": self._application},
@@ -119,10 +125,9 @@ class PageServer:
                 **options,
             )
             http = HTTPServer(tornado)
-            http.add_sockets(sockets)
+            http.add_sockets([listening])
         except BaseException:
-            for listening in sockets:
-                listening.close()
+            listening.close()
             raise
         return BaseServer(IOLoop.current(), tornado, http)
 

@@ -1,0 +1,129 @@
+"""The page is for this machine alone, and for others only with the token."""
+
+from __future__ import annotations
+
+import asyncio
+import urllib.error
+import urllib.request
+from http.cookiejar import CookieJar
+from pathlib import Path
+from urllib.parse import urlencode
+
+import pytest
+from bokeh.document import Document
+from bokeh.models import Div
+from bokeh.util.token import generate_jwt_token, generate_session_id
+from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.websocket import websocket_connect
+
+from piezo_hysteresis.errors import ParameterError
+from piezo_hysteresis.report.live.access import is_local, read_token
+from piezo_hysteresis.report.live.server import PageServer
+
+TOKEN = "a-token-of-enough-characters"
+SECRET = "what the page shows"
+
+
+def fill(document: Document) -> None:
+    document.title = SECRET
+    document.add_root(Div())
+
+
+@pytest.fixture
+def guarded():
+    server = PageServer(fill, "0.0.0.0", 0, TOKEN)
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def visitor():
+    """A browser that keeps cookies."""
+    opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
+
+    def visit(url: str, **fields: str) -> str:
+        data = urlencode(fields).encode() if fields else None
+        try:
+            with opener.open(url, data) as answer:
+                return answer.read().decode()
+        except urllib.error.HTTPError as error:
+            with error:
+                return f"{error.code} {error.read().decode()}"
+
+    return visit
+
+
+def is_welcome(port: int, origin: str) -> bool:
+    """Whether the server answers a websocket of a page of some origin, whose session is in order."""
+
+    async def ask() -> bool:
+        request = HTTPRequest(f"ws://127.0.0.1:{port}/ws", headers={"Origin": origin})
+        try:
+            socket = await websocket_connect(request, subprotocols=["bokeh", generate_jwt_token(generate_session_id())])
+        except HTTPClientError:
+            return False
+        answer = await asyncio.wait_for(socket.read_message(), 10.0)
+        socket.close()
+        while answer is not None and await socket.read_message() is not None:
+            pass
+        return answer is not None
+
+    return asyncio.run(ask())
+
+
+@pytest.mark.parametrize("address", ["0.0.0.0", "::", "192.0.2.1", "lab-computer"])
+def test_no_address_that_others_reach_without_a_token(address):
+    assert not is_local(address)
+    with pytest.raises(ParameterError, match="without a token"):
+        PageServer(fill, address, 0)
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1", "127.0.0.2", "::1", "localhost"])
+def test_addresses_of_this_machine(address):
+    assert is_local(address)
+
+
+def test_the_page_is_shown_after_the_token_and_not_before(guarded, visitor):
+    assert SECRET not in (asked := visitor(guarded.url))
+    assert 'name="token"' in asked
+    assert visitor(f"{guarded.url}login", token="a-token-of-other-characters").startswith("403")
+    assert SECRET not in visitor(guarded.url)
+    assert SECRET in visitor(f"{guarded.url}login", token=TOKEN)
+    assert SECRET in visitor(guarded.url)
+
+
+def test_a_websocket_needs_the_token_too(guarded):
+    assert not is_welcome(guarded.port, f"http://127.0.0.1:{guarded.port}")
+
+
+def test_pages_of_other_sites_get_no_websocket():
+    server = PageServer(fill, port=0)
+    try:
+        assert not is_welcome(server.port, "http://evil.example")
+        assert is_welcome(server.port, f"http://127.0.0.1:{server.port}")
+    finally:
+        server.close()
+
+
+def test_a_port_that_is_taken_is_an_error_in_one_line():
+    server = PageServer(fill, port=0)
+    try:
+        with pytest.raises(ParameterError, match="in use"):
+            PageServer(fill, port=server.port)
+    finally:
+        server.close()
+
+
+def test_a_token_file_is_private_and_long_enough(tmp_path: Path):
+    file = tmp_path / "token"
+    with pytest.raises(ParameterError, match="exists"):
+        read_token(file)
+    file.write_text(f"{TOKEN}\n")
+    file.chmod(0o644)
+    with pytest.raises(ParameterError, match="chmod 600"):
+        read_token(file)
+    file.chmod(0o600)
+    assert read_token(file) == TOKEN
+    file.write_text("short")
+    with pytest.raises(ParameterError, match="16"):
+        read_token(file)
