@@ -19,7 +19,8 @@ from rich.table import Table
 from piezo_hysteresis import Model
 from piezo_hysteresis.identification import DriveLimits
 from piezo_hysteresis.nodes.messages.conversions import values_of
-from piezo_hysteresis.report.figures.style import BLACK, BLUE, SETTINGS, canvas
+from piezo_hysteresis.report.figures.style import SETTINGS, canvas
+from piezo_hysteresis.report.palette import BLACK, BLUE
 
 Array = NDArray[np.float64]
 

@@ -97,6 +97,10 @@ class Browser:
         found = f"{ALL}.filter(e => e.id === {json.dumps(name)}).map(e => e.textContent)[0] ?? ''"
         return str(self.value(found))
 
+    def shown(self) -> str:
+        """All that can be read on the page."""
+        return str(self.value(f"{ALL}.filter(e => e.className === 'bk-clearfix').map(e => e.innerText).join('\\n')"))
+
     def source(self, name: str) -> dict[str, list[float]]:
         """Columns of a data source of the page, as the browser holds them."""
         column = "Object.fromEntries([...Object.entries(s.data)].map(([k, v]) => [k, Array.from(v)]))"
@@ -119,7 +123,7 @@ class Browser:
 
     def wait(self, condition: Callable[[], Any], what: str) -> Any:
         """Value of a condition, once it holds."""
-        return self._until(condition, lambda: f"{what}\n{self.value('document.body.innerText')}")
+        return self._until(condition, lambda: f"{what}\n{self.shown()}")
 
     def _until(self, condition: Callable[[], Any], what: Callable[[], str]) -> Any:
         deadline = time.monotonic() + PATIENCE

@@ -97,6 +97,7 @@ def test_identify_shows_the_plan_and_moves_nothing_before_it_is_confirmed(nodes,
     browser.wait(lambda: plan in browser.text("question"), "the plan")
     assert nodes.measured.newest.voltage[-1] == 0.0
     browser.click("Identify")
+    browser.wait(lambda: "recording to" in browser.text("answer"), "the answer of the identification node")
     nodes.wait(lambda: nodes.measured.newest.voltage[-1] > 0.1, "the first move of the identification")
     browser.click("Abort …")
     browser.click("Abort")
