@@ -22,6 +22,8 @@ FINER = 8
 """Steps of the plant per sample, about."""
 TURN = 0.3
 """Time at which creep turns from its fast rate to its slow one [s]."""
+DRIFT = 10.0
+"""Time in which a stage drifts by `drift` [s]."""
 PER_DECADE = 6
 """Creep elements per decade."""
 
@@ -77,6 +79,7 @@ class Nanopositioner:
     drift: float = 0.0
     plays: int = 30
     seed: int = field(default=0, compare=False)
+    noise_seed: int = field(default=0, compare=False)
 
     @classmethod
     def random(cls, rng: np.random.Generator, **fixed: float) -> Nanopositioner:
@@ -107,7 +110,8 @@ class Nanopositioner:
         """The same stage, its gain, loop and zero changed a little."""
         gain, loop = 1.0 + size * rng.uniform(-1.0, 1.0, 2)
         zero = self.zero + 0.01 * self.stroke * float(rng.normal())
-        return replace(self, gain=self.gain * gain, loop=self.loop * loop, zero=zero, seed=int(rng.integers(1 << 30)))
+        noise = int(rng.integers(1 << 30))
+        return replace(self, gain=self.gain * gain, loop=self.loop * loop, zero=zero, noise_seed=noise)
 
     def play(self, drive: Array, period: float, phase: str = "record") -> Record:
         """Record of a drive [V] that follows a rest at 0 V, sampled at `period` [s]."""
@@ -118,10 +122,10 @@ class Nanopositioner:
             for _ in range(3):
                 x = x / (1.0 + self.softening * x * x) if _ == 0 else x
         y = self._filtered(x, dt)
-        rng = np.random.default_rng((self.seed, drive.size))
+        rng = np.random.default_rng((self.seed, self.noise_seed, drive.size))
         at = y[::FINER]
         t = period * np.arange(at.size)
-        at = at + self.drift * t / (t[-1] + 1.0) + self.noise * rng.normal(size=at.size)
+        at = at + self.drift * t / DRIFT + self.noise * rng.normal(size=at.size)
         return Record(drive, self.zero + self.stroke * self.gain * at, period, phase=phase, initial_voltage=0.0)
 
     def _hysteresis(self, v: Array) -> Array:
@@ -155,8 +159,8 @@ class Nanopositioner:
             now = np.arange(x.size)
             x = np.interp(now - delay / dt, now, x, left=0.0)
         if pole:
-            keep = np.exp(-dt / pole)
-            x = lfilter([1.0 - keep], [1.0, -keep], x)
+            half = 0.5 * dt / pole  # trapezoidal: the lag is that of the pole, whatever the grid
+            x = lfilter([half / (1.0 + half)] * 2, [1.0, -(1.0 - half) / (1.0 + half)], x)
         return x
 
 

@@ -159,8 +159,7 @@ def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:
     needs_structure = state.model is None and not roles_of(state.experiment).broadband
     if len(state.moving) >= FEWEST and not needs_structure:
         return state
-    with ending_at(state.end):
-        return diagnose_few(state.experiment, state.model, state.moving, state.effects, state.progress)
+    return diagnose_few(state.experiment, state.model, state.moving, state.effects, state.progress, state.end)
 
 
 def fit_baseline(state: DiagnosisState) -> DiagnosisState:

@@ -48,7 +48,7 @@ KINDS: dict[str, ChangeKind] = {
     Softening.name: ChangeKind(
         Softening.name, "dynamics", "k3", "1", (Softening.name,), "with a stiffness that depends on position, {size}"
     ),
-    "drift": ChangeKind(ThermalDrift.name, "drift", "D", "m", ("drift_0", "drift_1"), "with a drift of {size}"),
+    "drift": ChangeKind(ThermalDrift.name, "drift", "D", "m", ("drift",), "with a drift of {size} within a record"),
     "gain": ChangeKind("gain", "static", "relative_change", "1", (), "with a gain changed by {size}"),
     "loop": ChangeKind("loop_height", "hysteresis", "relative_change", "1", (), "with a loop changed by {size}"),
 }

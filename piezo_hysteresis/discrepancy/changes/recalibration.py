@@ -18,7 +18,7 @@ from ...model.provenance import provenance
 from ...record import Experiment
 from ..residual.noise_floor import floors, stroke
 from .change_kinds import ParameterChange
-from .parameter_changes import ChangeSearch
+from .change_search import ChangeSearch
 from .same_stage import changed_model
 
 
@@ -77,9 +77,9 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     if not used:
         raise IdentificationError("recalibrate: the drive does not move in any record; expected at least one loop")
     search = ChangeSearch(model, records, used, floors(records).tolist())
-    best = min((search.best("delay"), search.account("none")), key=lambda account: account.cost)
-    numbers = dict(zip(best.names, best.theta.tolist(), strict=False))
-    session = {n: numbers.get(n, 0.0) for n in search.sides}
+    best = search.shaped("delay", free=search.sides)
+    best = min((best, search.account("none", free=search.sides)), key=lambda account: account.cost)
+    session = search.session(best)
     change = ParameterChange("delay", best.size, (best.size, best.size), (), best.cost, best.cost, session)
     fitted = changed_model(model, change, records)
 

@@ -19,7 +19,7 @@ from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
 from .change_kinds import KINDS, ParameterChange
 from .parameter_changes import find_change
-from .signatures import DRIFT_TIMES, creep_numbers, loop_numbers
+from .signatures import DRIFT_TIME, creep_numbers, loop_numbers
 
 ERROR, HASH = "free_run_error", "data_hash"
 """Keys of the provenance."""
@@ -114,8 +114,8 @@ def changed_model(model: Model, change: ParameterChange, records: Sequence[Recor
         numbers[name] = values[name] + change.size
     elif change.kind.name == ThermalDrift.name:
         longest = max(r.duration for r in records)
-        tau = max(1.0, DRIFT_TIMES[-1] * longest)
-        model = model.with_effect(ThermalDrift(D=change.size, tau=tau))
+        tau = max(1.0, DRIFT_TIME * longest)
+        model = model.with_effect(ThermalDrift(D=-change.size / float(np.expm1(-longest / tau)), tau=tau))
     elif change.kind.name == Softening.name:
         # the cube of the displacement, by the cube of the drive
         span = stroke(records)

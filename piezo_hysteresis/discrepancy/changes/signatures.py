@@ -28,8 +28,8 @@ from ...record import Record
 
 Array = NDArray[np.float64]
 
-DRIFT_TIMES = (0.1, 1.0)
-"""Time constants of a drift, share of the longest record."""
+DRIFT_TIME = 3.0
+"""Time constant of a drift, times the longest record: within it a stage drifts almost evenly."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -69,11 +69,12 @@ def creep_numbers(model: Model) -> dict[str, float]:
     return {n: values[n] for n in names if values.get(n)}
 
 
-def predictions(model: Model, records: Sequence[Record]) -> list[ChangeablePrediction]:
-    """Free run of every record, with its slopes by the linear changes.
+def predictions(model: Model, records: Sequence[Record]) -> tuple[list[ChangeablePrediction], float]:
+    """Free run of every record with its slopes by the linear changes, and the share of the loop in the displacement.
 
-    These are ``gain``, ``loop`` and ``creep``, relative; ``resonance`` in Hz; ``softening`` per cube of the range;
-    ``drift_0`` and ``drift_1`` in m.
+    A change of the loop height leaves the gain as it is: that share of the displacement is taken back.
+    The changes are ``gain``, ``loop`` and ``creep``, relative; ``resonance`` in Hz; ``softening`` per cube of the
+    range; ``drift`` in m at the end of the longest record.
     """
     bare = model.without(Offset.name) if Offset.name in model else model
     loop, creep = loop_numbers(bare), creep_numbers(bare)
@@ -103,11 +104,22 @@ def predictions(model: Model, records: Sequence[Record]) -> list[ChangeablePredi
             by["resonance"] = slopes[order.index(resonance[0])]
         by[Softening.name] = -((y / span) ** 3) * span
         time = record.start_time + record.sample_period * np.arange(y.size)
-        for k, share in enumerate(DRIFT_TIMES):
-            by[f"drift_{k}"] = -np.expm1(-time / (share * longest))
+        by["drift"] = np.expm1(-time / (DRIFT_TIME * longest)) / np.expm1(-1.0 / DRIFT_TIME)
         found.append(ChangeablePrediction(record, y, before, by))
         before = float(y[-1])
-    return found
+    return found, _loop_apart(found)
+
+
+def _loop_apart(found: Sequence[ChangeablePrediction]) -> float:
+    """Take from the slopes by the loop height what a gain does, and return the share."""
+    if "loop" not in found[0].rows:
+        return 0.0
+    moving = np.concatenate([p.y - p.y.mean() for p in found])
+    loops = np.concatenate([p.rows["loop"] - p.rows["loop"].mean() for p in found])
+    share = float(moving @ loops / (moving @ moving))
+    for p in found:
+        p.rows["loop"] = p.rows["loop"] - share * p.y
+    return share
 
 
 def settled(model: Model, voltage: float) -> float:

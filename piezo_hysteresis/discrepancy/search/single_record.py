@@ -40,6 +40,7 @@ from .selection import select
 from .selection_result import Selection, Step, explained
 from .structure_steps import structure_steps
 from .test_records import reporting
+from .time_limit import ending_at
 from .training_data import TrainingData, extent_of
 
 BLOCKS = 16
@@ -69,6 +70,7 @@ def diagnose_few(
     used: Collection[int],
     effects: Collection[type[Effect]],
     progress: Progress,
+    end: float = np.inf,
 ) -> Diagnosis:
     """Extend the best model as far as what is left out asks for it, and name what is decided.
 
@@ -84,6 +86,8 @@ def diagnose_few(
         The library to choose from.
     progress : callable
         Called with a word and the fraction done.
+    end : float
+        When the search for further effects has to end, on the clock of `time.monotonic` [s].
     """
     records = experiment.records
     aside = reporting(records, used) if len(used) >= FEWEST_RECORDS else ()
@@ -111,11 +115,14 @@ def diagnose_few(
     if found and found.structure and before.excess > ADEQUATE and has_several_drives(records, fitted):
         steps = structure_steps(found, before, training_data, short, least.tolist(), fitted)
     fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
-    more = select(now.model, training_data, score, null, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part))
+    with ending_at(end):
+        more = select(
+            now.model, training_data, score, null, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part)
+        )
     final, accepted = _delivered(more, now, model, found, records, least.tolist(), fitted)
     further = more.steps if accepted else tuple(replace(s, accepted=False) for s in more.steps)
     reached = more.score if accepted else score
-    selection = Selection(baseline.model, final.model, reached, (*steps, *further), null)
+    selection = Selection(baseline.model, final.model, reached, (*steps, *further), null, more.in_time)
 
     progress("gap", 0.9)
     chosen = sorted(aside or fitted)

@@ -1,0 +1,115 @@
+"""What changed between two recordings of one stage: is it named, with its size, and is an unchanged stage left alone.
+
+Every stage of `benchmarks.nanopositioner` is recorded and identified, then recorded on another day with one thing
+changed, or nothing. Sizes go from a tenth of a sample to tens of samples.
+
+    python -m benchmarks.changes --stages 8
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.figures import Cell, Figures, alone
+from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change
+from piezo_hysteresis.discrepancy.residual.noise_floor import floors
+from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.record import Experiment
+
+PERIOD = 5e-4
+"""Sample period [s]."""
+FREQUENCIES = (1.0, 10.0, 60.0)
+"""Of the growing sines of every recording [Hz]."""
+LEAST = 0.95
+"""Share of the changed stages whose family has to be right; of the unchanged ones none may get a name."""
+
+
+def played(stage: Nanopositioner) -> Experiment:
+    """A recording: a step from rest, a hold, growing sines, at every frequency."""
+    drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD, (0.4, 0.7, 1.0))) for f in FREQUENCIES)
+    return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
+
+
+def changes(day: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanopositioner]]:
+    """What is changed, the family it belongs to, its size where one number has it, and the stage."""
+    for samples in (0.1, 0.5, 3.0, 30.0):
+        late = replace(day, filter_delay=samples * PERIOD)
+        yield f"delay {samples:g} samples", "lag", samples * PERIOD, late
+    for samples in (0.2, 2.0, 20.0):
+        slow = replace(day, filter_pole=samples * PERIOD)
+        yield f"pole {samples:g} samples", "lag", samples * PERIOD, slow
+    yield "gain + 4 %", "static", None, replace(day, gain=1.04 * day.gain)
+    yield "gain - 6 %", "static", None, replace(day, gain=0.94 * day.gain)
+    yield "loop + 20 %", "hysteresis", None, replace(day, loop=1.2 * day.loop)
+    yield "softening 3 %", "dynamics", None, replace(day, softening=0.03)
+    yield "drift 1 % in 10 s", "drift", None, replace(day, drift=0.01)
+    yield "drift 5 % in 10 s", "drift", None, replace(day, drift=0.05)
+    for factor in (1.5, 2.0):
+        creeps = replace(day, creep_fast=factor * day.creep_fast, creep_slow=factor * day.creep_slow)
+        yield f"creep × {factor:g}", "creep", None, creeps
+    for factor in (0.93, 1.06):
+        yield f"resonance × {factor:g}", "dynamics", (factor - 1.0) * day.mode, replace(day, mode=factor * day.mode)
+
+
+def named(model: Model, stage: Nanopositioner) -> tuple[str, float, tuple[float, float]] | None:
+    """Family, size and interval of the change that the model's own search finds."""
+    records = played(stage).records
+    least = np.maximum(floors(records), float(model.provenance["free_run_error"]))
+    change = find_change(model, records, range(len(records)), least.tolist())
+    return None if change is None else (change.kind.family, change.size, change.interval_95)
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """How many stages."""
+    parser.add_argument("--stages", type=int, default=8)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
+
+
+def run(options: argparse.Namespace) -> list[Figures]:
+    """One row per change, over all stages."""
+    found: dict[str, list[tuple[bool, bool | None, float | None, str]]] = {}
+    false = 0
+    for seed in range(options.first, options.first + options.stages):
+        rng = np.random.default_rng(seed)
+        stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)))
+        model = identify(played(stage), memory=True).model
+        for _ in range(2):
+            false += named(model, stage.on_another_day(rng)) is not None
+        for what, family, size, changed in changes(stage.on_another_day(rng)):
+            answer = named(model, changed)
+            right = answer is not None and answer[0] == family
+            holds = error = None
+            if right and size is not None and answer is not None:
+                low, high = answer[2]
+                holds, error = low <= size <= high, abs(answer[1] / size - 1.0)
+            found.setdefault(what, []).append((right, holds, error, "none" if answer is None else answer[0]))
+    rows: list[tuple[Cell, ...]] = []
+    for what, cases in found.items():
+        held = [h for _, h, _, _ in cases if h is not None]
+        errors = [100.0 * e for _, _, e, _ in cases if e is not None]
+        wrong = ", ".join(sorted({name for right, _, _, name in cases if not right}))
+        counts = f"{sum(c[0] for c in cases)} of {len(cases)}"
+        coverage = f"{sum(held)} of {len(held)}" if held else ""
+        rows.append((what, counts, wrong, float(np.median(errors)) if errors else None, coverage))
+    every = [c for cases in found.values() for c in cases]
+    right = sum(c[0] for c in every)
+    held = [c[1] for c in every if c[1] is not None]
+    rows.append(("all", f"{right} of {len(every)}", "", None, f"{sum(held)} of {len(held)}"))
+    rows.append(("another day, named", f"{false} of {2 * options.stages}", "", None, ""))
+    failures = []
+    if right < LEAST * len(every):
+        failures.append(f"family right in {right} of {len(every)}, promised {LEAST:.0%}")
+    if false:
+        failures.append(f"{false} unchanged stages got a name, promised 0")
+    columns = ("change", "family right", "else", "error of the size, median [%]", "interval holds the size")
+    return [Figures("Changes between two recordings", columns, rows, tuple(failures))]
+
+
+if __name__ == "__main__":
+    alone(__name__)

@@ -1,0 +1,174 @@
+"""`ChangeSearch`: the difference between records and what a given model predicts of them, and accounts of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ...identification.structure.pieces import WEIGHTS, pieces_of
+from ...model.model import Model
+from ...record import Record
+from .change_kinds import KINDS
+from .signatures import SHAPES, ChangeablePrediction, predictions
+
+Array = NDArray[np.float64]
+
+DAY = {"gain": 0.0075, "loop": 0.04}
+"""Relative changes of gain and loop height from one day to another."""
+PRICE = 0.5
+"""What such a change costs in V beside another change."""
+SHORTEST, LONGEST = 0.02, 100.0
+"""Delays that are looked for [samples]."""
+AROUND = 0.2
+"""Part of a size, or of a sample, within which it is looked for again without some of the pieces."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Account:
+    """One explanation: its cost and its numbers, in the order of `names`."""
+
+    key: str
+    cost: float
+    size: float
+    theta: Array
+    names: tuple[str, ...]
+
+
+class ChangeSearch:
+    """Records, what the model predicts of them, and the accounts of the difference.
+
+    Parameters
+    ----------
+    model : Model
+        Given.
+    records : sequence of Record
+        In order.
+    used : sequence of int
+        Records that count.
+    floors : sequence of float
+        Floor of every record, the known error of the model included [m].
+    """
+
+    def __init__(self, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> None:
+        self.predicted, self.loop_share = predictions(model, records)
+        self.used, self.period = list(used), model.sample_period
+        self.sides = ["gain"] + (["loop"] if "loop" in self.predicted[0].rows else [])
+        self.weights, self.labels = self._weights(records, floors)
+        self.origins = np.concatenate([np.full(records[i].size, i) for i in self.used])
+
+    def _weights(self, records: Sequence[Record], floors: Sequence[float]) -> tuple[Array, NDArray[np.int64]]:
+        """Root of the weight of every sample that counts, and the piece it belongs to."""
+        roots, labels = [], []
+        pieces = pieces_of(records, self.used)
+        for number, piece in enumerate(p for p in pieces if p.origin in self.used):
+            size = piece.record.size
+            weight = WEIGHTS[piece.kind] / size / floors[piece.origin] ** 2
+            roots.append(np.full(size, np.sqrt(weight)))
+            labels.append(np.full(size, number))
+        root, label = np.concatenate(roots), np.concatenate(labels)
+        floor = np.concatenate([np.full(records[i].size, floors[i]) for i in self.used])
+        return root / np.sqrt(np.sum((root * floor) ** 2)), label
+
+    def _stack(self, signals: Sequence[Array]) -> Array:
+        return np.concatenate([signals[i] for i in self.used])
+
+    def _columns(self, key: str, size: float, names: Sequence[str]) -> tuple[Array, Array]:
+        """Changed prediction of all samples that count, and the columns `names` changed alike."""
+        shape = SHAPES.get(key)
+
+        def changed(p: ChangeablePrediction, signal: Array, before: float) -> Array:
+            return signal if shape is None else shape(p, signal, before, size)
+
+        y = self._stack([changed(p, p.y, p.before) for p in self.predicted])
+        rows = [
+            self._stack([changed(p, p.rows[n], p.before if n == "gain" else 0.0) for p in self.predicted])
+            for n in names
+        ]
+        zeros = [
+            self._stack([np.full(p.y.size, float(i == j)) for j, p in enumerate(self.predicted)]) for i in self.used
+        ]
+        return y, np.array([*rows, *zeros])
+
+    def account(
+        self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: NDArray[np.bool_] | None = None
+    ) -> Account:
+        """Least squares of the linear numbers beside a change of given size.
+
+        Gain and loop height are priced by what days do, unless they are in `free`.
+        """
+        names = (*self.sides, *(n for n in (KINDS[key].rows if key in KINDS else ())))
+        y, columns = self._columns(key, size, names)
+        root = self.weights if mask is None else np.where(mask, self.weights, 0.0)
+        measured = self._stack([p.record.displacement for p in self.predicted])
+        target, matrix = root * (measured - y), root * columns
+        scale = np.linalg.norm(matrix, axis=1)
+        scale[scale == 0.0] = 1.0
+        price = np.zeros(len(matrix))
+        for row, name in enumerate(names):
+            if name in DAY and name not in free:
+                price[row] = PRICE / DAY[name] ** 2
+        gram = (matrix / scale[:, None]) @ (matrix / scale[:, None]).T + np.diag(price / scale**2)
+        theta = np.linalg.lstsq(gram, (matrix / scale[:, None]) @ target, rcond=1e-12)[0] / scale
+        left = target - theta @ matrix
+        return Account(key, float(left @ left + price @ theta**2), size, theta, names)
+
+    def session(self, account: Account) -> dict[str, float]:
+        """Relative changes of gain and loop height of an account, as they act on the model."""
+        own = dict(zip(account.names, account.theta.tolist(), strict=False))
+        numbers = {n: own[n] for n in self.sides}
+        numbers["gain"] -= self.loop_share * numbers.get("loop", 0.0)
+        return numbers
+
+    def shaped(
+        self,
+        key: str,
+        mask: NDArray[np.bool_] | None = None,
+        near: float | None = None,
+        free: Sequence[str] = (),
+    ) -> Account:
+        """The best size of a delay or of a filter."""
+        period = min(p.record.sample_period for p in self.predicted)
+        if near is None:
+            sizes = period * np.geomspace(SHORTEST, LONGEST, 16)
+            sizes = np.concatenate((-sizes[:10][::-1], sizes)) if key == "delay" else sizes
+            near = float(min(sizes, key=lambda s: self.account(key, float(s), free, mask).cost))
+            low, high = sorted((0.4 * near, 2.2 * near))
+        else:
+            half = max(AROUND * abs(near), AROUND * period)
+            low, high = near - half, near + half
+        found = scipy.optimize.minimize_scalar(
+            lambda s: self.account(key, float(s), free, mask).cost,
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": 1e-3 * abs(near)},
+        )
+        return self.account(key, float(found.x), free, mask)
+
+    def best(self, key: str, mask: NDArray[np.bool_] | None = None, near: float | None = None) -> Account:
+        """The account of a change, its size in the unit of its kind."""
+        if key in SHAPES:
+            return self.shaped(key, mask, near)
+        found = self.account(key, free=(key,), mask=mask)
+        rows = KINDS[key].rows or (key,)
+        values = dict(zip(found.names, found.theta.tolist(), strict=False))
+        return Account(key, found.cost, sum(values[r] for r in rows), found.theta, found.names)
+
+    def interval(self, best: Account) -> tuple[float, float]:
+        """95 % interval by leaving out groups of pieces, and by leaving out records: the larger of the two."""
+        numbers = np.unique(self.labels)
+        groups = [g for g in np.array_split(numbers, min(6, numbers.size)) if g.size]
+        near = best.size if best.key in SHAPES else None
+        half = 0.0
+        for labels, parts in ((self.labels, groups), (self.origins, [[o] for o in np.unique(self.origins)])):
+            masks = [~np.isin(labels, part) for part in parts]
+            sizes = np.array([self.best(best.key, mask, near).size for mask in masks if mask.any()])
+            count = sizes.size
+            if count > 1:
+                spread = np.sqrt((count - 1.0) / count * np.sum((sizes - sizes.mean()) ** 2))
+                half = max(half, float(scipy.stats.t.ppf(0.975, count - 1)) * float(spread))
+        half = half or np.inf
+        return best.size - half, best.size + half
