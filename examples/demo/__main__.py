@@ -151,7 +151,7 @@ class Demo:
         self.say(f"[bold]verdict: {self.verdict}[/bold]")
         self.look(bench, "extended", bench.new_model(count))
         self.scan.follow("extended model")
-        self.scan.learn("best round of learning")
+        self.scan.learn("learning")
         self.scan.show(self.console)
         return experiment
 

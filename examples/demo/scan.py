@@ -126,7 +126,7 @@ class Scan:
             if values_of(best)["state"] == "done":
                 best, end = self._bench.learn()
             number = values_of(best)["phase"].rpartition("_")[2]
-            label = f"{method}, after {number} corrections" if number.isdecimal() else method
+            label = f"{method}, {number} corrections" if number.isdecimal() else method
             self.runs[name].append(self._run(label, wanted, values_of(best), end.message))
 
     def _run(self, method: str, wanted: Array, values: dict[str, str], note: str) -> Run:

@@ -18,12 +18,9 @@ from ..errors import ModelError, RecordingError
 from ..model import model_file
 from ..recording.formats.wanted_path import read_path
 from ..report.json_file import write_json
-from ..report.tables.table import Table
+from ..report.tables.plan_table import answer, notes, plan_table
 from .options.destination import add_force, require_new_file, require_new_folder
 from .terminal import console, show
-
-MOST_PARTS = 3
-"""Parts of a path that are reported one by one."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -45,11 +42,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default=0.05,
         help="duration of the approach to the path [s] (default: 0.05)",
     )
+    parser.add_argument(
+        "--way-back",
+        metavar="S",
+        type=float,
+        default=0.05,
+        help="duration of the way back to the rest voltage after the path [s]; 0: the command ends with the path "
+        "(default: 0.05)",
+    )
     parser.add_argument("--approximate", action="store_true", help="leave out effects that cannot be inverted")
     parser.add_argument(
         "--allow-partial", action="store_true", help="write the voltage even if a part of the path cannot be reached"
     )
     parser.add_argument("--figures", metavar="FOLDER", help="folder for the figure and its data")
+    parser.add_argument("--report", metavar="FILE", help="HTML page with the plan, the expected error and the figure")
     parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
     add_force(parser)
     parser.set_defaults(run=run)
@@ -84,104 +90,29 @@ def run(args: argparse.Namespace) -> int:
         limits,
         start=model.rest(args.rest_voltage),
         approach=args.approach,
+        way_back=args.way_back,
         approximate=args.approximate,
     )
     if args.json is not None:
         write_json(args.json, answer(found))
     if args.figures is not None:
         _draw(found, Path(args.figures).expanduser())
-    show(_table(found))
+    if args.report is not None:
+        from ..report.plan_page import plan_page
+
+        plan_page(found, model, args.path).save(Path(args.report).expanduser())
+    show(plan_table(found))
     out = console()
     if resampled:
         out.print(f"note: the path was interpolated to the model's sample period, {model.sample_period:g} s")
-    for name in found.left_out:
-        out.print(f"caution: {name} has no inverse and was left out; the error above holds what that costs")
-    for name in found.not_on_path:
-        out.print(f"note: {name} does not depend on the drive and is not compensated")
-    for line in refusal(found):
-        out.print(f"caution: {line}")
+    for line in notes(found):
+        out.print(line)
     if not found.reachability.is_whole and not args.allow_partial:
         out.print("no command was written; change the path, or give --allow-partial to write what the limits allow")
         return 1
     _save(found, Path(args.output).expanduser())
     out.print(f"wrote {args.output}")
     return 0 if found.reachability.is_whole else 1
-
-
-def refusal(found: Plan) -> list[str]:
-    """What cannot be had, and the nearest path that can; empty where all can."""
-    parts = found.reachability.parts
-    lines = [str(part) for part in parts[:MOST_PARTS]]
-    if len(parts) > MOST_PARTS:
-        lines.append(f"{len(parts) - MOST_PARTS} more parts like these cannot be had")
-    nearest = found.reachability.nearest
-    if nearest is None:
-        return lines
-    ways = []
-    if nearest.offset is not None:
-        ways.append(f"moved by {1e6 * nearest.offset:+.4g} µm")
-    if nearest.amplitude is not None:
-        ways.append(f"with {100.0 * nearest.amplitude:.4g} % of its amplitude about its middle")
-    if nearest.band is not None:
-        ways.append(f"without content above {nearest.band:.3g} Hz")
-    return [*lines, f"the path can be had {', or '.join(ways)}" if ways else "no shift or scale makes it reachable"]
-
-
-def answer(found: Plan) -> dict[str, Any]:
-    """The result for machines."""
-    nearest = found.reachability.nearest
-    return {
-        "schema": 1,
-        "samples": int(found.voltage.size),
-        "sample_period_s": found.sample_period,
-        "preview_samples": found.preview,
-        "preview_s": found.preview * found.sample_period,
-        "path_begins_at_sample": found.begin,
-        "range_m": found.range,
-        "voltage_min_V": float(found.voltage.min()),
-        "voltage_max_V": float(found.voltage.max()),
-        "largest_slew_V_per_s": found.largest_slew,
-        "expected_error": dict(found.expected.as_dict()),
-        "reachable": found.reachability.is_whole,
-        "unreachable": [
-            {
-                "begin_s": p.begin,
-                "end_s": p.end,
-                "largest_m": p.largest,
-                "limit": p.limit,
-                "needed_min_V": p.needed_min,
-                "needed_max_V": p.needed_max,
-                "needed_slew_V_per_s": p.needed_slew,
-                "after_loop": p.after_loop,
-            }
-            for p in found.reachability.parts
-        ],
-        "nearest": None
-        if nearest is None
-        else {"offset_m": nearest.offset, "amplitude": nearest.amplitude, "band_hz": nearest.band},
-        "left_out": list(found.left_out),
-        "not_on_path": list(found.not_on_path),
-    }
-
-
-def _table(found: Plan) -> Table:
-    expected, span = found.expected, found.range
-
-    def error(value: float | None) -> str:
-        if value is None:
-            return "not stated"
-        return f"{1e9 * value:.2f} nm" + (f", {100.0 * value / span:.4f} % of the path's range" if span else "")
-
-    rows = (
-        ("drive voltage", f"{found.voltage.min():.4g} to {found.voltage.max():.4g} V"),
-        ("largest slew", f"{found.largest_slew:.4g} V/s"),
-        ("duration", f"{found.voltage.size * found.sample_period:.4g} s, {found.voltage.size} samples"),
-        ("preview", f"{found.preview} samples, {1e3 * found.preview * found.sample_period:.3g} ms"),
-        ("error left by the plan", error(expected.planned)),
-        ("free-run error of the model", error(expected.free_run)),
-        ("expected error, rms", error(expected.total)),
-    )
-    return Table("Plan", ("", ""), rows)
 
 
 def _save(found: Plan, place: Path) -> None:

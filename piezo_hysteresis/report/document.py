@@ -9,11 +9,19 @@ from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
+from ..model.model import Model
 from .figures.comparison import ModelComparison
 from .figures.drawing import Drawing
 from .tables.table import Table
 from .verdict import VerdictText
 from .words import nanometre
+
+FREE_RUN = (
+    "Errors are those of free-run simulation: the model sees the drive only, never the measured displacement. Per\n"
+    "cents are RMS over peak-to-peak displacement of the experiment. The floor of a phase is its sensor noise or 0.03 %"
+    " of\nrange, whichever is larger."
+)
+"""How the numbers of a page about an experiment are to be read."""
 
 
 def document(
@@ -35,15 +43,45 @@ def document(
     parts : mapping of str to (drawings, tables)
         Heading of every section and what stands under it.
     """
-    model = comparison.model
+    merit = tuple(_figures_of_merit(comparison))
+    return framed(title, comparison.experiment.source, comparison.model, verdict, merit, parts, FREE_RUN)
+
+
+def framed(
+    title: str,
+    source: str,
+    model: Model | None,
+    verdict: VerdictText,
+    merit: Sequence[tuple[str, str]],
+    parts: Mapping[str, tuple[Sequence[Drawing], Sequence[Table]]],
+    footer: str,
+) -> str:
+    """The frame of any page.
+
+    Parameters
+    ----------
+    title, source : str
+        Heading, and what the page is about.
+    model : Model or None
+        Whose chain stands under the heading.
+    verdict : VerdictText
+        Comes first.
+    merit : sequence of (str, str)
+        Names and values of the figures under the verdict.
+    parts : mapping of str to (drawings, tables)
+        Heading of every section and what stands under it.
+    footer : str
+        How the numbers are to be read.
+    """
     return _template().render(
         title=title,
-        source=comparison.experiment.source,
+        source=source,
         chain="no model" if model is None else " → ".join(e.name for e in model.effects),
         style=files(__package__).joinpath("page.css").read_text(encoding="utf-8"),
         verdict=verdict,
-        merit=list(_figures_of_merit(comparison)),
+        merit=merit,
         parts=parts,
+        footer=footer,
     )
 
 

@@ -46,6 +46,31 @@ def test_the_command_drives_the_model_along_the_path(piezo, model, tmp_path):
     assert "expected error" in done.out and (tmp_path / "figures" / "tracking.png").stat().st_size > 5000
 
 
+def test_terminal_page_and_json_say_the_same_numbers(piezo, model, tmp_path):
+    write(tmp_path / "path.csv", 1.0, 3.0)
+    words = ("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz", "--json", tmp_path / "p.json")
+    done = piezo(*words, "--report", tmp_path / "page.html")
+    assert done.status == 0, done.err
+    answer, page = json.loads((tmp_path / "p.json").read_text()), (tmp_path / "page.html").read_text()
+    with np.load(tmp_path / "command.npz") as held:
+        u = held["voltage"]
+    assert u[-1] == u[0] == 0.0, "the way back"
+    for text in (
+        f"{1e9 * answer['expected_error']['total_m']:.2f} nm",
+        f"{1e9 * answer['expected_error']['planned_m']:.2f} nm",
+        f"{answer['largest_slew_V_per_s']:.4g} V/s",
+        f"{answer['voltage_min_V']:.4g} to {answer['voltage_max_V']:.4g} V",
+    ):
+        assert text in done.out and text in page
+    assert answer["largest_slew_V_per_s"] == pytest.approx(np.abs(np.diff(u)).max() / PERIOD)
+    assert "data:image/svg+xml" in page and "can follow the whole path" in page
+    write(tmp_path / "path.csv", 0.0, 3.0)
+    again = ("--force", "--report", tmp_path / "page.html")
+    assert piezo(*words, *again).status == 1
+    page = (tmp_path / "page.html").read_text()
+    assert "do not allow the whole path" in page and "below the minimum" in page
+
+
 def test_out_of_reach_writes_nothing_and_says_what_can_be_had(piezo, model, tmp_path):
     write(tmp_path / "path.csv", 0.0, 3.0)
     words = ("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz")

@@ -1,0 +1,43 @@
+"""The page about a plan: whether the path can be had, the expected error, the drive."""
+
+from __future__ import annotations
+
+from ..compensation.plan import Plan
+from ..model.model import Model
+from .document import framed
+from .figures.tracking import tracking
+from .page import Page
+from .tables.plan_table import notes, plan_table
+from .verdict import VerdictText
+from .words import nanometre
+
+FOOTER = (
+    "Nothing has moved. The expected error is the root of the sum of squares of what the plan leaves and of the "
+    "free-run error that the model file states. Per cents are RMS over the range of the path."
+)
+"""How the numbers are to be read."""
+MERIT = ("expected error, rms", "drive voltage", "largest slew")
+"""Rows of the plan that stand under the headline, too."""
+
+
+def plan_page(plan: Plan, model: Model, source: str) -> Page:
+    """Write the page.
+
+    Parameters
+    ----------
+    plan : Plan
+        Of the path.
+    model : Model
+        Whose inverse it is.
+    source : str
+        File of the path.
+    """
+    drawing, table = tracking(plan), plan_table(plan)
+    merit = tuple((name, value) for name, value in table.rows if name in MERIT)
+    if plan.reachability.is_whole:
+        headline = f"The stage can follow the whole path; the expected error is {nanometre(plan.expected.total)} rms"
+    else:
+        headline = "The limits of the drive do not allow the whole path"
+    verdict = VerdictText(headline, tuple(f"{line[:1].upper()}{line[1:]}." for line in notes(plan)))
+    html = framed("Compensation: a plan", source, model, verdict, merit, {"Plan": ([drawing], [table])}, FOOTER)
+    return Page(html, (drawing,))

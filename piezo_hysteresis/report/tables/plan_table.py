@@ -1,0 +1,100 @@
+"""A plan in words and for machines: terminal, page and JSON take the same numbers from here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...compensation.plan import Plan
+from .table import Table
+
+MOST_PARTS = 3
+"""Parts of a path that are reported one by one."""
+
+
+def plan_table(found: Plan) -> Table:
+    """Voltage, slew, duration, preview and the errors to expect."""
+    expected, span = found.expected, found.range
+
+    def error(value: float | None) -> str:
+        if value is None:
+            return "not stated"
+        return f"{1e9 * value:.2f} nm" + (f", {100.0 * value / span:.4f} % of the path's range" if span else "")
+
+    way_back = found.voltage.size - found.begin - found.wanted.size
+    rows = (
+        ("drive voltage", f"{found.voltage.min():.4g} to {found.voltage.max():.4g} V"),
+        ("largest slew", f"{found.largest_slew:.4g} V/s"),
+        ("duration", f"{found.voltage.size * found.sample_period:.4g} s, {found.voltage.size} samples"),
+        ("way back to the first voltage", f"{1e3 * way_back * found.sample_period:.4g} ms"),
+        ("preview", f"{found.preview} samples, {1e3 * found.preview * found.sample_period:.3g} ms"),
+        ("error left by the plan", error(expected.planned)),
+        ("free-run error of the model", error(expected.free_run)),
+        ("expected error, rms", error(expected.total)),
+    )
+    return Table("Plan", ("quantity", "value"), rows)
+
+
+def notes(found: Plan) -> list[str]:
+    """What the reader must know besides: effects that were left out, and what cannot be had."""
+    lines = [
+        f"caution: {name} has no inverse and was left out; the error above holds what that costs"
+        for name in found.left_out
+    ]
+    lines += [f"note: {name} does not depend on the drive and is not compensated" for name in found.not_on_path]
+    return [*lines, *(f"caution: {line}" for line in refusal(found))]
+
+
+def refusal(found: Plan) -> list[str]:
+    """What cannot be had, and the nearest path that can; empty where all can."""
+    parts = found.reachability.parts
+    lines = [str(part) for part in parts[:MOST_PARTS]]
+    if len(parts) > MOST_PARTS:
+        lines.append(f"{len(parts) - MOST_PARTS} more parts like these cannot be had")
+    nearest = found.reachability.nearest
+    if nearest is None:
+        return lines
+    ways = []
+    if nearest.offset is not None:
+        ways.append(f"moved by {1e6 * nearest.offset:+.4g} µm")
+    if nearest.amplitude is not None:
+        ways.append(f"with {100.0 * nearest.amplitude:.4g} % of its amplitude about its middle")
+    if nearest.band is not None:
+        ways.append(f"without content above {nearest.band:.3g} Hz")
+    return [*lines, f"the path can be had {', or '.join(ways)}" if ways else "no shift or scale makes it reachable"]
+
+
+def answer(found: Plan) -> dict[str, Any]:
+    """The plan for machines, in SI units."""
+    nearest = found.reachability.nearest
+    return {
+        "schema": 1,
+        "samples": int(found.voltage.size),
+        "sample_period_s": found.sample_period,
+        "preview_samples": found.preview,
+        "preview_s": found.preview * found.sample_period,
+        "path_begins_at_sample": found.begin,
+        "range_m": found.range,
+        "voltage_min_V": float(found.voltage.min()),
+        "voltage_max_V": float(found.voltage.max()),
+        "largest_slew_V_per_s": found.largest_slew,
+        "expected_error": dict(found.expected.as_dict()),
+        "reachable": found.reachability.is_whole,
+        "unreachable": [
+            {
+                "begin_s": p.begin,
+                "end_s": p.end,
+                "largest_m": p.largest,
+                "limit": p.limit,
+                "needed_min_V": p.needed_min,
+                "needed_max_V": p.needed_max,
+                "needed_slew_V_per_s": p.needed_slew,
+                "after_loop": p.after_loop,
+            }
+            for p in found.reachability.parts
+        ],
+        "nearest": None
+        if nearest is None
+        else {"offset_m": nearest.offset, "amplitude": nearest.amplitude, "band_hz": nearest.band},
+        "left_out": list(found.left_out),
+        "not_on_path": list(found.not_on_path),
+    }
