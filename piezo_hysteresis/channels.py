@@ -1,4 +1,4 @@
-"""Channels beside voltage and displacement: what may be measured, what it is called, and its unit."""
+"""Channels in addition to voltage and displacement: names and units."""
 
 from __future__ import annotations
 

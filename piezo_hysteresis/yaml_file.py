@@ -1,4 +1,4 @@
-"""Settings from YAML files that people write; a file can be wrong, but reading it takes neither memory nor time."""
+"""Settings from YAML files. A wrong or hostile file is refused within bounded memory and time."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 """The repository."""
 PACKAGE = ROOT / "piezo_hysteresis"
 """The Python package."""
-MOST_MODULES = 16
+MOST_MODULES = 15
 """Modules in a folder of the package at most, `__init__.py` aside."""
 MOST_LINES = 250
 """Lines of a module of the package at most."""

@@ -1,4 +1,4 @@
-"""`Claim`: who alone may move a stage for a while."""
+"""`Claim`: the one owner that may move a stage at present."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _OWNER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 
 
 class Claim:
-    """At most one owner at a time, who repeats its claim; times in s on the steady clock.
+    """At most one owner at a time. The owner repeats its claim. Times are in s on the steady clock.
 
     Parameters
     ----------

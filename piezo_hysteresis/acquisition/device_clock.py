@@ -1,4 +1,4 @@
-"""`DeviceClock`: keeps the time base on the clock of a device that sets the pace itself. No ROS."""
+"""`DeviceClock`: adjusts the time base to the clock of a device that paces its samples itself. No ROS."""
 
 from __future__ import annotations
 

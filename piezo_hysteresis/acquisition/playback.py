@@ -15,7 +15,7 @@ _ENDLESS = 1 << 62
 
 
 class Playback:
-    """Present voltage, phase, and the way on.
+    """Present voltage and phase, and what is applied next.
 
     Parameters
     ----------

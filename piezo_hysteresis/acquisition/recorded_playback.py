@@ -11,7 +11,7 @@ from .drive import Drive, Event, EventKind, Phase
 
 
 class RecordedPlayback:
-    """What `Playback` is to a stage that can be driven, for one that replays records.
+    """The counterpart of `Playback` for a stage that replays records and cannot be driven.
 
     Parameters
     ----------

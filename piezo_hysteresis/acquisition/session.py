@@ -1,4 +1,4 @@
-"""`DriverSession`: an opened stage with its limits and its lock, what a driver holds while it is configured. No ROS."""
+"""`DriverSession`: an opened stage with its limits and its lock, as a configured driver holds it. No ROS."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Delivery:
 
 @dataclass(slots=True)
 class Tally:
-    """What an acquisition has done since it started; times in s."""
+    """Counts and times [s] of an acquisition since its start."""
 
     samples: int = 0
     blocks: int = 0

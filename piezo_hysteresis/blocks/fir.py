@@ -1,4 +1,4 @@
-"""`FirBlock`: a delay as a few taps beside the direct path."""
+"""`FirBlock`: a delay as a short FIR filter added to the direct path."""
 
 from __future__ import annotations
 

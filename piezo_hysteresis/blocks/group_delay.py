@@ -1,4 +1,4 @@
-"""`GroupDelayBlock`: how fast linear dynamics act on slow samples, as dc gain plus group delay."""
+"""`GroupDelayBlock`: linear dynamics for slow samples, approximated by dc gain and group delay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`HeldBlock`: an output that follows the input as far as one number lets it, and is held in between."""
+"""`HeldBlock`: an output that follows the input only beyond a limit, and is constant otherwise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .block import Array, Block, State
 
 
 class HeldBlock(Block):
-    """State [y]; settled on its input at rest, with one parameter of its own that plays no part there."""
+    """State [y]. At rest the output equals the input, whatever the value of the one parameter."""
 
     keeps_state = True
 

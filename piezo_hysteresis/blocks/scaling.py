@@ -1,4 +1,4 @@
-"""Changes of unit in a chain, volts to v and position to metres, and what is checked on the way in and out."""
+"""Changes of unit in a chain: volts to v and position to metres, with checks of the values."""
 
 from __future__ import annotations
 

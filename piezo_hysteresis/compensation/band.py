@@ -1,4 +1,4 @@
-"""`Band`: how fast a wanted displacement may change at all."""
+"""`Band`: the frequency band of a wanted displacement."""
 
 from __future__ import annotations
 

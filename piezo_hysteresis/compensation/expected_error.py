@@ -1,4 +1,4 @@
-"""`ExpectedError`: how far from the path the stage will be, said before anything moves."""
+"""`ExpectedError`: the expected deviation of the stage from the path, computed before anything moves."""
 
 from __future__ import annotations
 

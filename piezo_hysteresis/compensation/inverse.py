@@ -1,4 +1,4 @@
-"""`Inverse`: a model turned round, from the displacement that is wanted to the drive voltage that gives it."""
+"""`Inverse`: the inverse of a model. It computes the drive voltage for a wanted displacement."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class InverseState:
 
 
 class Inverse:
-    """A model turned round, at the model's sample period.
+    """The inverse of a model, at the sample period of the model.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`learn`: rounds of play, measure, correct, until nothing but noise is left."""
+"""`learn`: repeats play, measure and correct until the error is noise."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AT_NOISE = 1.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LearningRound:
-    """What one round measured.
+    """Measurement of one round.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class LearningRound:
 
 
 class IterativeLearning:
-    """Corrects the reference of a path by the error that was measured, round by round.
+    """Corrects the reference of a path by the measured error, round by round.
 
     The correction goes through the inverse of the model, as the path itself does: hysteresis, creep and dynamics are
     known already, and a round need only remove what the model misses.

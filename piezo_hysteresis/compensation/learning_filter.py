@@ -1,4 +1,4 @@
-"""`LearningFilter`: how much of an error a round corrects at which frequency."""
+"""`LearningFilter`: the share of the error that a round corrects, by frequency."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Limits`: what the drive may do while a path is followed."""
+"""`Limits`: limits of the drive while a path is followed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`LinearInverse`: one section of linear dynamics turned round, as taps that look ahead and a recursion."""
+"""`LinearInverse`: inverse of one section of linear dynamics, as an FIR filter with preview and a recursion."""
 
 from __future__ import annotations
 

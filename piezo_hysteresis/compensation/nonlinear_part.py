@@ -1,4 +1,4 @@
-"""`NonlinearPart`: creep, hysteresis, amplifier and limits of a chain, ready to be turned round together."""
+"""`NonlinearPart`: creep, hysteresis, amplifier and limits of a chain, which are inverted together."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ FARTHEST = 1e3
 
 
 class NonlinearPart:
-    """The first blocks of a chain turned round together.
+    """The first blocks of a chain, which are inverted together.
 
     Parameters
     ----------

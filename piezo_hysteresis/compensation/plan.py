@@ -1,4 +1,4 @@
-"""`Plan`: the drive for a path, whether the path can be had, and the error to expect; nothing has moved yet."""
+"""`Plan`: the drive for a path, whether the path is reachable, and the expected error. Nothing has moved yet."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """What would be played, and what is expected of it.
+    """The planned drive and the expected result.
 
     Parameters
     ----------

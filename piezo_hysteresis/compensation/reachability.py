@@ -1,4 +1,4 @@
-"""What can be had of a path: `UnreachablePart`, `NearestPath`, `Reachability`."""
+"""Reachability of a path: `UnreachablePart`, `NearestPath`, `Reachability`."""
 
 from __future__ import annotations
 

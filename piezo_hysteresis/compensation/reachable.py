@@ -1,4 +1,4 @@
-"""`reachable`: which part of a path cannot be had, where, by how much, and the nearest path that can."""
+"""`reachable`: which part of a path cannot be reached, by how much, and the nearest path that can."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`TurnedBlock`: one block between the sensor and the creep turned round, displacement in, its cause out."""
+"""`TurnedBlock`: inverse of one block between the creep and the sensor, from its output to its input."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class TurnedBlock(ABC):
-    """A block turned round.
+    """The inverse of a block.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class TurnedFactor(TurnedBlock):
 
 
 class TurnedLinear(TurnedBlock):
-    """Sections of linear dynamics, one after the other."""
+    """Inverse of sections of linear dynamics in series."""
 
     def __init__(self, block: Block, sections: Iterable[Section], name: str) -> None:
         slope, _ = block.static_slopes(0.0)
@@ -95,7 +95,7 @@ def force_for(x, x0, p, z, w):
 
 
 class TurnedSoftening(TurnedBlock):
-    """A softened mode that drives all the rest of G: the rest turned round, then the force that moves the mode."""
+    """Inverse of a softened mode that drives the rest of G: first the rest, then the force on the mode."""
 
     def __init__(self, block: SoftenedArxBlock, name: str) -> None:
         self.block = block

@@ -20,7 +20,7 @@ SCHEMA = 1
 
 
 class Verdict(StrEnum):
-    """The three outcomes, all first class."""
+    """The three possible verdicts."""
 
     NAMED = "named"
     NOTHING_MISSING = "nothing_missing"

@@ -1,4 +1,4 @@
-"""What an experiment cannot show, whatever a search finds in it: kinds of drive that it does not hold."""
+"""Effects that an experiment cannot show, because it does not contain the necessary kind of drive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well the numbers of a model are known when its form is not exact.
+"""Uncertainty of the parameters of a model whose form is not exact.
 
 The standard errors of a fit treat its residual as noise. With a hundred thousand samples they become so small that the
 form of the model decides: another sampling of the same law, another integration, dynamics of another order. Every such

@@ -1,4 +1,4 @@
-"""The next experiment: which phase would separate two explanations that the data could not."""
+"""The next experiment: the phase that would separate two explanations that the data do not distinguish."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ IDLE = ("idle", "hold", *CARRYING)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DiagnosisState:
-    """What is known between two passes of a diagnosis.
+    """Intermediate results between two passes of a diagnosis.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From the search and the gap to the verdict, and the reason in one plain sentence."""
+"""Derives the verdict from the search and the gap, with the reason in one sentence."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class ChainPosition(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Discretisation:
-    """What an effect must know to become coefficients.
+    """Sample period and scales from which an effect computes its coefficients.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`Extent`: what an experiment spans; from it an effect proposes the values at which a search for it begins."""
+"""`Extent`: the ranges that an experiment covers. An effect derives its start values from them."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class FaultCatalogue:
-    """What can be made to go wrong in one kind of device.
+    """Faults of one kind of device.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`Identification`: the model found, how sure it is, how well it does, and what was noticed on the way."""
+"""`Identification`: the identified model with its uncertainties, errors and notices."""
 
 from __future__ import annotations
 

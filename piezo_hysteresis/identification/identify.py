@@ -1,4 +1,4 @@
-"""`identify`: from an experiment to a model, whatever was recorded.
+"""`identify`: identifies a model from the phases that an experiment contains.
 
 The published three steps give the start; then everything is fitted jointly in free run, the dynamics inside, with G(1)
 held as the gauge between hysteresis and dynamics.

@@ -1,4 +1,4 @@
-"""Matrix products on one core: ours are small, and the threads of BLAS mostly wait for one another."""
+"""Matrix products on one core: for small matrices, the threads of BLAS mostly wait for one another."""
 
 from __future__ import annotations
 

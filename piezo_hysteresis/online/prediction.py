@@ -1,4 +1,4 @@
-"""`Prediction`: what a model says about one block of samples."""
+"""`Prediction`: prediction and residual of one block of samples."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Prediction:
-    """What a model says about one block.
+    """Prediction and residual of one block.
 
     Parameters
     ----------

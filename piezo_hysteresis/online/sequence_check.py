@@ -13,7 +13,7 @@ LONGEST_DELAY = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """How a block joins the ones before it.
+    """Relation of a block to the blocks before it.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Arrival:
 
 
 class SequenceCheck:
-    """Follows the index, which wraps at 2³², and counts what went wrong.
+    """Follows the index, which wraps at 2³², and counts lost, repeated and late samples.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ REST_TOLERANCE = 5e-3
 
 
 class VoltageHistory:
-    """Every sample of the last `duration`, averages over `slow_period` of what was before.
+    """Every sample of the last `duration`, and averages over `slow_period` of the time before.
 
     A stage that rests at the beginning of the stream needs no samples: the history begins where the drive leaves
     `rest_voltage`.

@@ -1,4 +1,4 @@
-"""The frame of the page: one HTML document that needs no other file, no network and no script."""
+"""The frame of the page: one HTML document without other files, network access or scripts."""
 
 from __future__ import annotations
 

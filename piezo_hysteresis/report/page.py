@@ -1,4 +1,4 @@
-"""One self-contained HTML page about an experiment and the models held against it."""
+"""One self-contained HTML page that compares an experiment with models."""
 
 from __future__ import annotations
 

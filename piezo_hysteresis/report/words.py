@@ -1,4 +1,4 @@
-"""Lengths and times as a physicist says them."""
+"""Lengths and times as text, with a suitable unit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""`Agreement`: does what was measured agree with the drive asked for? What lags passes; what stays apart does not."""
+"""`Agreement`: checks that the measurement follows the requested drive.
+
+A lag is allowed, a lasting difference is not.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Description`: what a stage is, what it may be asked for, and the last line of defence of its limits."""
+"""`Description`: kind, limits and scales of a stage, and the check of these limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PERIOD_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What a stage is and what it may be asked for.
+    """Kind, limits and scales of a stage.
 
     Parameters
     ----------

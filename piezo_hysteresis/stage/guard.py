@@ -1,4 +1,4 @@
-"""`guarded`: what every stage does when its device fails: it goes to safety, and says whether it is there."""
+"""`guarded`: if its device fails, a stage goes to its safe voltage and reports whether this succeeded."""
 
 from __future__ import annotations
 

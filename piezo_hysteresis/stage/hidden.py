@@ -1,4 +1,4 @@
-"""`hidden_effect`: a simulated stage with something in it that its user does not know, drawn by a seed."""
+"""`hidden_effect`: a simulated stage with an effect that its user does not know, chosen by a seed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Draw = Callable[[np.random.Generator, PlantParameters, float], Changes]
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """What was hidden, and the stage it was hidden in.
+    """The hidden effect, and the stage that contains it.
 
     Parameters
     ----------

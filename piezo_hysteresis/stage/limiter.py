@@ -17,7 +17,7 @@ LONGEST_PART = 65536
 
 
 class Limiter:
-    """What a stage may put out, sample by sample.
+    """Limits the output of a stage, sample by sample.
 
     A stage asks its limiter before it gives its device a waveform, and takes from it the samples of every way that it
     goes by itself: to a set-point, to the safe voltage, after a fault, on closing. A stage begins with the limits of

@@ -1,4 +1,4 @@
-"""`Opening`: what a driver says about a stage that it opens, besides the values of its parameters."""
+"""`Opening`: how a driver opens a stage, in addition to the values of its parameters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def _no_reader(path: str) -> Iterable[Record]:
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """How a stage is wanted.
+    """Requested sample period and speed of a stage.
 
     Parameters
     ----------

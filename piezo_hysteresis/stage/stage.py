@@ -88,7 +88,7 @@ class Stage(Protocol):
 
 
 class StreamingStage(Stage, Protocol):
-    """A device whose clock runs on while blocks go to and fro."""
+    """A device whose clock keeps running while blocks are exchanged."""
 
     def exchange(self, voltage: Samples) -> Acquired:
         """Apply a block of drive voltages and return the samples applied and measured, as many as were given.

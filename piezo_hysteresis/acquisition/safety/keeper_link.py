@@ -23,7 +23,7 @@ _PER_TIMEOUT = 10
 
 
 class KeeperLink:
-    """A keeper process beside this one.
+    """The keeper process of this driver.
 
     Parameters
     ----------

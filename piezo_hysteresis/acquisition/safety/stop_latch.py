@@ -6,7 +6,7 @@ from ...errors import StageError
 
 
 class StopLatch:
-    """Set by a stop, and by nothing but `release` taken back."""
+    """Set by a stop; only `release` resets it."""
 
     def __init__(self) -> None:
         self._is_set = False

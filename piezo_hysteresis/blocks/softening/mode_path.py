@@ -1,4 +1,4 @@
-"""The dominant mode of an ARX, and what it passes on its way to the sensor."""
+"""The dominant mode of an ARX, and the dynamics between this mode and the sensor."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _inverse(matrix: Array) -> Array:
 
 
 class Path:
-    """The dominant mode of an ARX, and what it passes on its way to the sensor.
+    """The dominant mode of an ARX, and the dynamics between this mode and the sensor.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class Path:
 
 
 class WholePath(Path):
-    """All the rest of G: the mode drives whatever else there is."""
+    """The mode drives all other dynamics of G."""
 
     def __init__(self, arx: ArxBlock, delay: float) -> None:
         super().__init__(arx, delay)

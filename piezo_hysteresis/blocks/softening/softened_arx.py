@@ -184,7 +184,7 @@ class SoftenedArxBlock(Block):
 
 
 class SlowSoftenedBlock(SeriesBlock):
-    """The static softening of one mode in a sum, and the lag of G behind it, for records slower than the model."""
+    """Static softening of one mode in a sum, followed by the lag of G, for records slower than the model."""
 
     def __init__(self, lag: GroupDelayBlock, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
         ratio = path.share / arx.gain

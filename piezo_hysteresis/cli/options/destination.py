@@ -1,4 +1,7 @@
-"""Where results go: nothing that exists is replaced without a word, and that is found out before the work."""
+"""Options for output files.
+
+Existing files are refused before the work starts, unless the user allows to replace them.
+"""
 
 from __future__ import annotations
 

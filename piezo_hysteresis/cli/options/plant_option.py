@@ -1,4 +1,4 @@
-"""Which simulated stage: the options that ``piezo simulate`` and ``piezo emulate`` share."""
+"""Selection of the simulated stage: the options that ``piezo simulate`` and ``piezo emulate`` share."""
 
 from __future__ import annotations
 

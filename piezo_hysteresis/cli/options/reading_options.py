@@ -1,4 +1,4 @@
-"""How a recording is to be read: the options that all subcommands with an experiment share."""
+"""Options for reading a recording, shared by all subcommands with an experiment."""
 
 from __future__ import annotations
 

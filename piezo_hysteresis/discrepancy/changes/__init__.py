@@ -1,1 +1,1 @@
-"""Changed parameters of a given model: the stage is the same, but later, softer, or with a filter in its chain."""
+"""Changed parameters of a given model: the same stage with, for example, a longer delay or another gain."""

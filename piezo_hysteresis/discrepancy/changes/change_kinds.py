@@ -1,4 +1,4 @@
-"""What can have changed in a given model, and the change that was found."""
+"""Possible changes of a given model, and the change that was found."""
 
 from __future__ import annotations
 

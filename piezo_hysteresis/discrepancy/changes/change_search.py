@@ -39,7 +39,7 @@ class Account:
 
 
 class ChangeSearch:
-    """Records, what the model predicts of them, and the accounts of the difference.
+    """Records, their prediction by the model, and explanations of the difference.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from .same_stage import changed_model
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Recalibration:
-    """An old model with the numbers of a new day.
+    """An old model with newly fitted parameters.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`same_stage`: the diagnosis of a stage that is the one of a given model, but for one parameter."""
+"""`same_stage`: diagnosis of a stage that differs from a given model in one parameter only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What each change of a given model does to its prediction.
+"""Influence of each possible change of a given model on its prediction.
 
 A delay and a filter act on the predicted displacement as a whole; every other change is linear where it is small.
 """

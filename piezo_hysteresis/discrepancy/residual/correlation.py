@@ -1,4 +1,4 @@
-"""Residual tests in the form of the field: auto-correlation of the residual, its cross-correlation with the drive."""
+"""Standard residual tests: auto-correlation of the residual, and its cross-correlation with the drive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Data of a simulation whose loop takes the explicit step of Eq. (7): what that step changes is no physics.
+"""Recognises simulated data whose hysteresis loop was computed with the explicit step of Eq. (7).
 
 A loop without memory of speed goes through a jump as through a slow ramp. The explicit step does not: from one sample
 to the next it moves straight on, by 1 % of the range too far in a jump of a tenth of it. What it changes has no number

@@ -1,4 +1,4 @@
-"""What a slow record leaves open: a drive whose samples are averages may have jumped or turned between two of them.
+"""Inter-sample error: in a slow record, whose samples are averages, the drive may jump or turn between two samples.
 
 Straight lines between averages cut the peaks of a drive off, and a model that follows them is judged for what the
 recorder has lost.

@@ -22,7 +22,7 @@ EDGES = {
 
 @dataclass(frozen=True, slots=True)
 class ResidualShare:
-    """How unevenly the residual lies along one axis.
+    """Distribution of the residual along one axis.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The floor: below which residual no effect can be seen, for every record at its own sample period.
+"""The floor of every record: the smallest residual in which an effect can be seen, at the record's sample period.
 
 Four parts: white noise from the top of the spectrum, where a stage no longer moves; the scatter between periods of a
 periodic record, which also holds jitter and 1/f noise; the steps of the converter, q/√12; and an adequacy floor of

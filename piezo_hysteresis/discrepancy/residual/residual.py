@@ -1,4 +1,4 @@
-"""How wrong a model is in free run: the error measure that the whole package reports.
+"""Free-run error of a model: the error measure that the whole package reports.
 
 The error of a phase is the RMS of measured minus simulated displacement, in per cent of the *range*: the peak-to-peak
 of the measured displacement over the whole experiment. The paper's Table 1 uses the same measure.

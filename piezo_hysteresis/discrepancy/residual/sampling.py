@@ -1,4 +1,4 @@
-"""Every record at the sample period and the length that the search needs.
+"""Conversion of every record to the sample period and length that the search needs.
 
 A slow phase at 50 kHz holds the same averages over and over; a minute of noise says no more about the dynamics than a
 tenth of a second. A drive that moves the dynamics, stored at a longer period than theirs, is interpolated: gain and

@@ -1,4 +1,4 @@
-"""What speaks against an effect that gains: none sees it, it may be off, a hum follows the drive, a limit is none."""
+"""Acceptance tests: reasons to reject an effect although it improves the prediction."""
 
 from __future__ import annotations
 

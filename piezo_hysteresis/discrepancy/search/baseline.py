@@ -1,4 +1,4 @@
-"""The baseline: the published model with all its numbers fitted jointly, as well as its form allows.
+"""The baseline: the published model with all its parameters fitted jointly.
 
 What is missing may only be judged from a baseline that misses nothing it could have had: with dynamics of too low an
 order any linear effect would be a gain.

@@ -1,4 +1,7 @@
-"""The ground of a diagnosis: records with their floors, split and shortened, and the baseline fitted to them."""
+"""The starting point of a diagnosis.
+
+Records with their floors, split and shortened, and the baseline fitted to them.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,7 @@ UNSURE = 0.3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BaselineSetup:
-    """What a search for effects begins from.
+    """The starting point of a search for effects.
 
     Parameters
     ----------

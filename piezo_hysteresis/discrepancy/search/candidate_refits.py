@@ -1,4 +1,4 @@
-"""`refit_candidates`: joint refits of candidates against one another, the longer the better they stand."""
+"""`refit_candidates`: joint refits of candidates, with more iterations for the better ones."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Candidate:
-    """An effect that was screened: where the search for it begins, and how well it does on records left out.
+    """An effect that was screened: its start values, and its score on records left out.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ FARTHEST = 100.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Score:
-    """How far records that were left out lie above their floor.
+    """Errors of the records that were left out, relative to their floors.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Joint refits of candidates: from their start, carried on, behind dynamics found anew, and without the effect again.
+"""Joint refits of candidates: from their start values, continued, with newly estimated dynamics, and without it.
 
 Linearised scores rank effects. The worth of an effect is the improvement of a refit of the whole model with the effect
 over a refit without it that had the same number of iterations.

@@ -57,7 +57,7 @@ EXTENDS = 0.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Delivered:
-    """The model that is written, its fit, and what is free per record under it."""
+    """The model that is saved, its fit, and the disturbances that are free in every record."""
 
     model: Model
     fit: Fit | None

@@ -1,4 +1,4 @@
-"""Steps from the published model to a structure that was chosen by what it predicts, effect by effect."""
+"""Steps from the published model to the structure that predicts best, one effect at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`TrainingData`: the records that fit and choose, and what they span."""
+"""`TrainingData`: the records for fitting and choosing, and the ranges that they cover."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOVES = 30.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TrainingData:
-    """Records that fit and choose, with their floors, and what is free in each of them.
+    """Records for fitting and choosing, with their floors and the disturbances that are free in each.
 
     Parameters
     ----------

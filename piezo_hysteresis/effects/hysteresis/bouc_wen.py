@@ -35,7 +35,7 @@ def check_bounded(effect: Effect) -> None:
 
 
 class ModifiedBoucWen(HysteresisOperator):
-    """What both forms of the modified Bouc-Wen operator share: their numbers and where a fit of them begins."""
+    """Base of both forms of the modified Bouc-Wen operator: their parameters and start values."""
 
     gain_names = ("A", "p1", "p2")
     memory_names = ("A", "beta", "gamma")

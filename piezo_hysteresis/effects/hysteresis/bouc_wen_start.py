@@ -1,4 +1,4 @@
-"""Start values of the modified Bouc-Wen operator from its loops, without any guess (paper, Sec. 3.4).
+"""Start values of the modified Bouc-Wen operator from its loops (paper, Sec. 3.4). The user gives no initial values.
 
 For given β and γ the state is proportional to A, and a negative A is the same loop with −γ: with g the state for A = 1,
 

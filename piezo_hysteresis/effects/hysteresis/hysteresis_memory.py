@@ -1,4 +1,4 @@
-"""Memory of turning points that one Bouc-Wen state cannot hold: plays beside it."""
+"""Memory of turning points: play operators in addition to the Bouc-Wen state, which has no such memory."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Loop:
 
 
 class HysteresisOperator(Effect):
-    """From the normalised input v to the hysteresis output w, with the numbers that make it large and that shape it."""
+    """From the normalised input v to the hysteresis output w, with parameters for its size and for its shape."""
 
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS

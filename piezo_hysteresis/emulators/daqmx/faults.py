@@ -1,4 +1,4 @@
-"""`FAULTS`: what can be made to go wrong in an emulated card and its server."""
+"""`FAULTS`: faults of an emulated card and its server."""
 
 from __future__ import annotations
 

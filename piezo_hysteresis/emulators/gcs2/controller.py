@@ -43,7 +43,7 @@ _TABLES, _POINTS, _WAVE_TABLES = 8, 262144, 4
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What comes back for a command.
+    """Answer to a command.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`FAULTS`: what can be made to go wrong in an emulated controller."""
+"""`FAULTS`: faults of an emulated controller."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Motion`: a simulated stage that lives on while nobody asks, and plays a waveform meanwhile."""
+"""`Motion`: a simulated stage that keeps running between commands, and plays a waveform meanwhile."""
 
 from __future__ import annotations
 

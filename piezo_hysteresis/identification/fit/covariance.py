@@ -1,4 +1,4 @@
-"""`covariance`: how well a joint fit knows its numbers, where residuals are neither white nor alike."""
+"""`covariance`: uncertainty of a joint fit, for residuals that are neither white nor of equal variance."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ RUNAWAY = 1e100
 
 @dataclass(frozen=True, slots=True)
 class Nuisance:
-    """What is free and linear in every record, and is eliminated exactly.
+    """Disturbances that are free and linear in every record, and are eliminated exactly.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`DriverCommands`: what others ask of the driver: `command`, `set_voltage`, `~/stop`, `~/cancel`, `~/release`."""
+"""`DriverCommands`: requests to the driver: `command`, `set_voltage`, `~/stop`, `~/cancel`, `~/release`."""
 
 from __future__ import annotations
 

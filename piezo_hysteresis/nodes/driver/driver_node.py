@@ -1,4 +1,4 @@
-"""`driver_node`: drives one stage, publishes every sample, plays commands that it has checked whole."""
+"""`driver_node`: drives one stage, publishes every sample, and plays commands after a complete check."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`DriverTopics`: what the driver publishes, from deliveries and refusals to messages."""
+"""`DriverTopics`: converts deliveries and refusals of the driver to messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""`DriverClient`: the driver as seen from the identification node: its limits, its voltage, commands and their fate."""
+"""`DriverClient`: the driver as seen from the identification node.
+
+Its limits, its voltage, and the state of commands.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,7 @@ _PLACE_TOLERANCE = 0.01
 
 
 class DriverClient:
-    """Asks the driver for what is in force, sends it phases, and follows what becomes of them.
+    """Asks the driver for its limits, sends phases to it, and follows their state.
 
     Parameters
     ----------

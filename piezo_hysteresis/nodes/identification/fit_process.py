@@ -23,7 +23,7 @@ Report = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a fit found.
+    """Result of a fit.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ _NEWER = 2
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where a long job stands.
+    """Progress of a long job.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`IdentificationStatus`: where the identification stands, on `status` at every change and on /diagnostics."""
+"""`IdentificationStatus`: progress of the identification, on `status` at every change and on /diagnostics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Streams of sensor_msgs/PointCloud2 as bytes: what their messages have in common is serialised, or read, once."""
+"""Streams of sensor_msgs/PointCloud2 as bytes: the parts that all messages share are serialised, or read, once."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LONGEST_END = 4
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Columns:
-    """What a cloud says.
+    """Content of a cloud.
 
     Parameters
     ----------

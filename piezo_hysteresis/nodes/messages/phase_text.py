@@ -1,4 +1,4 @@
-"""Phases as commands and messages name them. No ROS."""
+"""Names of phases in commands and messages. No ROS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`ModelTopics`: what the model node publishes, from predictions to messages."""
+"""`ModelTopics`: converts predictions of the model node to messages."""
 
 from __future__ import annotations
 

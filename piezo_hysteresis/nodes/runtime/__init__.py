@@ -1,1 +1,1 @@
-"""What every node process needs: parameters, quality of service, executor, start and end."""
+"""Common parts of all node processes: parameters, quality of service, executor, start and end."""

@@ -1,4 +1,4 @@
-"""`GuardedNode`: a node that no exception out of a callback ends, rclpy's own callbacks included."""
+"""`GuardedNode`: a node that keeps running after an exception in a callback, including callbacks of rclpy."""
 
 from __future__ import annotations
 

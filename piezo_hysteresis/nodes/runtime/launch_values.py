@@ -1,4 +1,4 @@
-"""Values of launch arguments, which are all text, as what they mean; other words are refused."""
+"""Values of launch arguments, converted from text; invalid words are refused."""
 
 from __future__ import annotations
 

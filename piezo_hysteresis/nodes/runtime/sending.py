@@ -1,4 +1,4 @@
-"""`send`: publish so that a middleware that is short of time costs a message at worst, never the node.
+"""`send`: publishes a message. If the middleware is out of time, the message is lost and the node continues.
 
 `is_heard` spares the making of messages that nobody takes, `is_taken_by` the sending of those that the one who has to
 act on them would miss.

@@ -1,4 +1,4 @@
-"""`Baseline`: how scores scatter while the stage has not changed, for every class of drive."""
+"""`Baseline`: scatter of the scores of an unchanged stage, for every class of drive."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def _memory(said: Array) -> Array:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Baseline:
-    """Scatter of scores by class of drive, taken while the stage was as the model says.
+    """Scatter of scores by class of drive, taken while the stage agreed with the model.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ _OFFSET = GROUPS.index("offset")
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What the change watch says after a score.
+    """Result of the change watch after a score.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ SLOW_TIME = 3.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ChangeScore:
-    """One block of the stream, as the change watch sees it.
+    """Score of one block of the stream.
 
     Parameters
     ----------

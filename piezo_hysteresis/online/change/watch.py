@@ -1,4 +1,4 @@
-"""`ChangeWatch`: follows a predictor and says whether the stage still is what its model and its baseline say."""
+"""`ChangeWatch`: follows a predictor and reports whether the stage still agrees with its model and its baseline."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ LONGEST_SILENCE = 60.0
 
 @dataclass
 class _Run:
-    """What the driver sent from one start on: index and arrival (start, stop) of every piece in one go."""
+    """Samples since one start of the driver: index and arrival (start, stop) of every piece in one go."""
 
     first: bool
     period: float

@@ -1,4 +1,4 @@
-"""The border to files that others wrote: whatever a decoder raises becomes one clear line."""
+"""Errors of decoders of foreign files, converted to one clear line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How phases begin: whether their first samples agree with a stage that had settled before, and with one another."""
+"""Checks of the beginning of phases: whether their first samples agree with a settled stage, and with one another."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much later than the drive the displacement moves: dynamics of the stage, or a channel that is late."""
+"""Delay between drive and displacement: dynamics of the stage, or a channel that is late."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from .tdms_variables import TdmsVariables
 
 
 class Format(Protocol):
-    """One way in which experiments lie on disk."""
+    """One file format of experiments."""
 
     def recognises(self, path: Path) -> bool:
         """True if the file or folder looks like this format."""

@@ -1,4 +1,4 @@
-"""A folder of ``NN_<phase>.npz``, one file per phase: the plainest form of an experiment."""
+"""A folder of ``NN_<phase>.npz``, one file per phase: the simplest form of an experiment."""
 
 from __future__ import annotations
 

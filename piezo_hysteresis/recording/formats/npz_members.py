@@ -22,7 +22,7 @@ _SMALL = 1 << 26
 
 
 class NpzMembers:
-    """Arrays of a zip archive, none of them larger than the file can justify.
+    """Arrays of a zip archive. An array that declares more than the file can contain is refused.
 
     Parameters
     ----------

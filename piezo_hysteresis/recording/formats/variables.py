@@ -1,4 +1,4 @@
-"""`Variables`: what the readers of files that hold arrays under names have in common."""
+"""`Variables`: base of the readers of files that contain named arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`read_path`: a displacement that is wanted, from CSV or NPZ."""
+"""`read_path`: reads a wanted displacement from CSV or NPZ."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ _PEAK = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A level, or a movement; of no size where the drive jumps from one level to the next."""
+    """A level or a movement. A jump between two levels is a movement without samples."""
 
     start: int
     stop: int

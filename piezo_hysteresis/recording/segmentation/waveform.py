@@ -1,4 +1,4 @@
-"""The name of a drive signal by what it looks like: sine, triangle, chirp, multisine, noise, step, ramp, rest."""
+"""Name of a drive signal, found from its shape: sine, triangle, chirp, multisine, noise, step, ramp, rest."""
 
 from __future__ import annotations
 

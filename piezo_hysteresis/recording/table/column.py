@@ -13,7 +13,7 @@ from ..segmentation.decimating_buffer import ENOUGH, PIECE
 
 
 class Column:
-    """Numbers of one kind; beyond `ENOUGH` they lie in a temporary file, of which memory holds what is looked at.
+    """Numbers of one type. Beyond `ENOUGH` numbers they are stored in a temporary file that is mapped into memory.
 
     The file has no name and goes with the column. It lies where ``TMPDIR`` says; that should be no memory disk.
 

@@ -1,4 +1,4 @@
-"""The time base of a recording: its sample period, and where time stands still, jumps or runs back."""
+"""The time base of a recording: its sample period, and the places where time stands still, jumps or runs back."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def round_period(period: float, tolerance: float = 1e-12) -> float:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TimeColumn:
-    """What a column of times says.
+    """Result of checking a column of times.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""`ModelComparison`: an experiment and the models held against it, the one to report last."""
+"""`ModelComparison`: an experiment and the models it is compared with; the last one is reported."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ModelComparison:
-    """What all figures of a report are drawn from.
+    """The data of all figures of a report.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the stage does while the drive is held, on a logarithmic time axis."""
+"""Displacement while the drive is constant, on a logarithmic time axis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Drawing`: a figure, what it says in words, and the numbers that it is drawn from."""
+"""`Drawing`: a figure, its caption, and its data."""
 
 from __future__ import annotations
 

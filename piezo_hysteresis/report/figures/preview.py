@@ -1,4 +1,4 @@
-"""What a reader understood of a recording: drive and displacement against time, and one against the other."""
+"""Preview of a recording that was read: drive and displacement against time, and one against the other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The residual against what could explain it: drive, displacement, rate of the drive."""
+"""The residual against drive, displacement, and rate of the drive."""
 
 from __future__ import annotations
 

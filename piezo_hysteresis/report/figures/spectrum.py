@@ -1,4 +1,4 @@
-"""Spectrum of the residual beside the noise that nobody can explain."""
+"""Spectrum of the residual beside the noise."""
 
 from __future__ import annotations
 

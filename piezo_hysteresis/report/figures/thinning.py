@@ -1,4 +1,4 @@
-"""`thinned`: fewer points for the eye, none of the extremes lost."""
+"""`thinned`: fewer points to draw, with all extremes kept."""
 
 from __future__ import annotations
 

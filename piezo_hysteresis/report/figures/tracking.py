@@ -1,4 +1,4 @@
-"""A path, the drive for it, and how far the stage is expected to be off."""
+"""A path, its drive voltage, and the expected error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The residual tests of the field, drawn with their bounds."""
+"""The standard residual tests, drawn with their bounds."""
 
 from __future__ import annotations
 

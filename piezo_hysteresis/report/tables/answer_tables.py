@@ -1,4 +1,4 @@
-"""Tables of a diagnosis: the effects found, where the residual sits, why the others were rejected."""
+"""Tables of a diagnosis: the effects found, the location of the residual, and why other effects were rejected."""
 
 from __future__ import annotations
 

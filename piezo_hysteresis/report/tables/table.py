@@ -1,4 +1,4 @@
-"""`Table`: rows of words and numbers, to be read on a page or in a terminal."""
+"""`Table`: rows of text and numbers for a page or a terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Deadline`: no call to a device server waits for ever, not even where a cable was pulled."""
+"""`Deadline`: no call to a device server waits for ever, even if a cable is disconnected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The delay of the card itself, measured with its output wired back to its input: no part of the stage's delay."""
+"""The delay of the card itself, measured with its output wired to its input. It is not a part of the stage's delay."""
 
 from __future__ import annotations
 

@@ -24,11 +24,11 @@ _OPTIONS = (
 
 
 class DaqmxError(DeviceError):
-    """NI-DAQmx reports a fault, or the card does what it should not."""
+    """NI-DAQmx reports a fault, or the card behaves wrongly."""
 
 
 class UnsupportedError(DaqmxError):
-    """The card itself refuses, over a link that works."""
+    """The card refuses a request, and the link works."""
 
 
 class Tasks:

@@ -1,4 +1,4 @@
-"""What the error numbers mean that a controller keeps for ``ERR?``."""
+"""Meaning of the error numbers that a controller returns for ``ERR?``."""
 
 STOPPED_BY_COMMAND = 10
 """A motion was stopped by a command."""

@@ -1,4 +1,4 @@
-"""What acts on the stage from outside: temperature, mains, and the motion of the other axis."""
+"""Influences from outside: temperature, mains, and the motion of the other axis."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _CHUNK = 4096
 
 
 class Reading(NamedTuple):
-    """What one run of the plant gives, one value per sample."""
+    """Result of one run of the plant, one value per sample."""
 
     voltage: Samples
     displacement: Samples

@@ -21,7 +21,7 @@ _LONGEST_PERIOD = 10e-3
 
 
 class Simulation:
-    """What both kinds of simulated stage share: a plant behind limits, the slow path, whole phases played from rest."""
+    """Base of both kinds of simulated stage: a plant behind limits, single set-points, and phases played from rest."""
 
     def __init__(
         self,
