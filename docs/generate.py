@@ -21,7 +21,7 @@ import topics
 from piezo_hysteresis.acquisition.settings import DRIVER, IN_FORCE
 from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
 from piezo_hysteresis.nodes.compensation.settings import COMPENSATION
-from piezo_hysteresis.nodes.identification.identification_node import IDENTIFICATION
+from piezo_hysteresis.nodes.identification.settings import IDENTIFICATION
 from piezo_hysteresis.nodes.model.model_node import MODEL
 from piezo_hysteresis.nodes.page.page_node import PAGE
 from piezo_hysteresis.parameter import Parameter, Row, Setting

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
+from uuid import uuid4
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
@@ -16,11 +17,10 @@ from ...acquisition.stage_lock import StageLock
 from ...effects import HYSTERESIS, Arx, Offset
 from ...errors import ParameterError, PiezoError, reason_of
 from ...identification.protocol.drive_limits import DriveLimits
-from ...identification.protocol.protocol import Protocol, paper, rich, short
+from ...identification.protocol.protocol import Protocol
 from ...model.model import Model
 from ...model.model_file import dumps, loads, save
 from ...model.model_parameters import PREFIX
-from ...parameter import Row, Setting
 from ...recording.segmentation.decimation import save_decimation
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.parameters import declare, read
@@ -30,23 +30,11 @@ from ..topics import QOS_OVERRIDES, advertise
 from .driver_client import DriverClient
 from .experiment_folder import ExperimentFolder
 from .fit_process import FitProcess, Job, diagnosis, identification
+from .job_actions import JobActions
 from .protocol_runner import Progress, run_protocol
 from .served_model import ServedModel
+from .settings import IDENTIFICATION, PROTOCOLS
 from .status import IdentificationStatus
-
-PROTOCOLS: dict[str, Callable[[DriveLimits, int], Protocol]] = {"paper": paper, "short": short, "rich": rich}
-"""Words of the parameter `protocol`."""
-
-IDENTIFICATION: tuple[Row, ...] = (
-    Setting("protocol", "short", "protocol to play to the stage", tuple(PROTOCOLS)),
-    Setting("seed", 0, "seed of the random waveforms of the protocol", lower=0, upper=2**31 - 1),
-    Setting("driver", "driver_node", "name of the driver node in the same namespace; read at start"),
-    Setting("experiment", "", "recording for ~/diagnose, inside experiment_root; empty: the last one"),
-    Setting(
-        "experiment_root", "", "folder of the recordings, read at start; empty: ~/.ros/piezo_hysteresis/<namespace>"
-    ),
-)
-"""Parameters of the identification node."""
 
 START = Model((HYSTERESIS(), Arx(), Offset()), 2e-5)
 """Declared, not valid, before there is a result."""
@@ -85,11 +73,15 @@ class IdentificationNode(GuardedNode):
             ("abort", self._on_abort),
         ):
             self.create_service(Trigger, f"~/{name}", callback)
+        begin = {"identify": self._on_identify, "diagnose": self._on_diagnose}
+        self._actions = JobActions(self, begin, self._on_abort, self._result)
+        self._status.listener = self._actions.report
         self.create_timer(_TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def end(self) -> None:
         """Abort what is under way, while services still work."""
         self._lock.release()
+        self._actions.end()
         if self._job is not None:
             self._end_job()
             asked = self._driver.stop()
@@ -141,10 +133,19 @@ class IdentificationNode(GuardedNode):
             job.close()
             response.message = "busy; wait, or abort first"
             return response
-        self._job = job
+        self._job, self._status.goal = job, uuid4().hex
         self.get_logger().info(message)
-        response.success, response.message = True, message
+        response.success, response.message = True, f"{message}; goal {self._status.goal}"
         return response
+
+    def _result(self) -> dict[str, str]:
+        """Of the job that was done last, for those who asked by action."""
+        answer = Path(self._status.experiment) / "answer.json"
+        model = self._served.model
+        return {
+            "model": "" if model is None else dumps(model),
+            "answer": answer.read_text(encoding="utf-8") if answer.is_file() else "",
+        }
 
     def _tick(self) -> None:
         if self._job is None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 
@@ -10,6 +12,9 @@ from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
 from .protocol_runner import Progress
+
+ENDED = ("done", "failed", "aborted")
+"""States in which a job has ended."""
 
 
 class IdentificationStatus:
@@ -26,6 +31,10 @@ class IdentificationStatus:
         Path of the recording that is made or fitted.
     owner : str
         As whom the stage is claimed while it is driven.
+    goal : str
+        Identifier of the job under way or ended last; the answer of the service that began it ends with it.
+    listener : callable
+        Called with every status that is new.
     """
 
     def __init__(self, node: GuardedNode) -> None:
@@ -33,7 +42,8 @@ class IdentificationStatus:
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: identification"
         self._publisher = advertise(node, "status")
         self._diagnostics = advertise(node, DIAGNOSTICS)
-        self.experiment = self.owner = ""
+        self.experiment = self.owner = self.goal = ""
+        self.listener: Callable[[DiagnosticStatus], None] = lambda status: None
         self._shown: DiagnosticStatus | None = None
         self._logged = ("", "")
         self._show(DiagnosticStatus.OK, "idle", "nothing is under way")
@@ -76,10 +86,12 @@ class IdentificationStatus:
             percent=round(100 * fraction),
             experiment=self.experiment,
             owner=self.owner,
+            goal=self.goal,
         )
         if status != self._shown:
             self._shown = status
             send(self._publisher, status)
+            self.listener(status)
 
     def _repeat(self) -> None:
         shown, fault = self._shown, self._node.recent_fault

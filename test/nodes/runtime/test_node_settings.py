@@ -7,7 +7,7 @@ import pytest
 from piezo_hysteresis.acquisition.settings import DRIVER
 from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.model.parameter_file import parameters
-from piezo_hysteresis.nodes.identification.identification_node import IDENTIFICATION
+from piezo_hysteresis.nodes.identification.settings import IDENTIFICATION
 from piezo_hysteresis.nodes.model.model_node import MODEL
 from piezo_hysteresis.nodes.runtime.parameters import describe
 from piezo_hysteresis.parameter import Setting

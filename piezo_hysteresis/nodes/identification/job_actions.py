@@ -1,0 +1,142 @@
+"""`JobActions`: `~/identify` and `~/diagnose` as actions, where the package of their types is installed."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Mapping
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from ..messages.conversions import values_of
+from ..runtime.guarded_node import GuardedNode
+from .status import ENDED
+
+INTERFACES = "piezo_hysteresis_interfaces"
+"""Package of the types: optional, built by colcon beside this one."""
+
+_SUFFIX = "_actions"
+"""After the name of the node: the name of the node that serves its actions."""
+
+
+class JobActions:
+    """Actions under the name of the identification node, on a node and threads of their own.
+
+    A goal waits for the end of its job in one thread, while another one takes requests to cancel it. What touches the
+    job is done in the thread of the identification node.
+
+    Parameters
+    ----------
+    node : GuardedNode
+        The identification node.
+    begin : mapping
+        Name of the action to the callback of the service that does the same.
+    abort : callable
+        The callback of the service `~/abort`.
+    result : callable
+        Further fields of a result, by name, once a job has ended.
+    """
+
+    def __init__(
+        self,
+        node: GuardedNode,
+        begin: Mapping[str, Callable[[Trigger.Request, Trigger.Response], Trigger.Response]],
+        abort: Callable[[Trigger.Request, Trigger.Response], Trigger.Response],
+        result: Callable[[], Mapping[str, str]],
+    ) -> None:
+        self._main, self._begin, self._abort, self._result = node, begin, abort, result
+        self._goal: queue.SimpleQueue[Any] | None = None
+        self._executor: MultiThreadedExecutor | None = None
+        if find_spec(INTERFACES) is None:
+            return
+        types = import_module(f"{INTERFACES}.action")
+        self._node = Node(
+            f"{node.get_name()}{_SUFFIX}",
+            context=node.context,
+            namespace=node.get_namespace(),
+            use_global_arguments=False,  # they may rename the identification node
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        for name in begin:
+            kind = getattr(types, name.capitalize())
+            ActionServer(
+                self._node,
+                kind,
+                f"{node.get_fully_qualified_name()}/{name}",
+                execute_callback=partial(self._execute, name, kind),
+                cancel_callback=self._cancel,
+                callback_group=ReentrantCallbackGroup(),
+            )
+        self._executor = MultiThreadedExecutor(num_threads=3, context=node.context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._executor.spin, name="actions", daemon=True)
+        self._thread.start()
+
+    def report(self, status: DiagnosticStatus) -> None:
+        """Pass a status of the job under way on to the goal that began it."""
+        goal = self._goal
+        if goal is not None:
+            if values_of(status)["state"] in ENDED:
+                self._goal = None
+            goal.put(status)
+
+    def end(self) -> None:
+        """Serve nothing any more; harmless when repeated."""
+        executor, self._executor = self._executor, None
+        if executor is not None:
+            executor.shutdown(timeout_sec=1.0)
+            self._node.destroy_node()
+
+    def _execute(self, name: str, kind: Any, handle: Any) -> Any:
+        """Follow one goal to its end, in a thread of the actions; the result in the type of the action."""
+        reports: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._in_main(lambda: self._start(name, reports))
+        while True:
+            report = reports.get()
+            if isinstance(report, Trigger.Response):
+                handle.abort()
+                return kind.Result(success=False, message=report.message)
+            values = values_of(report)
+            if values["state"] in ENDED:
+                break
+            handle.publish_feedback(
+                kind.Feedback(
+                    state=values["state"],
+                    phase=values["phase"],
+                    percent=float(values["percent"]),
+                    reason=report.message,
+                )
+            )
+        done = values["state"] == "done"
+        if done:
+            handle.succeed()
+        elif handle.is_cancel_requested:
+            handle.canceled()
+        else:
+            handle.abort()
+        fields = {key: text for key, text in self._result().items() if hasattr(kind.Result, key)} if done else {}
+        return kind.Result(success=done, message=report.message, experiment=values["experiment"], **fields)
+
+    def _start(self, name: str, reports: queue.SimpleQueue[Any]) -> None:
+        response = self._begin[name](Trigger.Request(), Trigger.Response())
+        if response.success:
+            self._goal = reports
+        else:
+            reports.put(response)
+
+    def _cancel(self, handle: Any) -> CancelResponse:
+        self._in_main(lambda: self._abort(Trigger.Request(), Trigger.Response()))
+        return CancelResponse.ACCEPT
+
+    def _in_main(self, action: Callable[[], object]) -> None:
+        self._main.executor.create_task(self._main.guarded(action))

@@ -1,0 +1,23 @@
+"""Parameters of the identification node, and the protocols that they name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ...identification.protocol.drive_limits import DriveLimits
+from ...identification.protocol.protocol import Protocol, paper, rich, short
+from ...parameter import Row, Setting
+
+PROTOCOLS: dict[str, Callable[[DriveLimits, int], Protocol]] = {"paper": paper, "short": short, "rich": rich}
+"""Words of the parameter `protocol`."""
+
+IDENTIFICATION: tuple[Row, ...] = (
+    Setting("protocol", "short", "protocol to play to the stage", tuple(PROTOCOLS)),
+    Setting("seed", 0, "seed of the random waveforms of the protocol", lower=0, upper=2**31 - 1),
+    Setting("driver", "driver_node", "name of the driver node in the same namespace; read at start"),
+    Setting("experiment", "", "recording for ~/diagnose, inside experiment_root; empty: the last one"),
+    Setting(
+        "experiment_root", "", "folder of the recordings, read at start; empty: ~/.ros/piezo_hysteresis/<namespace>"
+    ),
+)
+"""Parameters of the identification node."""
