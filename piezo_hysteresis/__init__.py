@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .online.predictor import Predictor
     from .record import Experiment, Record
     from .recording import read
+    from .report.plot import plot
 
 __version__ = "0.1.0"
 """Version of the package, as in package.xml and CHANGELOG.md."""
@@ -36,6 +37,7 @@ _ROOMS = {
     "diagnose": "discrepancy",
     "identify": "identification",
     "load": "model.model_file",
+    "plot": "report.plot",
     "read": "recording",
     "save": "model.model_file",
 }
@@ -50,6 +52,7 @@ __all__ = [
     "diagnose",
     "identify",
     "load",
+    "plot",
     "read",
     "save",
 ]

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from .channels import ChannelMapping, Samples, are_finite
 from .errors import RecordError, printable
+from .html_table import html_table
 from .notice import Notice
 
 __all__ = ["Experiment", "Notice", "Record", "Samples", "are_finite"]
@@ -98,6 +99,19 @@ class Record:
         for name in ("start_time", "initial_voltage"):
             if (number := getattr(self, name)) is not None and not np.isfinite(number):
                 raise RecordError(f"{name}: got {number!r}, expected a finite number")
+
+    def __repr__(self) -> str:
+        return f"Record({', '.join(self.summary())})"
+
+    def summary(self) -> tuple[str, str, str, str]:
+        """Phase, samples with their period, drive and displacement, in words."""
+        u, y = self.voltage, 1e6 * self.displacement
+        return (
+            self.phase,
+            f"{self.size} samples of {self.sample_period:g} s",
+            f"{u.min():.4g} to {u.max():.4g} V",
+            f"{y.min():.4g} to {y.max():.4g} µm",
+        )
 
     @property
     def size(self) -> int:
@@ -205,6 +219,16 @@ class Experiment:
         object.__setattr__(self, "records", tuple(self.records))
         if not self.records:
             raise RecordError(f"experiment '{self.source}' holds no record; expected at least one phase")
+
+    def __repr__(self) -> str:
+        return "\n".join((self._title(), *(f"  {record!r}" for record in self)))
+
+    def _repr_html_(self) -> str:
+        header = ("phase", "samples", "drive voltage", "displacement")
+        return html_table(self._title(), header, (record.summary() for record in self))
+
+    def _title(self) -> str:
+        return f"Experiment of {len(self)} phases, {self.size} samples, {len(self.notices)} findings"
 
     def __iter__(self) -> Iterator[Record]:
         return iter(self.records)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..discrepancy import Diagnosis, diagnose
+from ..discrepancy import diagnose
 from ..model import model_file
-from ..report.figures.comparison import ModelComparison, compare
+from ..report.figures.comparison import compare_diagnosis
 from ..report.json_file import write_json
 from ..report.page import page
 from ..report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
         write_json(args.json, answer)
     if args.report is not None:
         with progress("report") as report_progress:
-            drawn = page(_comparison(found), fit=found.fit, answer=answer, progress=report_progress)
+            drawn = page(compare_diagnosis(found), fit=found.fit, answer=answer, progress=report_progress)
         drawn.save(Path(args.report).expanduser())
     out = console()
     said = answer_verdict(answer)
@@ -87,13 +87,3 @@ def run(args: argparse.Namespace) -> int:
         if written:
             out.print(f"wrote {written}")
     return 0
-
-
-def _comparison(found: Diagnosis) -> ModelComparison:
-    models = {}
-    if found.baseline is not None:
-        models["before"] = found.baseline
-    if found.selection is not None and found.selection.accepted and found.model not in (None, found.baseline):
-        assert found.model is not None
-        models["after"] = found.model
-    return compare(found.experiment, models)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from ..html_table import html_table
 from ..identification.fit.fit import Fit
 from ..model.model import Model
 from ..record import Experiment
@@ -174,6 +175,13 @@ class Diagnosis:
             ],
             "model": model_file,
         }
+
+    def __repr__(self) -> str:
+        return f"Diagnosis({self.verdict}: {self.reason})"
+
+    def _repr_html_(self) -> str:
+        rows = ((e["name"], f"{100 * e['explained_fraction']:.0f} %", e["family"]) for e in self.answer()["effects"])
+        return html_table(repr(self), ("effect", "explained", "family"), rows)
 
     def summary(self) -> str:
         """The answer in plain words, several lines."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import Arx
+from ..html_table import html_table
 from ..model.model import Model
 from ..record import Experiment, Notice, Samples
 from .fit.fit import Fit
@@ -151,6 +152,16 @@ class Identification:
         covariance = self.fit.covariance[np.ix_(rows, rows)]
         variance = np.einsum("ik,ij,jk->k", relative.conj(), covariance, relative).real
         return value, np.sqrt(np.maximum(variance, 0.0))
+
+    def __repr__(self) -> str:
+        return f"Identification({self.model!r}, free-run error {self.free_run_percent:.3g} % of range)"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            (p.phase, f"{p.percent:.3f}", f"{1e9 * p.rms:.1f}", "fitted" if p.is_fitted else "held out")
+            for p in self.phases
+        )
+        return html_table(repr(self), ("phase", "% of range", "nm", "data"), rows)
 
     def __str__(self) -> str:
         arx = self.model[Arx.name]

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..effects import CHAIN, Discretisation, Effect, HysteresisOperator, Offset
 from ..errors import ModelError
+from ..html_table import html_table
 from ..parameter import Parameter, Value
 from ..record import Record
 from .chain import Chain, ChainState, Channels
@@ -78,6 +79,13 @@ class Model:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise ModelError(f"{name}: got {value!r}, expected a positive number")
+
+    def __repr__(self) -> str:
+        return f"Model({' → '.join(e.name for e in self.effects)}, {self.sample_period:g} s)"
+
+    def _repr_html_(self) -> str:
+        rows = ((name, f"{value:.6g}", self.row(name).unit) for name, value in self.values().items())
+        return html_table(repr(self), ("parameter", "value", "unit"), rows)
 
     def __getitem__(self, name: str) -> Effect:
         for effect in self.effects:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...discrepancy import Diagnosis
 from ...discrepancy.residual.noise_floor import floors, noise_floors
 from ...discrepancy.residual.residual import Errors, errors
 from ...identification.fit.normal_equations import Nuisance
@@ -101,3 +102,14 @@ def compare(
         noise=noise,
         floors=floors(records, noise) if record_floors is None else np.asarray(record_floors, dtype=float),
     )
+
+
+def compare_diagnosis(found: Diagnosis) -> ModelComparison:
+    """The experiment of a diagnosis, with the model before and, where an effect was named, after it."""
+    models = {}
+    if found.baseline is not None:
+        models["before"] = found.baseline
+    if found.selection is not None and found.selection.accepted and found.model not in (None, found.baseline):
+        assert found.model is not None
+        models["after"] = found.model
+    return compare(found.experiment, models)

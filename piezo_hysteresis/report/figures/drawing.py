@@ -57,6 +57,9 @@ class Drawing:
             self.figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
         return stream.getvalue()
 
+    def _repr_svg_(self) -> str:
+        return self.svg()
+
     def csv(self) -> str:
         """The numbers drawn; shorter columns end early."""
         stream = io.StringIO()

@@ -1,0 +1,56 @@
+"""`plot`: the figure of a record, an experiment, a model against an experiment, an identification or a diagnosis."""
+
+from __future__ import annotations
+
+from ..discrepancy import Diagnosis
+from ..discrepancy.residual.residual import zero_per_phase
+from ..errors import RecordError
+from ..identification.identification import Identification
+from ..model.model import Model
+from ..record import Experiment, Record
+from .figures.comparison import compare, compare_diagnosis
+from .figures.drawing import Drawing
+from .figures.gap import gap
+from .figures.preview import preview
+from .figures.time_series import time_series
+
+
+def plot(
+    what: Record | Experiment | Model | Identification | Diagnosis, experiment: Experiment | None = None
+) -> Drawing:
+    """The figure that shows `what` at a glance; a notebook shows it, and `Drawing.save_picture` writes it.
+
+    It is a function of the package and no method of its classes: a record knows no figures, and without a figure
+    nothing imports matplotlib.
+
+    Parameters
+    ----------
+    what : Record, Experiment, Model, Identification or Diagnosis
+        Records are drawn against time and as loops; a model or an identification against an experiment, with the
+        residual; a diagnosis as the gap before and after.
+    experiment : Experiment, optional
+        What a model or an identification is compared with; the state is carried from phase to phase.
+
+    Returns
+    -------
+    Drawing
+        With caption, data and a `matplotlib` figure.
+
+    Raises
+    ------
+    RecordError
+        If a model comes without an experiment, or a diagnosis has nothing to draw.
+    """
+    if isinstance(what, Record):
+        return preview(Experiment((what,)))
+    if isinstance(what, Experiment):
+        return preview(what)
+    if isinstance(what, Diagnosis):
+        drawing = gap(compare_diagnosis(what))
+        if drawing is None:
+            raise RecordError("plot: got a diagnosis without a model, expected one with a gap; see its reason")
+        return drawing
+    model = what.model if isinstance(what, Identification) else what
+    if experiment is None:
+        raise RecordError("plot: got a model alone, expected an experiment too; give plot(model, experiment)")
+    return time_series(compare(experiment, {"model": model}, {"model": zero_per_phase(model)}))

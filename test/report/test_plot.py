@@ -1,0 +1,48 @@
+"""What a notebook shows: one line per record, tables, and the figure of each result."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piezo_hysteresis as piezo
+from piezo_hysteresis import Experiment, Model, Record
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.errors import RecordError
+
+ROOT = Path(__file__).parents[2]
+MODEL = Model((Arx(a=[-0.5], b=[0.5]), BoucWen()), 1e-3, displacement_scale=1e-5)
+DRIVE = 5.0 - 5.0 * np.cos(np.arange(2000) / 100.0)
+RECORD = Record(DRIVE, MODEL.simulate(DRIVE), 1e-3, phase="sine_<b>")
+EXPERIMENT = Experiment((RECORD, RECORD[1000:]))
+
+
+def test_a_record_is_one_line_and_an_experiment_one_line_for_each():
+    assert repr(RECORD).startswith("Record(sine_<b>, 2000 samples of 0.001 s, 0 to 10 V, ")
+    assert "\n" not in repr(RECORD)
+    assert repr(EXPERIMENT).splitlines()[0] == "Experiment of 2 phases, 3000 samples, 0 findings"
+    assert len(repr(EXPERIMENT).splitlines()) == 3
+    assert EXPERIMENT._repr_html_().count("<tr>") == 3
+    assert "sine_&lt;b&gt;" in EXPERIMENT._repr_html_()
+
+
+def test_a_model_names_its_chain_and_lists_its_numbers():
+    assert repr(MODEL) == "Model(bouc_wen → arx, 0.001 s)"
+    assert MODEL._repr_html_().count("<tr>") == 1 + len(MODEL.values())
+
+
+@pytest.mark.parametrize("what", [(RECORD,), (EXPERIMENT,), (MODEL, EXPERIMENT)])
+def test_plot_draws_it(what):
+    drawing = piezo.plot(*what)
+    assert "<svg" in drawing._repr_svg_()
+    assert drawing.data
+    with pytest.raises(RecordError, match=r"plot\(model, experiment\)"):
+        piezo.plot(MODEL)
+
+
+def test_without_a_figure_nothing_imports_matplotlib():
+    code = "import sys, piezo_hysteresis as p; [getattr(p, n) for n in p.__all__ if n != 'plot']; "
+    command = [sys.executable, "-c", code + "sys.exit('matplotlib' in sys.modules)"]
+    assert subprocess.run(command, cwd=ROOT, check=False, timeout=120).returncode == 0
