@@ -61,8 +61,9 @@ SCREEN = "1000,1150"
 
 
 def of_the_demo(folder: Path) -> None:
-    """The live run, and the beginning of its page as a browser shows it."""
-    (IMAGES / "demo_residual.png").write_bytes((folder / "residual.png").read_bytes())
+    """The live run, the scan, and the beginning of its page as a browser shows it."""
+    for name in ("residual", "scan"):
+        (IMAGES / f"demo_{name}.png").write_bytes((folder / f"{name}.png").read_bytes())
     with tempfile.TemporaryDirectory() as profile:
         browser = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
         shown = [f"--user-data-dir={profile}", f"--window-size={SCREEN}", f"--screenshot={IMAGES / 'report.png'}"]
