@@ -76,6 +76,7 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
+            f"axis_node = {NAME}.nodes.start:axis_node",
             f"driver_node = {NAME}.nodes.start:driver_node",
             f"model_node = {NAME}.nodes.start:model_node",
             f"identification_node = {NAME}.nodes.start:identification_node",

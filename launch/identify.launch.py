@@ -9,7 +9,7 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from piezo_hysteresis.nodes.runtime.launch_values import parameter_file
+from piezo_hysteresis.nodes.runtime.launch_values import parameter_file, switch
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -19,7 +19,11 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def identification(context: LaunchContext) -> list[Node]:
-    namespace, file = (LaunchConfiguration(name).perform(context) for name in ("namespace", "params_file"))
+    namespace, file, together = (
+        LaunchConfiguration(name).perform(context) for name in ("namespace", "params_file", "one_process")
+    )
+    if switch("one_process", together):
+        return []  # it is in the process of the driver
     config = Path(get_package_share_directory("piezo_hysteresis")) / "config"
     node = Node(
         package="piezo_hysteresis",

@@ -25,6 +25,7 @@ ARGUMENTS = (
     ("real_time_factor", "", "speed of a simulated or replayed stage; empty: as the parameter files say", None),
     ("autostart", "true", "configure and activate the driver at start", list(SWITCH)),
     ("compensation", "false", "start the compensation node, too: it follows trajectories in metres", list(SWITCH)),
+    ("one_process", "false", "driver, model and identification node in one process", list(SWITCH)),
     ("page", "false", "show every axis on a page in the browser, http://127.0.0.1:5006", list(SWITCH)),
 )  # fmt: skip
 
@@ -62,10 +63,10 @@ def nodes(context: LaunchContext) -> list[Node]:
     model: dict[str, object] = {"model_file": value["model_file"]} if value["model_file"] else {}
     if switch("use_sim_time", value["use_sim_time"]):
         model["use_sim_time"] = True
-    started = [
-        node("driver_node", "driver.yaml", **driver),
-        node("model_node", "model.yaml", **model),
-    ]
+    if switch("one_process", value["one_process"]):
+        started = [node("axis_node", "driver.yaml", **driver, **model)]
+    else:
+        started = [node("driver_node", "driver.yaml", **driver), node("model_node", "model.yaml", **model)]
     if switch("compensation", value["compensation"]):
         started.append(node("compensation_node", "compensation.yaml", model_file=value["model_file"]))
     if switch("page", value["page"]):

@@ -11,7 +11,7 @@ from launch_ros.utilities import evaluate_parameters  # noqa: E402
 
 STAGE_ARGUMENTS = {
     "namespace", "params_file", "use_sim_time", "model_file", "stage", "experiment", "real_time_factor", "autostart",
-    "compensation", "page",
+    "compensation", "one_process", "page",
 }  # fmt: skip
 FOLDER = Path(__file__).parents[1] / "launch"
 

@@ -15,6 +15,11 @@ NO_ROS = 2
 """Exit status of a node on a computer without ROS 2."""
 
 
+def axis_node() -> int:
+    """Run driver, model and identification node in one process."""
+    return _run("axis_node")
+
+
 def driver_node() -> int:
     """Run a driver."""
     return _run("driver.driver_node")

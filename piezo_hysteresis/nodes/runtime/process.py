@@ -1,4 +1,4 @@
-"""`run`: the life of a node process, from command line to exit code."""
+"""`run` and `run_together`: the life of a node process, from command line to exit code."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import socket
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import rclpy
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
@@ -31,6 +33,25 @@ _BAD_START = (
 AnyNode = TypeVar("AnyNode", bound=GuardedNode)
 
 
+@dataclass(frozen=True, slots=True)
+class NodeLife(Generic[AnyNode]):
+    """How a node of a process begins and ends.
+
+    Parameters
+    ----------
+    make : callable
+        Makes the node; nothing may be set in motion yet, a signal ends it at once.
+    begin : callable
+        Called once, before the node spins.
+    end : callable
+        Called once, when it has stopped spinning for whatever reason.
+    """
+
+    make: Callable[[], AnyNode]
+    begin: Callable[[AnyNode], None] = lambda node: None
+    end: Callable[[AnyNode], None] = lambda node: None
+
+
 def run(
     make: Callable[[], AnyNode],
     arguments: Sequence[str] | None = None,
@@ -38,32 +59,33 @@ def run(
     begin: Callable[[AnyNode], None] = lambda node: None,
     end: Callable[[AnyNode], None] = lambda node: None,
 ) -> int:
-    """Make a node and spin it until SIGINT or SIGTERM.
+    """As `run_together`, for one node."""
+    return run_together([NodeLife(make, begin, end)], arguments)
+
+
+def run_together(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None = None) -> int:
+    """Make nodes and spin them in one thread until SIGINT or SIGTERM.
 
     The handlers of rclpy would invalidate the context before anything can be done about it: here both signals only end
     the spinning, further ones are ignored, and `end` still publishes and serves. No exception out of a callback ends
-    the node: it is reported, and the node goes on.
+    a node: it is reported, and the node goes on.
 
     Parameters
     ----------
-    make : callable
-        Makes the node; nothing may be set in motion yet, a signal ends it at once.
+    lives : sequence of NodeLife
+        Of every node; they begin in this order and end in the opposite one.
     arguments : sequence of str, optional
         Command line; default that of the process.
-    begin : callable
-        Called once, before the node spins.
-    end : callable
-        Called once, when it has stopped spinning for whatever reason.
 
     Returns
     -------
     int
-        0, 2 where the node could not be made from its parameters (the reason is one line on stderr), or 130 where it
+        0, 2 where a node could not be made from its parameters (the reason is one line on stderr), or 130 where it
         was interrupted while it was made.
     """
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-        node = make()
+        nodes = [(life.make(), life) for life in lives]
         stop = _signalled()
     except KeyboardInterrupt:
         rclpy.try_shutdown()
@@ -75,16 +97,15 @@ def run(
     gc.collect()
     gc.freeze()  # what was made so far stays: the collector need not walk over it while a stream waits
     executor = make_executor()
-    executor.add_node(node)
-    try:
-        begin(node)
-        spin_until(executor, stop, node)
-    finally:
-        try:
-            end(node)
-        finally:
-            executor.shutdown()
-            rclpy.try_shutdown()
+    with ExitStack() as ending:
+        ending.callback(rclpy.try_shutdown)
+        ending.callback(executor.shutdown)
+        for node, life in nodes:
+            executor.add_node(node)
+            ending.callback(life.end, node)
+        for node, life in nodes:
+            life.begin(node)
+        spin_until(executor, stop, nodes[0][0])
     return 0
 
 
