@@ -62,7 +62,7 @@ def with_gaps(places: NDArray[np.intp], valid: NDArray[np.bool_], *columns: Arra
 def newest_cycles(window: Window) -> Window:
     """The last few cycles of the drive, or all of the window where it holds fewer.
 
-    A window of very many cycles is halved before they are looked for, so that they can be told apart after thinning.
+    A window of very many cycles is halved before they are looked for, so that they stay distinguishable after thinning.
     """
     while window.size > 64:
         places = extremes(window.voltage)

@@ -129,7 +129,7 @@ class Browser:
         deadline = time.monotonic() + PATIENCE
         while not (value := condition()):
             if time.monotonic() > deadline:
-                raise AssertionError(f"waited {PATIENCE:g} s in vain: {what()}")
+                raise AssertionError(f"waited {PATIENCE:g} s for {what()}, which did not come")
             time.sleep(0.05)
         return value
 
