@@ -124,9 +124,9 @@ class LearningFilter:
         known = np.maximum(0.0, 1.0 - 3.0 * floor / np.maximum(smooth, 1e-300)) if floor > 0.0 else np.ones(power.size)
         weight = gain * known
         correction = np.fft.irfft(weight * spectrum, size)[:n]
-        signal = np.maximum(0.0, power - floor)
+        signal = power - floor  # also below zero: the sum over noise alone shall be zero
         in_band = gain > 0.0
-        left = np.sum(((1.0 - weight) ** 2 * signal + weight**2 * np.minimum(floor, power))[in_band])
-        now = np.sum(signal[in_band])
+        left = max(0.0, np.sum(((1.0 - weight) ** 2 * signal + weight**2 * np.minimum(floor, power))[in_band]))
+        now = max(0.0, np.sum(signal[in_band]))
         scale = 2.0 / size**2
         return correction, float(np.sqrt(scale * left)), float(np.sqrt(scale * now))

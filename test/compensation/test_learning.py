@@ -50,6 +50,17 @@ def test_rounds_stop_at_the_noise_and_copy_little_of_it() -> None:
     assert left < 0.7 * noise
 
 
+def test_an_error_that_is_noise_alone_is_not_corrected() -> None:
+    model, noise = stage(), 5e-4 * np.ptp(WANTED)
+    for seed in range(10):
+        got = IterativeLearning(model, plan(model, WANTED, LIMITS), LIMITS, noise=noise)
+        first = got.next
+        assert first is not None
+        measured = first.predicted + noise * np.random.default_rng(seed).normal(size=first.voltage.size)
+        assert got.update(measured) is None
+        assert "noise" in got.reason
+
+
 def test_every_round_is_predicted_to_be_better_before_it_is_played() -> None:
     got = learn(learning(), stage_with_noise(0.0), rounds=6)
     for before, after in zip(got.rounds[:-1], got.rounds[1:], strict=True):
