@@ -12,7 +12,7 @@ lint: setup ; @scripts/lint
 bench: setup ; @$(RUN) python -m benchmarks $(BENCH)
 bench-naming: setup ; @$(RUN) python -m benchmarks.naming $(BENCH)
 soak: setup ; @$(RUN) python -m benchmarks.soak $(SOAK)
-docs: setup ; @$(RUN) python docs/generate.py
+docs: setup ; @$(RUN) python docs/generate.py && scripts/docs
 
 .venv/.installed: requirements.txt constraints.txt ; @scripts/setup $(PYTHON) && touch $@
 install/.built: .venv/.installed package.xml setup.py setup.cfg $(wildcard config/* launch/*) ; @scripts/build && touch $@

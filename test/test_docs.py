@@ -116,3 +116,18 @@ def test_every_command_behind_a_figure_exists():
     assert rows
     for file in rows:
         assert (ROOT / file).exists(), file
+
+
+@pytest.mark.soak
+def test_the_site_builds_without_a_warning():
+    subprocess.run([ROOT / "scripts" / "docs"], check=True, timeout=900)
+    site = ROOT / "docs" / "_build" / "html"
+    assert 'class="math' in (site / "model.html").read_text()
+    assert "piezo_hysteresis.record.Record" in (site / "api.html").read_text()
+    assert (site / "searchindex.js").stat().st_size > 10_000
+
+
+def test_every_page_is_in_the_site():
+    index = (ROOT / "docs" / "index.md").read_text().splitlines()
+    pages = {page.stem for page in (ROOT / "docs").glob("*.md")} - {"index"}
+    assert pages <= set(index)

@@ -64,7 +64,7 @@ def identify(
     experiment : Experiment
         Records of any kind and sample period; records that continue carry the state of the stage.
     voltage_scale : float, optional
-        v = u / voltage_scale [V]; default the largest |u|.
+        v = u / voltage_scale [V]; default the largest absolute voltage.
     displacement_scale : float, optional
         Displacement at normalised output 1 [m]; default the range of the displacement.
     gain : float
