@@ -23,6 +23,8 @@ PRICE = 0.5
 """What such a change costs in V beside another change."""
 SHORTEST, LONGEST = 0.02, 100.0
 """Delays that are looked for [samples]."""
+SHOWN = 0.3
+"""Share of what a change explains that has to remain when a part of the records is left out."""
 AROUND = 0.2
 """Part of a size, or of a sample, within which it is looked for again without some of the pieces."""
 
@@ -144,7 +146,7 @@ class ChangeSearch:
             lambda s: self.account(key, float(s), free, mask).cost,
             bounds=(low, high),
             method="bounded",
-            options={"xatol": 1e-3 * abs(near)},
+            options={"xatol": 1e-3 * max(abs(near), SHORTEST * period)},
         )
         return self.account(key, float(found.x), free, mask)
 
@@ -158,14 +160,19 @@ class ChangeSearch:
         return Account(key, found.cost, sum(values[r] for r in rows), found.theta, found.names)
 
     def interval(self, best: Account) -> tuple[float, float]:
-        """95 % interval by leaving out groups of pieces, and by leaving out records: the larger of the two."""
+        """95 % interval by leaving out groups of pieces, and by leaving out records: the larger of the two.
+
+        A part without which little is left of the change is not left out.
+        """
         numbers = np.unique(self.labels)
         groups = [g for g in np.array_split(numbers, min(6, numbers.size)) if g.size]
         near = best.size if best.key in SHAPES else None
+        whole = self.account("none").cost - best.cost
         half = 0.0
         for labels, parts in ((self.labels, groups), (self.origins, [[o] for o in np.unique(self.origins)])):
             masks = [~np.isin(labels, part) for part in parts]
-            sizes = np.array([self.best(best.key, mask, near).size for mask in masks if mask.any()])
+            found = [(self.account("none", mask=m).cost, self.best(best.key, m, near)) for m in masks if m.any()]
+            sizes = np.array([rest.size for without, rest in found if without - rest.cost > SHOWN * whole])
             count = sizes.size
             if count > 1:
                 spread = np.sqrt((count - 1.0) / count * np.sum((sizes - sizes.mean()) ** 2))

@@ -18,13 +18,13 @@ from ...model.model import Model
 from ...record import Record
 from .change_kinds import KINDS, ParameterChange
 from .change_search import Account, ChangeSearch
-from .signatures import SHAPES
+from .signatures import SHAPES, shaped_model
 
 Array = NDArray[np.float64]
 
 EXPLAINS = 0.7
 """Share of V that a change may leave beside gain, loop height and zero."""
-LEAVES, NEARLY_ALL = 4.0, 0.04
+LEAVES, NEARLY_ALL = 6.0, 0.08
 """V, or share of V, that a change may leave: where more is left, the stage is not the same in all else."""
 SEEN = 0.7
 """Size of a change, RMS in floors, from which it is reported."""
@@ -70,6 +70,7 @@ def find_change(
     if "resonance" in keys and min(e.account.cost for e in found) > LEAVES:
         found.append(_moved_resonance(model, records, used, floors))
     found.sort(key=lambda e: e.account.cost)
+    found[0] = _simulated(found[0], model, records, used, floors)
     best = found[0].account
     leaves = best.cost < LEAVES or best.cost < NEARLY_ALL * day.cost
     if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
@@ -91,6 +92,8 @@ class _Explanation:
     search: ChangeSearch
     account: Account
     moved: float = 0.0
+    spread: float | None = None
+    """Half width of the interval where another search has it."""
 
     @property
     def size(self) -> float:
@@ -99,10 +102,28 @@ class _Explanation:
 
     def interval(self, before: float) -> tuple[float, float]:
         """95 % interval of the size; V was `before` without the change."""
-        low, high = self.search.interval(self.account)
+        spread = self.spread
+        if spread is None:
+            low, high = self.search.interval(self.account)
+            spread = 0.5 * (high - low)
         alike = UNCERTAIN * abs(self.size) / float(np.sqrt(max(before - self.account.cost, 1e-12)))
-        half = float(np.hypot(0.5 * (high - low), alike))
+        half = float(np.hypot(spread, alike))
         return self.size - half, self.size + half
+
+
+def _simulated(
+    found: _Explanation, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
+) -> _Explanation:
+    """A delay or a filter as the model simulates it: an interpolated prediction is a little off where a stage rings."""
+    key, size = found.account.key, found.account.size
+    if key not in SHAPES or size < 0.0:
+        return found
+    search = ChangeSearch(shaped_model(model, key, size), records, used, floors)
+    low, high = found.search.interval(found.account)
+    exact = search.shaped(key, near=0.0) if key == "delay" else search.account(key)
+    if exact.cost >= found.account.cost:
+        return found
+    return _Explanation(search, exact, size, 0.5 * (high - low))
 
 
 def _moved_resonance(

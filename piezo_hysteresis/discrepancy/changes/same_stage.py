@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...effects import Arx, ExtraDelay, ExtraResonance, SensorBandwidth, Softening, ThermalDrift
+from ...effects import ExtraResonance, Softening, ThermalDrift
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.fit.normal_equations import Nuisance, residuals
 from ...model.model import Model
@@ -19,7 +19,7 @@ from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
 from .change_kinds import KINDS, ParameterChange
 from .parameter_changes import find_change
-from .signatures import DRIFT_TIME, creep_numbers, loop_numbers
+from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_model
 
 ERROR, HASH = "free_run_error", "data_hash"
 """Keys of the provenance."""
@@ -100,15 +100,8 @@ def changed_model(model: Model, change: ParameterChange, records: Sequence[Recor
     values = model.values()
     gain, loop = change.session.get("gain", 0.0), change.session.get("loop", 0.0)
     numbers = {n: v * (1.0 + loop) for n, v in loop_numbers(model).items()} if loop else {}
-    if change.key == "delay" and Arx.name in model and ExtraDelay.name not in model:
-        name = f"{Arx.name}.delay"
-        numbers[name] = max(0.0, values[name] + change.size / model.sample_period)
-    elif change.key == "delay":
-        present = model[ExtraDelay.name]["tau"] if ExtraDelay.name in model else 0.0
-        model = model.with_effect(ExtraDelay(tau=max(0.0, present + change.size)))
-    elif change.key == "low_pass":
-        present = model[SensorBandwidth.name]["tau"] if SensorBandwidth.name in model else 0.0
-        model = model.with_effect(SensorBandwidth(tau=present + change.size))
+    if change.key in SHAPES:
+        model = shaped_model(model, change.key, change.size)
     elif change.kind.name == ExtraResonance.name:
         name = f"{ExtraResonance.name}.f0"
         numbers[name] = values[name] + change.size

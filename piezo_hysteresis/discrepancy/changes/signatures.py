@@ -13,14 +13,17 @@ import scipy
 from numpy.typing import NDArray
 
 from ...effects import (
+    Arx,
     BoucWen,
     Creep,
     CreepFractional,
     CreepTwoRates,
+    ExtraDelay,
     ExtraResonance,
     HysteresisMemory,
     Offset,
     PublishedBoucWen,
+    SensorBandwidth,
     Softening,
 )
 from ...model.model import Model
@@ -170,3 +173,15 @@ Shaped = Callable[[ChangeablePrediction, Array, float, float], Array]
 
 SHAPES: dict[str, Shaped] = {"delay": delayed, "low_pass": filtered}
 """Changes that act on the whole prediction, by name."""
+
+
+def shaped_model(model: Model, key: str, size: float) -> Model:
+    """The model with a change of `SHAPES`: later by `size` [s], or behind a low-pass of that time constant [s]."""
+    if key == "low_pass":
+        present = model[SensorBandwidth.name]["tau"] if SensorBandwidth.name in model else 0.0
+        return model.with_effect(SensorBandwidth(tau=present + size))
+    if Arx.name in model and ExtraDelay.name not in model:
+        name = f"{Arx.name}.delay"
+        return model.with_values({name: max(0.0, model.values()[name] + size / model.sample_period)})
+    present = model[ExtraDelay.name]["tau"] if ExtraDelay.name in model else 0.0
+    return model.with_effect(ExtraDelay(tau=max(0.0, present + size)))
