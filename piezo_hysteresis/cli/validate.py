@@ -9,6 +9,7 @@ from typing import Any
 from ..discrepancy.residual.correlation import CAPTION, correlate
 from ..discrepancy.residual.residual import zero_per_phase
 from ..errors import RecordError
+from ..identification.identified_range import outside
 from ..identification.records.conditioning_split import known_from_within
 from ..identification.records.roles import CARRYING
 from ..model import model_file
@@ -57,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     if args.figures is not None:
         _draw(comparison, Path(args.figures).expanduser())
     show(error_table(comparison), frequency_table(comparison), _test_table(tests))
-    show_notices((*experiment.notices, *conditioned))
+    show_notices((*experiment.notices, *conditioned, *outside(model, experiment)))
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
     assert comparison.now is not None

@@ -6,7 +6,7 @@ held as the gauge between hysteresis and dynamics.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +15,12 @@ from ..effects import HYSTERESIS, Arx, HysteresisOperator, Offset
 from ..errors import IdentificationError
 from ..model.model import Model
 from ..model.provenance import provenance
-from ..record import Experiment, Notice, Record
+from ..record import Experiment, Notice
 from .fit.fit import Fit, Progress
 from .fit.joint import fit_dynamics, fit_lag
 from .fit.normal_equations import residuals
 from .identification import Identification, phase_errors
+from .identified_range import identified_range
 from .one_core import on_one_core
 from .records.conditioning_split import known_from_within
 from .records.excitation_content import sensor_noise
@@ -28,16 +29,17 @@ from .records.roles import HELD_OUT, Roles, roles_of
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.delay import Delay, identify_delay
 from .steps.dynamics import Dynamics, delay_of
-from .steps.hysteresis import fit_hysteresis
 from .steps.hysteresis_choice import choose_memory
-from .steps.linear_start import dynamics_of, hysteresis_signals
+from .steps.linear_start import hysteresis_signals
 from .steps.order_choice import OrderError, choose_order, compare_orders
 from .steps.remaining_lag import lag_notices
-from .steps.three_steps import ThreeSteps, named, three_steps
+from .steps.three_steps import ThreeSteps, behind_the_gauge, three_steps
 from .structure.structure_choice import StructureChoice, choose_structure
 
 ADEQUATE = 3e-4
 """Share of the range below which a residual does not decide: no lab needs better."""
+AT_THE_FLOOR = 1.5
+"""Mean square of residual over floor up to which a fit has nothing left to gain, whatever its last step was."""
 FEWEST_SAMPLES = 32
 """Shortest record that can show a loop."""
 HIGHEST_ORDER = 10
@@ -125,7 +127,7 @@ def identify(
     report("step 3: hysteresis", 0.1)
     dead = 1.0 if delay is None else max(1.0, delay.time / period)
     frame = Model((hysteresis(), Arx(a=(), b=(gain,), delay=dead)), period, scale_v, scale_y)
-    start = _behind_the_gauge(frame, published, records, roles.loops)
+    start = behind_the_gauge(frame, published, records, roles.loops)
     dynamics: Dynamics | None = None
     table: tuple[OrderError, ...] = ()
     comparisons: tuple[InputComparison, ...] = ()
@@ -180,6 +182,7 @@ def identify(
     phases = phase_errors(joint.model, experiment, roles)
     zero = float(np.mean([e.mean() for e in residuals(joint.model, records)]))
     joint = replace(joint, model=joint.model.with_effect(Offset(y0=zero)))
+    joint = replace(joint, converged=joint.converged or joint.cost <= AT_THE_FLOOR)
     if not joint.converged:
         notices.append(Notice("not_converged", f"the joint fit did not converge in {joint.iterations} linearisations"))
     notices += [
@@ -198,6 +201,7 @@ def identify(
         joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices), structure
     )
     origin = provenance(experiment, found.free_run_error, found.free_run_percent)
+    origin = {**origin, **identified_range(records, roles.fitted)}
     return replace(found, model=replace(joint.model, provenance=origin))
 
 
@@ -237,13 +241,3 @@ def _published(
     except IdentificationError as error:
         notices.append(Notice("no_three_steps", str(error)))
         return None
-
-
-def _behind_the_gauge(
-    frame: Model, published: ThreeSteps | None, records: Sequence[Record], loops: Collection[int]
-) -> Model:
-    """`frame` with its hysteresis fitted to the loops; where step 3 was, only its gain is another one."""
-    if published is None or set(loops) != set(named(records, "triangle")):
-        return fit_hysteresis(frame, records, loops).model
-    gain = published.dynamics.arx.dc_gain / dynamics_of(frame).dc_gain
-    return frame.with_hysteresis(published.model.hysteresis.scaled(gain))

@@ -26,6 +26,9 @@ _PROVENANCE = {
     "free_run_error_percent": "% of the displacement range",
     "data_hash": "of the samples that were fitted",
     "date": "UTC",
+    "voltage_min": "V; of the records that were fitted",
+    "voltage_max": "V",
+    "frequency_max": "Hz; 95 % of the power of dv/dt lies below it",
 }
 """Comments beside the entries of the provenance."""
 

@@ -6,7 +6,7 @@ sees of it enters G. The joint identification starts from here and mends that; b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from ..records.excitation_content import excited_part
 from .delay import Delay, identify_delay
 from .dynamics import Dynamics, identify_arx
 from .hysteresis import fit_hysteresis
+from .linear_start import dynamics_of
 from .regressors import Signals
 
 
@@ -111,3 +112,25 @@ def three_steps(
     loop = fit_hysteresis(Model((hysteresis(), follower), period, voltage_scale, displacement_scale), records, triangle)
     whole = loop.model.with_effect(dynamics.arx).with_effect(Offset(y0=float(np.mean([n[0] for n in loop.nuisances]))))
     return ThreeSteps(delay, dynamics, replace(loop, model=whole))
+
+
+def behind_the_gauge(
+    frame: Model, published: ThreeSteps | None, records: Sequence[Record], loops: Collection[int]
+) -> Model:
+    """`frame` with its hysteresis fitted to the loops; where step 3 was, only its gain is another one.
+
+    Parameters
+    ----------
+    frame : Model
+        With the gain and the delay of the gauge.
+    published : ThreeSteps or None
+        What the published steps found.
+    records : sequence of Record
+        The experiment, in order.
+    loops : collection of int
+        Indices of the records that show the hysteresis.
+    """
+    if published is None or set(loops) != set(named(records, "triangle")):
+        return fit_hysteresis(frame, records, loops).model
+    gain = published.dynamics.arx.dc_gain / dynamics_of(frame).dc_gain
+    return frame.with_hysteresis(published.model.hysteresis.scaled(gain))

@@ -1,0 +1,30 @@
+"""A model says outside of which voltages and frequencies it was not identified."""
+
+import numpy as np
+
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.identification.identified_range import identified_range, outside
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.record import Experiment, Record
+
+TIME = 1e-3 * np.arange(4000)
+
+
+def sine(amplitude, frequency):
+    drive = 5.0 + amplitude * np.sin(2.0 * np.pi * frequency * TIME)
+    return Record(drive, 1e-6 * drive, 1e-3, f"sine_{frequency:g}hz")
+
+
+def test_a_drive_inside_is_not_noticed_and_one_outside_is():
+    fitted = (sine(2.0, 1.0), sine(3.0, 10.0))
+    origin = identified_range(fitted, (0, 1))
+    assert (float(origin["voltage_min"]), float(origin["voltage_max"])) == (2.0, 8.0)
+    model = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=1.0)), 1e-3, provenance=origin)
+    assert outside(model, Experiment((sine(2.5, 5.0),))) == ()
+    kinds = [n.kind for n in outside(model, Experiment((sine(4.0, 5.0), sine(2.0, 40.0))))]
+    assert kinds == ["outside_amplitudes", "outside_frequencies"]
+
+
+def test_a_model_without_its_range_gives_no_notice():
+    model = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=1.0)), 1e-3)
+    assert outside(model, Experiment((sine(4.0, 40.0),))) == ()
