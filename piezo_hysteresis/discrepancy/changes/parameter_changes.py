@@ -8,7 +8,7 @@ leaves, and no other explains as much.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,8 +92,6 @@ class _Explanation:
     search: ChangeSearch
     account: Account
     moved: float = 0.0
-    spread: float | None = None
-    """Half width of the interval where another search has it."""
 
     @property
     def size(self) -> float:
@@ -102,28 +100,27 @@ class _Explanation:
 
     def interval(self, before: float) -> tuple[float, float]:
         """95 % interval of the size; V was `before` without the change."""
-        spread = self.spread
-        if spread is None:
-            low, high = self.search.interval(self.account)
-            spread = 0.5 * (high - low)
+        low, high = self.search.interval(self.account)
         alike = UNCERTAIN * abs(self.size) / float(np.sqrt(max(before - self.account.cost, 1e-12)))
-        half = float(np.hypot(spread, alike))
+        half = float(np.hypot(0.5 * (high - low), alike))
         return self.size - half, self.size + half
 
 
 def _simulated(
     found: _Explanation, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
 ) -> _Explanation:
-    """A delay or a filter as the model simulates it: an interpolated prediction is a little off where a stage rings."""
+    """A delay or a filter with what it leaves when the model simulates it.
+
+    An interpolated prediction leaves more where a stage rings between few samples. Its size is the surer one: the model
+    interpolates too, and its delay was fitted with what that does.
+    """
     key, size = found.account.key, found.account.size
     if key not in SHAPES or size < 0.0:
         return found
     search = ChangeSearch(shaped_model(model, key, size), records, used, floors)
-    low, high = found.search.interval(found.account)
     exact = search.shaped(key, near=0.0) if key == "delay" else search.account(key)
-    if exact.cost >= found.account.cost:
-        return found
-    return _Explanation(search, exact, size, 0.5 * (high - low))
+    left = min(found.account.cost, exact.cost)
+    return replace(found, account=replace(found.account, cost=left))
 
 
 def _moved_resonance(
