@@ -17,8 +17,8 @@ from ..errors import printable
 from ..record import Notice
 from ..report.tables.table import Table
 
-WIDTH = 140
-"""Columns where standard output is no terminal."""
+WIDTH = 10_000
+"""Columns where standard output is no terminal: a table takes the width that it needs, and no word is broken."""
 LINE_INTERVAL = 10.0
 """Time between two lines of progress where standard error is no terminal [s]."""
 
