@@ -64,7 +64,7 @@ class Demo:
         self.console.print(f"[dim]{time.monotonic() - self.begin:6.1f} s[/dim]  {text}")
 
     def start(self, processes: Processes, speed: float, protocol: str, seed: int) -> Bench:
-        """Start the four nodes; the model node begins with the numbers of the paper."""
+        """Start the nodes; the model node begins with the numbers of the paper."""
         plant = self.folder / "plant.yaml"
         processes.start(
             "driver_node",
@@ -83,9 +83,16 @@ class Demo:
             way_back=scan.APPROACH,
             learning_rounds=scan.ROUNDS,
         )
+        processes.start("page_node", port=0)
         ids = ", ".join(f"{name} {number}" for name, number in processes.ids.items())
-        self.say(f"four processes in {NAMESPACE}, ROS domain {os.environ['ROS_DOMAIN_ID']}: {ids}")
+        self.say(f"five processes in {NAMESPACE}, ROS domain {os.environ['ROS_DOMAIN_ID']}: {ids}")
         return Bench(NAMESPACE, LIMITS.sample_period, processes.check)
+
+    def show_page(self, bench: Bench, log: Path) -> None:
+        """Say where a browser shows the stage while the demo runs."""
+        bench.wait(lambda: "http://" in log.read_text(), "the live page", PATIENCE)
+        address = log.read_text().partition("http://")[2].split()[0]
+        self.say(f"live page: http://{address} in a browser on this machine, while the demo runs")
 
     def look(self, bench: Bench, name: str, model: Model) -> None:
         """Play the probe and show what the model node, which follows `model`, leaves of it."""
@@ -212,8 +219,9 @@ def main() -> int:
         stack.callback(rclpy.try_shutdown)
         processes = stack.enter_context(Processes(NAMESPACE, folder / "log"))
         bench = demo.start(processes, arguments.speed, arguments.protocol, arguments.seed)
+        demo.show_page(bench, folder / "log" / "page_node.log")
         experiment = demo.run(bench)
-    demo.say("the nodes have ended, the stage is at its safe voltage")
+    demo.say("the nodes have ended, the stage is at its safe voltage; `scripts/run page_node` shows stages that run")
     demo.report(experiment)
     demo.reveal()
     return 0

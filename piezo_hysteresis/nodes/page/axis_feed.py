@@ -57,7 +57,7 @@ class AxisFeed:
             ("model", self._on_model, False),
         ):
             topic = TOPICS[name]
-            node.create_subscription(topic.type, f"{self._prefix}/{name}", callback, topic.quality, raw=raw)
+            node.create_subscription(topic.type, f"{self._prefix}/{name}", callback, topic.deep, raw=raw)
         services = {control.service for control in CONTROLS} | {c.plan for c in CONTROLS if c.plan}
         self._clients = {name: node.create_client(Trigger, f"{self._prefix}/{name}") for name in services}
         self._waiting: list[tuple[float, Reply[Answer], str]] = []

@@ -51,13 +51,18 @@ PROMISED: dict[str, Any] = {"color": BLUE, "line_width": 1.4, "line_dash": [2, 3
 class WindowFigures:
     """Draws a window of samples; what is shown follows the range of the time axes.
 
+    Parameters
+    ----------
+    time_label : str
+        What the time axes say.
+
     Attributes
     ----------
     loop, displacement, residual, spectrum : bokeh figure
         In this order on the page.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, time_label: str = "time before now [s]") -> None:
         self._time = Range1d(0.0, 1.0, bounds=None)
         self._loop = ColumnDataSource({"voltage": [], "measured": [], "predicted": []}, name="loop_data")
         self._measured = ColumnDataSource({"time": [], "measured": []}, name="measured_data")
@@ -71,11 +76,12 @@ class WindowFigures:
         self.loop.line("voltage", "measured", source=self._loop, **MEASURED)
         self.loop.line("voltage", "predicted", source=self._loop, **PREDICTED)
         over_time = {"x_range": self._time}
-        label = "time before now [s]"
-        self.displacement = _figure("displacement", "Displacement", label, "displacement [µm]", **over_time)
+        self.displacement = _figure("displacement", "Displacement", time_label, "displacement [µm]", **over_time)
         self.displacement.line("time", "measured", source=self._measured, **MEASURED)
         self.displacement.line("time", "predicted", source=self._predicted, **PREDICTED)
-        self.residual = _figure("residual", "Residual: measured minus predicted", label, "residual [nm]", **over_time)
+        self.residual = _figure(
+            "residual", "Residual: measured minus predicted", time_label, "residual [nm]", **over_time
+        )
         self.residual.line("time", "residual", source=self._residual, color=ORANGE, legend_label="residual")
         for name, style in (("noise", FLOOR), ("error", PROMISED)):
             self.residual.line("time", name, source=self._limits, **style)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from html import escape
 from importlib.resources import files
 
 from bokeh.document import Document
@@ -54,7 +55,7 @@ def lay_out(document: Document, heading: str, top: Sequence[UIElement], sections
     document.title = heading
     document.template = _text("page.html.jinja")
     document.template_variables.update(
-        heading=heading, page_css=_text("page.css"), top=[part.name for part in top], sections=list(sections)
+        heading=escape(heading), page_css=_text("page.css"), top=[part.name for part in top], sections=list(sections)
     )
 
 

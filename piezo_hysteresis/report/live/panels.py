@@ -7,12 +7,19 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from html import escape
 
+import numpy as np
+
 from ...errors import printable
-from ..words import nanometre
-from .axis_state import OK, SILENT, STALE, Alarm, AxisState, Status
+from ..figures.comparison import ModelComparison
+from ..words import duration, nanometre
+from .axis_state import OK, SILENT, STALE, WARN, Alarm, AxisState, Status
 
 LEVELS = ("ok", "warn", "error", "stale")
 """Words of the levels of a status, which are also the names of their styles."""
+
+
+_NEWEST = 0.5
+"""Age up to which a sample with its prediction counts as the newest [s]."""
 
 
 def badge(level: int, word: str = "") -> str:
@@ -30,14 +37,16 @@ def state(axis: AxisState, noise: float | None) -> str:
     noise : float or None
         RMS noise of the sensor [m].
     """
-    newest = axis.window.newest(2.0 * axis.window.sample_period)
+    newest = axis.window.newest(_NEWEST)
     numbers: list[tuple[str, str, str]] = [("phase", "phase", escape(printable(axis.phase)) or "—")]
     if newest.size:
+        predicted = np.flatnonzero(np.isfinite(newest.prediction))
+        k = int(predicted[-1]) if predicted.size else newest.size - 1  # all numbers are those of one sample
         numbers += [
-            ("voltage", "drive voltage", f"{newest.voltage[-1]:.3f} V"),
-            ("displacement", "displacement", _micrometre(newest.displacement[-1])),
-            ("prediction", "predicted", _micrometre(_last_finite(newest.prediction))),
-            ("residual", "residual", _length(_last_finite(newest.residual))),
+            ("voltage", "drive voltage", f"{newest.voltage[k]:.3f} V"),
+            ("displacement", "displacement", _micrometre(newest.displacement[k])),
+            ("prediction", "predicted", _micrometre(newest.prediction[k])),
+            ("residual", "residual", _length(newest.residual[k])),
         ]
     numbers += [
         ("residual_rms", "residual, RMS", _length(axis.residual_rms)),
@@ -153,6 +162,47 @@ def _short(model_hash: str) -> str:
     return model_hash.removeprefix("sha256:")[:12]
 
 
+def record(comparison: ModelComparison, index: int, words: str) -> str:
+    """One phase of a recording: its size, its noise, and the free-run error of the model.
+
+    Parameters
+    ----------
+    comparison : ModelComparison
+        The recording.
+    index : int
+        Number of the phase.
+    words : str
+        Its size.
+    """
+    now = comparison.now
+    numbers = [("noise of the sensor", _length(float(comparison.noise[index])))]
+    if now is not None:
+        row = now.rows[index]
+        numbers += [("residual, RMS", _length(row.rms)), ("of the range", f"{row.percent:.3g} %")]
+        numbers.append(("largest residual", _length(row.largest)))
+    cells = "".join(f"<div><dt>{label}</dt><dd>{text}</dd></div>" for label, text in numbers)
+    notices = "".join(f"<p>{badge(WARN, 'data')} {escape(n.message)}</p>" for n in comparison.experiment.notices)
+    return f"<p>{escape(words)}</p><dl>{cells}</dl>{notices}"
+
+
+def records(comparison: ModelComparison) -> str:
+    """All phases of a recording."""
+    now = comparison.now
+    rows = [
+        _row(
+            str(k + 1),
+            escape(one.phase),
+            duration(one.duration),
+            duration(one.sample_period),
+            _length(float(comparison.floors[k])),
+            "—" if now is None else _length(now.rows[k].rms),
+        )
+        for k, one in enumerate(comparison.experiment)
+    ]
+    head = "<tr><th></th><th>phase</th><th>duration</th><th>sample period</th><th>floor</th><th>residual, RMS</th></tr>"
+    return _table([head, *rows])
+
+
 def _row(*cells: str) -> str:
     return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
@@ -177,10 +227,6 @@ def _number(text: str) -> float:
         return float(text)
     except ValueError:
         return math.nan
-
-
-def _last_finite(values: Iterable[float]) -> float | None:
-    return next((float(v) for v in reversed(list(values)) if math.isfinite(v)), None)
 
 
 def _micrometre(metres: float | None) -> str:

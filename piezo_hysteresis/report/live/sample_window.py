@@ -13,6 +13,9 @@ Array = NDArray[np.float64]
 CAPACITY = 1 << 19
 """Samples that are kept: 10 s at 50 kHz, in 21 MB."""
 
+_MOST_EARLY = 100
+"""Blocks of predictions that wait for their samples."""
+
 _TURN = 1 << 32
 """The running number of a sample is counted modulo this."""
 
@@ -80,6 +83,7 @@ class SampleWindow:
         self._period = 0.0
         self._end = 0
         self._filled = 0
+        self._early: list[tuple[NDArray[np.uint32], Array]] = []
         self.received = 0
 
     def add(self, index: NDArray[np.uint32], time: Array, voltage: Array, displacement: Array) -> None:
@@ -115,9 +119,14 @@ class SampleWindow:
             self._write(self._end - size, values[:, -size:])
             self._filled = min(self._filled + step + size, self._capacity)
             self.received += int(index.size)
+            early, self._early = self._early, []
+            for block in early:
+                self._place(*block)
 
     def add_prediction(self, index: NDArray[np.uint32], prediction: Array) -> None:
-        """Take the predictions of samples; those that the window does not hold are left out.
+        """Take the predictions of samples; those of samples that the window does not hold any more are left out.
+
+        Two topics keep no common order: predictions that come before their samples wait for them.
 
         Parameters
         ----------
@@ -127,12 +136,14 @@ class SampleWindow:
             Free-run prediction [m].
         """
         with self._lock:
-            back = (self._end - int(index[0])) % _TURN
-            if back > self._filled:
-                return
-            size = min(index.size, back)
-            places = (int(index[0]) + np.arange(size)) % self._capacity
-            self._rows[3, places] = prediction[:size]
+            self._place(index, prediction)
+
+    def _place(self, index: NDArray[np.uint32], prediction: Array) -> None:
+        if (int(index[-1]) + 1 - self._end) % _TURN in range(1, self._capacity):
+            self._early = [*self._early[1 - _MOST_EARLY :], (index, prediction)]
+        elif (self._end - int(index[0])) % _TURN <= self._filled:
+            places = (int(index[0]) + np.arange(index.size)) % self._capacity
+            self._rows[3, places] = prediction
 
     def _write(self, start: int, values: Array) -> None:
         start %= self._capacity

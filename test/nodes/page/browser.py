@@ -19,10 +19,17 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 """Path of the browser; None where there is none."""
 
-PATIENCE = 30.0
+PATIENCE = 60.0
 """Longest wait for something on the page [s]."""
 
-OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0", "--no-first-run")
+OPTIONS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--remote-debugging-port=0",
+    "--no-first-run",
+    "--hide-scrollbars",
+)
 
 ALL = """(() => { const found = [];
   const walk = node => { for (const child of node.querySelectorAll('*')) {

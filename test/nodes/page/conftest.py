@@ -1,6 +1,8 @@
 """One browser for all tests of a file; they are skipped where there is none."""
 
+import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -16,3 +18,9 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield browser
     finally:
         browser.close()
+
+
+@pytest.fixture
+def pictures(tmp_path: Path) -> Path:
+    """Folder for pictures of the page; that of the environment variable PAGE_PICTURES where it is set."""
+    return Path(os.environ.get("PAGE_PICTURES", tmp_path))

@@ -23,16 +23,19 @@ pytestmark = pytest.mark.nodes
 ROOT = Path(__file__).parents[3]
 PERIOD = 2e-5
 AXIS = "/stage_x"
+ROOM = {"FASTDDS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "large_blocks.xml")}
+"""Without room for a second of blocks, a reader that is killed costs the others blocks: docs/live_page.md."""
 
 
 @pytest.fixture(scope="module")
 def nodes(shared_lab, browser):
     """The nodes of an axis that is driven, and the page of it, open."""
     lab = shared_lab
-    lab.driver(namespace=AXIS)
-    lab.start("model_node", namespace=AXIS, model_file=str(ROOT / "config" / "published_stage.yaml"))
-    lab.start("identification_node", namespace=AXIS, experiment_root=str(lab.folder / "experiments"))
-    page = lab.start("page_node", port=0)
+    lab.driver(namespace=AXIS, environment=ROOM)
+    lab.start("model_node", namespace=AXIS, model_file=str(ROOT / "config" / "published_stage.yaml"), environment=ROOM)
+    lab.start("identification_node", namespace=AXIS, experiment_root=str(lab.folder / "experiments"), environment=ROOM)
+    lab.others = list(lab.processes)
+    page = lab.start("page_node", port=0, environment=ROOM)
     url = lab.wait(lambda: re.search(r"http://127\.0\.0\.1:\d+/", page.output), "the address of the page").group()
     lab.page = page
     lab.measured = lab.samples(f"{AXIS}/samples")
@@ -55,6 +58,7 @@ def test_the_page_draws_the_loop_and_its_points_are_those_of_the_topics(nodes, b
     scan(nodes)
     browser.wait(lambda: "scan" in browser.text("phase"), "the phase 'scan'")
     browser.wait(lambda: max(browser.source("loop").get("voltage") or [0], key=abs) > 7.9, "the loop")
+    browser.wait(lambda: known_share(browser.source("loop")["predicted"]) > 0.9, "the prediction")
     browser.click("Pause")
     seen = nodes.measured.so_far()
     drawn = {name: np.array(values, dtype=float) for name, values in browser.source("loop").items()}
@@ -66,9 +70,18 @@ def test_the_page_draws_the_loop_and_its_points_are_those_of_the_topics(nodes, b
     clouds = [from_cloud(cloud, PREDICTED_SAMPLES) for cloud in nodes.predicted]
     said = {(1e6 * y, 1e6 * p) for c in clouds for y, p in zip(c["displacement"], c["prediction"], strict=True)}
     known = np.isfinite(drawn["predicted"])
-    assert known.sum() > 0.9 * real.sum()
+    assert known.sum() > 0.5 * real.sum()
     assert set(zip(drawn["measured"][known], drawn["predicted"][known], strict=True)) <= said
     browser.click("Pause")
+
+
+def test_the_page_fits_screens_telephones_and_paper(nodes, browser, pictures):
+    for width in (1200, 420):
+        browser.size(width, 900)
+        browser.wait(lambda w=width: browser.value("document.scrollingElement.scrollWidth") <= w, f"{width} px")
+        assert browser.picture(pictures / f"live_page_{width}.png").stat().st_size > 20_000
+    browser.size(1200, 1000)
+    assert browser.print(pictures / "live_page.pdf").stat().st_size > 20_000
 
 
 def test_stop_stops_and_raises_an_alarm_and_release_asks_first(nodes, browser):
@@ -83,6 +96,11 @@ def test_stop_stops_and_raises_an_alarm_and_release_asks_first(nodes, browser):
     browser.click("Release")
     browser.wait(lambda: "stopped" not in browser.text("driver"), "the end of the stop")
     assert values_of(driver_report(nodes))["stopped"] == "False"
+
+
+def known_share(values):
+    """Share of numbers that are none of NaN."""
+    return np.isfinite(np.array(values, dtype=float)).mean()
 
 
 def driver_report(lab):
@@ -112,17 +130,17 @@ def test_a_change_of_the_stage_appears(nodes, browser):
     browser.wait(lambda: "has changed: gain" in browser.text("change"), "the change")
 
 
-def test_the_page_fits_a_telephone(nodes, browser):
-    browser.size(420, 900)
-    browser.wait(lambda: browser.value("document.scrollingElement.scrollWidth") <= 420, "a page of 420 px")
-    browser.size(1200, 1000)
-
-
-def test_a_killed_page_disturbs_nobody(nodes, browser):
+@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGKILL])
+def test_a_page_that_ends_disturbs_nobody(nodes, browser, ending):
+    if not nodes.page.is_running:
+        known = nodes.node.get_subscriptions_info_by_topic
+        nodes.page = nodes.start("page_node", port=0, environment=ROOM)
+        nodes.wait(lambda: "found the axis" in nodes.page.output, "the page's axis")
+        nodes.wait(lambda: "page_node" in {i.node_name for i in known(f"{AXIS}/samples")}, "its subscription")
     before = nodes.measured.lost
-    nodes.page.signal(signal.SIGKILL)
+    nodes.page.signal(ending)
     nodes.page.wait()
-    at = nodes.measured.place()[-1]
-    nodes.wait(lambda: nodes.measured.place()[-1] > at + 50_000, "one second more of samples")
+    count = len(nodes.measured.blocks)
+    nodes.wait(lambda: len(nodes.measured.blocks) > count + 200, "two seconds more of samples")
     assert nodes.measured.lost == before
-    assert all(process.is_running for process in nodes.processes if process is not nodes.page)
+    assert all(process.is_running for process in nodes.others)

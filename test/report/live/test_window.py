@@ -48,6 +48,14 @@ def test_lost_samples_are_a_gap_and_a_restart_begins_anew():
     np.testing.assert_array_equal(window.newest(1.0).voltage, np.arange(5))
 
 
+def test_predictions_that_come_before_their_samples_wait_for_them():
+    window = SampleWindow(64)
+    add(window, 100, 10)
+    window.add_prediction(np.arange(110, 120, dtype=np.uint32), 3.0 * np.arange(110, 120))
+    add(window, 110, 10, predicted=False)
+    np.testing.assert_array_equal(window.newest(1.0).prediction, 3.0 * np.arange(100, 120))
+
+
 def test_late_and_unknown_predictions_change_nothing():
     window = SampleWindow(64)
     add(window, 100, 10, predicted=False)

@@ -1,0 +1,49 @@
+"""Show an experiment in the browser: loops, displacement, residual and spectrum, with zoom into every sample."""
+
+from __future__ import annotations
+
+import argparse
+import webbrowser
+from contextlib import suppress
+from pathlib import Path
+
+from ..model import model_file
+from ..report.figures.comparison import compare
+from .options import reading_options
+from .terminal import console, show_notices
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("view", description=__doc__)
+    reading_options.add_arguments(parser)
+    parser.add_argument("--model", metavar="FILE", help="model file whose prediction is drawn")
+    parser.add_argument("--port", type=int, default=0, help="port on 127.0.0.1 (default: a free one)")
+    parser.add_argument("--no-browser", action="store_true", help="only print the address")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve the page until Ctrl-C; returns 0.
+
+    Raises
+    ------
+    PiezoError
+        On files that cannot be read, or a port that is taken.
+    """
+    from ..report.live.recording_page import RecordingPage
+    from ..report.live.server import PageServer
+
+    models = {} if args.model is None else {Path(args.model).stem: model_file.load(args.model)}
+    experiment = reading_options.read(args)
+    comparison = compare(experiment, models)
+    title = f"Recording {', '.join(Path(path).name for path in args.experiment)}"
+    server = PageServer(lambda document: RecordingPage(document, comparison, title), port=args.port)
+    show_notices(experiment.notices)
+    console().print(f"open {server.url} in a browser; Ctrl-C ends the server")
+    if not args.no_browser:
+        webbrowser.open(server.url)
+    with suppress(KeyboardInterrupt):
+        server.wait()
+    server.close()
+    return 0

@@ -1,0 +1,71 @@
+"""`RecordingPage`: one view of a recording in one browser window, with zoom into every sample."""
+
+from __future__ import annotations
+
+import numpy as np
+from bokeh.document import Document
+from bokeh.models import Select
+
+from ..figures.comparison import ModelComparison
+from ..words import duration
+from . import panels
+from .figures import WindowFigures
+from .layout import Section, lay_out, panel_styles, text_panel
+from .live_page import TICK
+from .sample_window import Window
+
+
+class RecordingPage:
+    """Draws one phase of an experiment; what is shown follows the zoom of the time axes.
+
+    Parameters
+    ----------
+    document : bokeh Document
+        Of one browser window.
+    comparison : ModelComparison
+        The experiment, and the model held against it, if there is one.
+    title : str
+        Heading of the page.
+    """
+
+    def __init__(self, document: Document, comparison: ModelComparison, title: str) -> None:
+        self._comparison = comparison
+        names = [f"{k} {record.phase}" for k, record in enumerate(comparison.experiment, 1)]
+        self._phase = Select(name="phase", title="", options=names, value=names[0], width=180)
+        self._phase.on_change("value", lambda attribute, old, new: self._chosen())
+        self._figures = WindowFigures("time since the beginning of the phase [s]")
+        styles = panel_styles()
+        self._state, self._records = text_panel("state", styles), text_panel("records", styles)
+        self._records.text = panels.records(comparison)
+        figures = self._figures
+        lay_out(
+            document,
+            title,
+            (self._phase,),
+            (
+                Section(self._state),
+                *(Section(drawn, classes="half figure") for drawn in figures.all),
+                Section(self._records, "Phases"),
+            ),
+        )
+        self._chosen()
+        document.add_periodic_callback(self._tick, TICK)
+
+    def _chosen(self) -> None:
+        index = self._phase.options.index(self._phase.value)
+        record, now = self._comparison.experiment[index], self._comparison.now
+        predicted = np.full(record.size, np.nan) if now is None else now.predicted[index]
+        time = record.sample_period * np.arange(record.size, dtype=np.float64)
+        self._window = Window(time, record.voltage, record.displacement, predicted, record.sample_period)
+        self._noise = float(self._comparison.noise[index])
+        self._figures.span(0.0, float(time[-1]) or record.sample_period)
+        self._figures.draw_spectrum(self._window, self._noise)
+        self._drawn: tuple[float, float] | None = None
+        words = f"{record.size} samples every {duration(record.sample_period)}, {duration(record.duration)}"
+        self._state.text = panels.record(self._comparison, index, words)
+        self._tick()
+
+    def _tick(self) -> None:
+        if self._figures.shown != self._drawn:
+            self._drawn = self._figures.shown
+            self._figures.draw(self._window, 0.0, self._noise, None)
