@@ -19,6 +19,8 @@ PACKAGE = ROOT / "piezo_hysteresis"
 """The Python package."""
 MOST_MODULES = 15
 """Modules in a folder of the package at most, `__init__.py` aside."""
+FULLER = {"piezo_hysteresis/cli": 18}
+"""Folders that hold more, and how many: every subcommand of `piezo` is a module of its own."""
 MOST_LINES = 250
 """Lines of a module of the package at most."""
 LONGER = {
@@ -63,8 +65,10 @@ def full_folders(paths: list[Path]) -> Iterator[str]:
     for path in paths:
         counts[path.parent] += path.name != "__init__.py"
     for folder, count in counts.items():
-        if count > MOST_MODULES:
-            yield f"{folder.relative_to(ROOT)} holds {count} modules, expected at most {MOST_MODULES}; group them"
+        name = str(folder.relative_to(ROOT))
+        most = FULLER.get(name, MOST_MODULES)
+        if count > most:
+            yield f"{name} holds {count} modules, expected at most {most}; group them"
 
 
 def long_files(paths: list[Path]) -> Iterator[str]:

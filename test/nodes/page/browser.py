@@ -63,11 +63,10 @@ class Browser:
 
     def close(self) -> None:
         """End the browser."""
-        self._socket.close()
+        self._loop.run_until_complete(_closed(self._socket))
+        self._loop.close()
         self._process.terminate()
         self._process.wait(PATIENCE)
-        self._loop.run_until_complete(asyncio.sleep(0))
-        self._loop.close()
 
     def do(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Result of one command of the protocol."""
@@ -154,6 +153,12 @@ class Browser:
 
 async def _connected(target: dict[str, Any]) -> WebSocketClientConnection:
     return await websocket_connect(target["webSocketDebuggerUrl"], max_message_size=1 << 28)
+
+
+async def _closed(socket: WebSocketClientConnection) -> None:
+    socket.close()
+    while await asyncio.wait_for(socket.read_message(), PATIENCE) is not None:
+        pass
 
 
 def _port(profile: Path) -> int:
