@@ -62,14 +62,15 @@ def test_a_record_is_cut_by_what_its_drive_does():
     assert all(p.record.continues for p in pieces[1:])
 
 
-@pytest.mark.parametrize("frequency", [1040.0, 1400.0])
-def test_a_fast_mode_is_resolved_up_to_near_half_the_sampling_rate(frequency):
+@pytest.mark.parametrize(("frequency", "percent"), [(1040.0, 0.3), (1400.0, 0.6)])
+def test_a_fast_mode_is_resolved_up_to_near_half_the_sampling_rate(frequency, percent):
+    """Half the sampling rate is 1667 Hz: the nearer the mode, the less of its form is left in the samples."""
     fast = Nanopositioner(mode=frequency, delay=2e-4, pole=2e-4)
     records = [fast.play(growing_sine(f, 3e-4, (0.5, 1.0), hold=0.2), 3e-4, f"sine_{f:g}hz") for f in (2.0, 100.0)]
     model = identify(Experiment(tuple(records)), memory=True).model
     assert model[ExtraResonance.name]["f0"] == pytest.approx(frequency, rel=0.01)
     unseen = Experiment((fast.play(growing_sine(40.0, 3e-4, (0.5, 1.0), hold=0.2), 3e-4, "sine_40hz"),))
-    assert max(percents(model, unseen)) < 0.3
+    assert max(percents(model, unseen)) < percent
 
 
 def test_a_gain_that_rises_with_the_frequency_shows_a_mode_without_a_step():
