@@ -10,10 +10,12 @@ from ..identification.identification import Identification
 from ..identification.identify import identify
 from ..identification.records.roles import HELD_OUT
 from ..model import model_file
+from ..model.axes_samples import has_several_drives
 from ..report.json_file import write_json
 from ..report.tables.parameter_table import correlation_table, parameter_table
 from ..report.tables.table import Table
 from ..report.words import error_sentence
+from . import several_axes
 from .options import reading_options
 from .options.destination import add_force, require_new_file
 from .terminal import console, progress, show, show_notices
@@ -33,6 +35,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--choose-orders", action="store_true", help="choose the lowest orders that predict as well as any"
+    )
+    parser.add_argument(
+        "--taps", metavar="N", type=int, help="several axes: length of every impulse response (default: 250)"
     )
     operator = parser.add_mutually_exclusive_group()
     operator.add_argument(
@@ -75,6 +80,8 @@ def run(args: argparse.Namespace) -> int:
     require_new_file("-o", args.output, args.force)
     require_new_file("--json", args.json, args.force)
     experiment = reading_options.read(args)
+    if has_several_drives(experiment):
+        return several_axes.identify(experiment, args)
     orders = None if args.choose_orders else tuple(args.orders or (8, 8))
     with progress("identify", f"{experiment.size} samples; this usually takes {USUAL_TIME}") as report_progress:
         found = identify(

@@ -19,6 +19,7 @@ from ..report.json_file import write_json
 from ..report.tables.error_table import error_table, frequency_table
 from ..report.tables.table import Table
 from ..report.words import error_sentence
+from . import several_axes
 from .options import reading_options
 from .options.destination import add_force, require_new_file, require_new_folder
 from .terminal import console, show, show_notices
@@ -27,7 +28,7 @@ from .terminal import console, show, show_notices
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
     parser = subparsers.add_parser("validate", description=__doc__)
-    parser.add_argument("model", metavar="MODEL", help="model file")
+    parser.add_argument("model", metavar="MODEL", help="model file; .npz for several axes")
     reading_options.add_arguments(parser)
     parser.add_argument(
         "--one-zero", action="store_true", help="one sensor zero for all phases instead of one for each"
@@ -48,6 +49,8 @@ def run(args: argparse.Namespace) -> int:
     """
     require_new_file("--json", args.json, args.force)
     require_new_folder("--figures", args.figures, args.force)
+    if Path(args.model).suffix == ".npz":
+        return several_axes.validate(reading_options.read(args), args)
     model = model_file.load(args.model)
     experiment, conditioned = known_from_within(reading_options.read(args))
     nuisances = None if args.one_zero else {"error": zero_per_phase(model)}

@@ -1,0 +1,62 @@
+"""Kernel of a stage with several axes: responses to all drives, corrected by hysteresis of the elongations."""
+
+from __future__ import annotations
+
+import math
+
+from .kernel import kernel
+
+
+@kernel
+def coupled_axes(u, taps, elongation, radii, decay, reference, power, history, plays, y):
+    """Displacements of one block; `power`, `history` and `plays` are the state and are changed in place.
+
+    Parameters
+    ----------
+    u : (n, m) array
+        Drive voltages [V].
+    taps : (s, p, l, f) array
+        Impulse responses of every pass, the oldest sample first, f = m (3 + r).
+    elongation : (m, p) array
+        From displacements to the elongations of the actuators in volts of drive [V/m].
+    radii : (r,) array
+        Half widths of the play operators [V].
+    decay, reference : float
+        Of the running mean square per sample [1], and the level at which the amplitude is 1 [V].
+    power : (1,) array
+        Running mean square of the drives [V²].
+    history : (s, l - 1 + n, f) array
+        Regressors; the first l - 1 rows of every pass come from the block before.
+    plays : (s, m, r) array
+        Play operators of every pass [V].
+    y : (n, p) array
+        Displacements of the last pass [m], the result.
+    """
+    passes, outputs, length, _ = taps.shape
+    inputs = u.shape[1]
+    for k in range(u.shape[0]):
+        square = 0.0
+        for i in range(inputs):
+            square += u[k, i] * u[k, i]
+        power[0] += (1.0 - decay) * (square / inputs - power[0])
+        amplitude = math.sqrt(power[0]) / reference
+        for s in range(passes):
+            row = history[s, k + length - 1]
+            for i in range(inputs):
+                row[i] = u[k, i]
+                row[inputs + i] = amplitude * u[k, i]
+                row[2 * inputs + i] = amplitude * amplitude * u[k, i]
+                if s > 0:
+                    z = 0.0
+                    for o in range(outputs):
+                        z += elongation[i, o] * y[k, o]
+                    for r in range(radii.size):
+                        plays[s, i, r] = min(max(plays[s, i, r], z - radii[r]), z + radii[r])
+                        row[(3 + r) * inputs + i] = plays[s, i, r]
+            used = row.size if s > 0 else 3 * inputs
+            for o in range(outputs):
+                total = 0.0
+                for j in range(length):
+                    for f in range(used):
+                        total += taps[s, o, j, f] * history[s, k + j, f]
+                y[k, o] = total

@@ -1,0 +1,66 @@
+"""What `piezo identify` and `piezo validate` do with records of several drive voltages."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import IdentificationError, ModelError
+from ..identification.identify_axes import LENGTH, AxisError, axes_errors, identify_axes
+from ..identification.records.roles import HELD_OUT
+from ..model import axes_file
+from ..record import Experiment, Record
+from ..report.json_file import write_json
+from ..report.tables.table import Table
+from .terminal import console, show, show_notices
+
+
+def identify(experiment: Experiment, args: argparse.Namespace) -> int:
+    """Fit a model of several axes, print its errors and save it; returns 0.
+
+    Raises
+    ------
+    PiezoError
+        On an output that does not end in .npz, or data that do not determine the model.
+    """
+    path = Path("model.npz" if args.output == "model.yaml" else args.output)
+    if path.suffix != ".npz":
+        raise ModelError(f"{path}: a model of several axes is an NPZ file; give -o a name that ends in .npz")
+    judges = experiment.named(*(HELD_OUT if args.held_out is None else args.held_out))
+    fitted = [record for record in experiment if record not in judges]
+    if not fitted:
+        raise IdentificationError("every phase is held out, expected at least one to fit")
+    model = identify_axes(fitted, length=LENGTH if args.taps is None else args.taps)
+    axes_file.save(model, path)
+    _show(axes_errors(model, judges or fitted), "not fitted" if judges else "fitted", args.json)
+    show_notices(experiment.notices)
+    console().print(f"wrote {path}")
+    return 0
+
+
+def validate(experiment: Experiment, args: argparse.Namespace) -> int:
+    """Print the free-run errors of a model of several axes; returns 0.
+
+    Raises
+    ------
+    PiezoError
+        On a model or records that cannot be used, or that do not fit each other.
+    """
+    records: Sequence[Record] = experiment.records
+    _show(axes_errors(axes_file.load(args.model), records), "", args.json)
+    show_notices(experiment.notices)
+    return 0
+
+
+def _show(errors: Sequence[AxisError], data: str, json: str | None) -> None:
+    if json is not None:
+        entries = [
+            {"phase": e.phase, "displacement": e.displacement, "rms_m": e.rms, "percent_of_range": e.percent}
+            for e in errors
+        ]
+        write_json(json, {"schema": 1, "errors": entries})
+    rows = tuple((e.phase, e.displacement, f"{e.percent:.3f}", f"{1e9 * e.rms:.1f}") for e in errors)
+    note = "Predicted from the voltages alone; one sensor zero free per phase and displacement."
+    title = f"Free-run error of several axes{', data ' + data if data else ''}"
+    show(Table(title, ("phase", "displacement", "% of range", "nm"), rows, note, frozenset({2, 3})))

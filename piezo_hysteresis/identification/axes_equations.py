@@ -1,0 +1,112 @@
+"""Least squares for impulse responses of several inputs and outputs, from records of any length."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import IdentificationError
+
+Array = NDArray[np.float64]
+
+RIDGE = 1e-6
+"""Share of the diagonal that is added to it, for bands that the drives leave out."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Regression:
+    """What one record contributes.
+
+    Parameters
+    ----------
+    x : (n, f) array
+        Regressors; zero before the first row.
+    y : (n, p) array
+        Measured displacements [m].
+    first : int
+        First row that is fitted.
+    weight : float
+        Factor of its squared errors.
+    """
+
+    x: Array
+    y: Array
+    first: int = 0
+    weight: float = 1.0
+
+
+def impulse_responses(regressions: Iterable[Regression], length: int) -> tuple[Array, Array]:
+    """Impulse responses h and zeros c with y(k) ≈ c + Σₗ h(l) x(k − l); the zero is free in every record.
+
+    Parameters
+    ----------
+    regressions : iterable of Regression
+        All with the same numbers of columns.
+    length : int
+        Number of lags, 1 or more.
+
+    Returns
+    -------
+    h : (p, length, f) ndarray
+        The oldest sample first.
+    c : (p,) ndarray
+        Weighted mean of the zeros of the records [m].
+
+    Raises
+    ------
+    IdentificationError
+        If the records hold fewer samples than unknowns, or do not determine them.
+    """
+    from scipy.linalg import LinAlgError, solve
+
+    parts = list(regressions)
+    terms, outputs = parts[0].x.shape[1], parts[0].y.shape[1]
+    available = sum(max(0, len(part.x) - part.first) for part in parts)
+    if available < length * terms:
+        raise IdentificationError(
+            f"got {available} samples for {length * terms} taps per displacement, expected more; "
+            "record longer or identify with fewer taps"
+        )
+    matrix = np.zeros((length, terms, length, terms))
+    right = np.zeros((length, terms, outputs))
+    edges, signs, means, sizes, levels = [], [], [], [], []
+    for part in parts:
+        n = len(part.x) - part.first
+        if n <= 0:
+            continue
+        padded = np.concatenate((np.zeros((length, terms)), part.x))
+        begin, end = length + part.first, len(padded)
+        total = np.zeros((length, terms))
+        for lag in range(length):
+            late = padded[begin - lag : end - lag]
+            matrix[0, :, lag] += part.weight * (padded[begin:].T @ late)
+            right[lag] += part.weight * (late.T @ part.y[part.first :])
+            total[lag] = late.sum(axis=0)
+        for last, sign in ((begin, part.weight), (end, -part.weight)):
+            edges.append(padded[last - length : last][::-1])
+            signs.append(sign)
+        means.append(total / n)
+        levels.append(part.y[part.first :].mean(axis=0))
+        sizes.append(part.weight * n)
+    edge, edge_weight = np.array(edges), np.array(signs)
+    for lag in range(length - 1):  # a shift by one sample adds a row at the beginning and drops one at the end
+        ends = np.tensordot(edge_weight[:, None] * edge[:, lag], edge[:, : length - 1], axes=(0, 0))
+        matrix[lag + 1, :, 0] = matrix[0, :, lag + 1].T
+        matrix[lag + 1, :, 1:] = matrix[lag, :, :-1] + ends
+    flat, target = matrix.reshape(length * terms, -1), right.reshape(length * terms, outputs)
+    mean, size, level = np.array(means).reshape(len(means), -1), np.array(sizes), np.array(levels)
+    flat -= (mean.T * size) @ mean  # the zero of every record is projected out
+    target -= (mean.T * size) @ level
+    flat[np.diag_indices(len(flat))] *= 1.0 + RIDGE
+    try:
+        h = solve(flat, target, assume_a="pos", overwrite_a=True)
+    except LinAlgError:
+        raise IdentificationError(
+            "the drives do not determine the responses: got drives that repeat one another or stand still, "
+            "expected independent noise or multisines on all of them"
+        ) from None
+    zeros = np.average(level - mean @ h, axis=0, weights=size)
+    return h.reshape(length, terms, outputs)[::-1].transpose(2, 0, 1).copy(), zeros

@@ -1,0 +1,173 @@
+"""`identify_axes`: a full matrix of dynamics with a hysteresis for every actuator, from records of several axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import IdentificationError
+from ..model.axes_model import LINEAR_TERMS, AxesModel
+from ..model.axes_samples import columns, names
+from ..record import Record
+from .axes_equations import Regression, impulse_responses
+
+Array = NDArray[np.float64]
+
+LENGTH = 250
+"""Taps of every response."""
+PASSES = 3
+"""The linear pass, and two with hysteresis; another one gains about 1 % of the error."""
+RADII = (0.05, 0.2, 0.8)
+"""Half widths of the play operators, in units of the rms elongation."""
+MEMORY = 0.05
+"""Time constant of the running mean square [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisError:
+    """Free-run error of one displacement in one record.
+
+    Parameters
+    ----------
+    phase : str
+        Of the record.
+    displacement : str
+        Name of the channel.
+    rms : float
+        Error about its mean [m].
+    percent : float
+        Of the peak-to-peak displacement in the same samples.
+    """
+
+    phase: str
+    displacement: str
+    rms: float
+    percent: float
+
+
+def fitted_from(record: Record, settling: int) -> int:
+    """First sample that counts: 0 where the record begins at 0 V, behind the settling elsewhere."""
+    return settling if record.truncated or record.continues else 0
+
+
+def identify_axes(
+    records: Sequence[Record],
+    length: int = LENGTH,
+    radii: Sequence[float] = RADII,
+    passes: int = PASSES,
+    progress: Callable[[str], None] | None = None,
+) -> AxesModel:
+    """Fit the taps of one pass after the other by linear least squares on the prediction of the pass before.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        With ``voltage_2``, ``displacement_2``, … in their channels, at one sample period. A record begins at rest at
+        0 V, unless it is `truncated` or `continues`; then its beginning only brings the model into its state.
+    length : int
+        Taps of every response.
+    radii : sequence of float
+        Half widths of the plays in units of the rms elongation.
+    passes : int
+        1 for no hysteresis.
+    progress : callable, optional
+        Receives a line before every pass.
+
+    Returns
+    -------
+    AxesModel
+        Simulated from the voltages alone.
+
+    Raises
+    ------
+    IdentificationError
+        If the records have other channels or periods than the first, or do not determine the taps.
+    """
+    if length < 1 or passes < 1:
+        raise IdentificationError(f"got {length} taps and {passes} passes, expected 1 or more of each")
+    voltages, displacements = _checked(records)
+    inputs, outputs = voltages[0].shape[1], displacements[0].shape[1]
+    reference = float(np.sqrt(np.mean(np.concatenate(voltages) ** 2)))
+    if reference == 0.0:
+        raise IdentificationError("all drive voltages are 0 V, expected records with independent noise on every drive")
+    terms = inputs * (LINEAR_TERMS + len(radii))
+    model = AxesModel(
+        np.zeros((1, outputs, length, terms)), np.zeros((inputs, outputs)), np.zeros(len(radii)), np.zeros(outputs),
+        records[0].sample_period, reference, MEMORY,
+    )  # fmt: skip
+    spread = [max(float(y.std()), np.finfo(float).tiny) for y in displacements]
+    weights = [(min(spread) / s) ** 2 for s in spread]  # a record counts by its relative error
+    scales = np.asarray(radii, dtype=np.float64)
+    for number in range(passes):
+        if progress is not None:
+            progress(f"pass {number + 1} of {passes}")
+        used = LINEAR_TERMS * inputs if number == 0 else terms
+        settling = int(replace(model, taps=np.zeros((passes, *model.taps.shape[1:]))).settling)
+        parts = [
+            Regression(model.regressors(u)[:, :used], y, fitted_from(record, settling), weight)
+            for record, u, y, weight in zip(records, voltages, displacements, weights, strict=True)
+        ]
+        h, zero = impulse_responses(parts, length)
+        taps = model.taps.copy()
+        taps[-1, :, :, :used] = h
+        model = replace(model, taps=taps, zero=zero)
+        if number == 0:
+            static = taps[0].sum(axis=1)[:, : LINEAR_TERMS * inputs].reshape(outputs, LINEAR_TERMS, inputs).sum(axis=1)
+            elongation = np.linalg.pinv(static)
+            motions = [(y - y.mean(axis=0)) @ elongation.T for y in displacements]
+            size = float(np.sqrt(np.mean(np.concatenate(motions) ** 2)))
+            model = replace(model, elongation=elongation, radii=scales * size)
+        if number < passes - 1:
+            model = replace(model, taps=np.concatenate((model.taps, np.zeros((1, *model.taps.shape[1:])))))
+    return model
+
+
+def axes_errors(model: AxesModel, records: Sequence[Record]) -> list[AxisError]:
+    """Free-run error of every displacement of every record, behind the settling where a record begins in mid-run.
+
+    Raises
+    ------
+    IdentificationError
+        If a record has other channels or another sample period than the model, or ends before the model has settled.
+    """
+    found = []
+    for record, u, y in zip(records, *_checked(records), strict=True):
+        if (u.shape[1], y.shape[1]) != (model.inputs, model.outputs):
+            raise IdentificationError(
+                f"{record.phase}: got {u.shape[1]} drives and {y.shape[1]} displacements, "
+                f"expected {model.inputs} and {model.outputs} as the model has"
+            )
+        if not np.isclose(record.sample_period, model.sample_period, rtol=1e-3):
+            raise IdentificationError(
+                f"{record.phase}: got the sample period {record.sample_period:g} s, expected {model.sample_period:g} s"
+            )
+        first = fitted_from(record, model.settling)
+        if first >= len(y):
+            raise IdentificationError(
+                f"{record.phase}: got {len(y)} samples, expected more than {first}; record longer"
+            )
+        error = (y - model.run(u, model.rest())[0])[first:]
+        for name, e, measured in zip(names(record, "displacement"), error.T, y[first:].T, strict=True):
+            rms, reach = float(e.std()), float(np.ptp(measured))
+            found.append(AxisError(record.phase, name, rms, 100.0 * rms / reach if reach else float("inf")))
+    return found
+
+
+def _checked(records: Sequence[Record]) -> tuple[list[Array], list[Array]]:
+    first = records[0]
+    for record in records:
+        for quantity in ("voltage", "displacement"):
+            if names(record, quantity) != names(first, quantity):
+                raise IdentificationError(
+                    f"{record.phase}: got {', '.join(names(record, quantity))}, "
+                    f"expected {', '.join(names(first, quantity))} as in {first.phase}"
+                )
+        if not np.isclose(record.sample_period, first.sample_period, rtol=1e-3):
+            raise IdentificationError(
+                f"{record.phase}: got the sample period {record.sample_period:g} s, expected {first.sample_period:g} s "
+                "as in the first record; identify several axes at one period"
+            )
+    return [columns(r, "voltage") for r in records], [columns(r, "displacement") for r in records]

@@ -1,0 +1,45 @@
+"""The voltages and displacements of several axes in a record, in the order of their numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..record import Record
+
+_NUMBERED = re.compile(r"(voltage|displacement)_(\d+)")
+"""Channel of a further axis; other names, such as ``monitor_voltage``, are no axis."""
+
+
+def names(record: Record, quantity: str) -> tuple[str, ...]:
+    """Channels of one quantity, the first axis first.
+
+    Parameters
+    ----------
+    record : Record
+        With ``voltage_2``, ``displacement_2``, … in its channels.
+    quantity : str
+        ``"voltage"`` or ``"displacement"``.
+
+    Examples
+    --------
+    >>> r = Record([0.0], [0.0], 1.0, channels={"voltage_2": [1.0], "displacement_3": [0.0], "monitor_voltage": [0.0]})
+    >>> names(r, "voltage"), names(r, "displacement")
+    (('voltage', 'voltage_2'), ('displacement', 'displacement_3'))
+    """
+    found = [match for name in record.channels if (match := _NUMBERED.fullmatch(name)) and match[1] == quantity]
+    return (quantity, *(match[0] for match in sorted(found, key=lambda match: int(match[2]))))
+
+
+def columns(record: Record, quantity: str) -> NDArray[np.float64]:
+    """Samples of all axes, shape (n, axes) [V or m]."""
+    held = {"voltage": record.voltage, "displacement": record.displacement, **record.channels}
+    return np.column_stack([held[name] for name in names(record, quantity)])
+
+
+def has_several_drives(records: Iterable[Record]) -> bool:
+    """Whether any record holds more than one drive voltage."""
+    return any(len(names(record, "voltage")) > 1 for record in records)

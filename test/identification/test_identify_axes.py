@@ -1,0 +1,95 @@
+"""A plant of three axes, written here: a full matrix of gains behind a lag and a play in every actuator."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.cli.main import main
+from piezo_hysteresis.errors import IdentificationError, ModelError
+from piezo_hysteresis.identification.identify_axes import axes_errors, identify_axes
+from piezo_hysteresis.model import axes_file
+from piezo_hysteresis.model.axes_samples import columns
+from piezo_hysteresis.record import Record
+
+GAINS = 1e-6 * np.array([[-2.8, 1.5, -3.5], [0.5, -3.5, -4.0], [-3.5, -4.5, 1.7]])
+LAG, WIDTH, SHARE = 0.5, 0.05, 0.4
+
+
+def plant(seed, share=SHARE, size=3000):
+    u = 0.2 * np.random.default_rng(seed).standard_normal((size, 3))
+    x, h, y = np.zeros(3), np.zeros(3), np.empty((size, 3))
+    for k in range(size):
+        x = LAG * x + (1 - LAG) * u[k]
+        h = np.clip(h, x - WIDTH, x + WIDTH)
+        y[k] = GAINS @ (x + share * h)
+    others = {f"{q}_{i + 1}": a[:, i] for q, a in (("voltage", u), ("displacement", y)) for i in (1, 2)}
+    return Record(u[:, 0], y[:, 0], 1e-3, f"noise_{seed}", channels=others)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return identify_axes([plant(1), plant(2)], length=20)
+
+
+def test_the_planted_matrix_is_recovered():
+    found = identify_axes([plant(1, share=0.0)], length=20, passes=1)
+    assert np.allclose(np.linalg.inv(found.elongation), GAINS, atol=2e-3 * abs(GAINS).max())
+    assert max(e.percent for e in axes_errors(found, [plant(3, share=0.0)])) < 0.01
+
+
+def test_the_planted_loops_are_predicted_on_a_record_that_was_not_fitted(model):
+    linear = identify_axes([plant(1), plant(2)], length=20, passes=1)
+    left, left_linear = (sum(e.rms for e in axes_errors(m, [plant(3)])) for m in (model, linear))
+    assert left < 0.35 * left_linear
+
+
+def test_every_cutting_gives_the_same_bits(model):
+    u = columns(plant(3), "voltage")[:700]
+    whole, _ = model.run(u, model.rest())
+    state, parts = model.rest(), []
+    for block in np.split(u, [1, 2, 5, 30, 333]):
+        y, state = model.run(block, state)
+        parts.append(y)
+    assert np.array_equal(whole, np.concatenate(parts))
+
+
+def test_a_file_reads_back_bit_for_bit(model, tmp_path):
+    again = axes_file.load(axes_file.save(model, tmp_path / "m.npz"))
+    u = columns(plant(3), "voltage")
+    assert np.array_equal(again.run(u, again.rest())[0], model.run(u, model.rest())[0])
+
+
+def test_two_drives_move_three_displacements():
+    records = [plant(1), plant(2)]
+    two = [
+        Record(r.voltage, r.displacement, 1e-3, channels={n: v for n, v in r.channels.items() if n != "voltage_3"})
+        for r in records
+    ]
+    assert identify_axes(two, length=10).run(np.zeros((5, 2)), identify_axes(two, length=10).rest())[0].shape == (5, 3)
+
+
+def test_what_does_not_fit_is_refused(model, tmp_path):
+    with pytest.raises(IdentificationError, match="record longer"):
+        identify_axes([plant(1, size=100)])
+    with pytest.raises(ModelError, match="shape"):
+        model.run(np.zeros((5, 2)), model.rest())
+    with pytest.raises(ModelError, match=r"ends in \.npz"):
+        axes_file.save(model, tmp_path / "m.yaml")
+    (tmp_path / "broken.npz").write_bytes(b"PK")
+    with pytest.raises(ModelError, match="several axes"):
+        axes_file.load(tmp_path / "broken.npz")
+
+
+def test_the_command_identifies_and_validates_a_recording(tmp_path, capsys):
+    for seed in (1, 2):
+        r = plant(seed)
+        np.savez(
+            tmp_path / f"0{seed}_noise.npz",
+            voltage=r.voltage,
+            displacement=r.displacement,
+            sample_period=1e-3,
+            **r.channels,
+        )
+    files = [str(tmp_path / f"0{seed}_noise.npz") for seed in (1, 2)]
+    assert main(["identify", *files, "--taps", "20", "-o", str(tmp_path / "m.npz")]) == 0
+    assert main(["validate", str(tmp_path / "m.npz"), *files]) == 0
+    assert "displacement_3" in capsys.readouterr().out
