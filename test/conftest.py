@@ -1,9 +1,11 @@
-"""Two processes share the tests; all that start nodes go to one of them, and these the other core.
+"""Three processes share the tests; those that start nodes, which wait most of their time, go to two of them by file.
 
 Tests of real processes over DDS need the processor in time. One that fails is tried once more, and reported as RERUN: a
 promise that does not hold fails twice, a computer that was busy elsewhere does not. Nor does it fail a property: no
 example has a deadline.
 """
+
+from zlib import crc32
 
 import pytest
 from hypothesis import settings
@@ -17,6 +19,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         nodes = item.get_closest_marker("nodes") is not None
         device = item.get_closest_marker("device") is not None
-        item.add_marker(pytest.mark.xdist_group("nodes" if nodes or device else item.path.stem))
+        half = crc32(item.path.stem.encode()) % 2
+        item.add_marker(pytest.mark.xdist_group(f"nodes_{half}" if nodes or device else item.path.stem))
         if nodes:
             item.add_marker(pytest.mark.flaky(reruns=1))

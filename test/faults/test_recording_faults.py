@@ -162,7 +162,7 @@ def test_abort_of_a_run_whose_recording_has_gone_ends_no_node(running):
     ("options", "reason"),
     [
         ("size=1m", "No space left on device"),
-        ("nr_inodes=3", "No space left on device"),
+        ("nr_inodes=2", "No space left on device"),
         ("ro", "Read-only file system"),
     ],
     ids=["full", "no more files", "read-only"],

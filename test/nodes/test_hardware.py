@@ -88,7 +88,7 @@ def test_the_name_that_a_controller_gives_forges_no_line(lab):
         lab.wait(lambda: any(s.hardware_id for report in list(driven.reports) for s in report.status), "its name")
         named = {s.hardware_id for report in list(driven.reports) for s in report.status}
         assert all(name.isprintable() for name in named)
-        assert driven.samples.newest.stage.isprintable()
+        assert driven.samples.newest.frame.isprintable()
         assert "forged" in driven.process.output
         assert all(line.isprintable() for line in driven.process.output.split("\n"))
 

@@ -56,7 +56,7 @@ def false_alarm_threshold(directions: Array, interval: float, seed: int = 0) -> 
 
     Examples
     --------
-    >>> a, b = (threshold(np.eye(3), interval) for interval in (1e4, 1e6))
+    >>> a, b = (false_alarm_threshold(np.eye(3), interval) for interval in (1e4, 1e6))
     >>> 15 < a < b < 45
     True
     """

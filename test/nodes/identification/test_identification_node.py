@@ -136,7 +136,7 @@ def test_from_an_unknown_stage_to_a_live_model(lab):
         np.testing.assert_array_equal(one.displacement, other.displacement)
     assert not own.notices
 
-    assert identification.ask("diagnose").message == f"diagnosing {path}"
+    assert identification.ask("diagnose").message.startswith(f"diagnosing {path}; goal ")
     identification.await_state("fitting")
     reported = identification.await_state("done", "failed", timeout=240.0)
     assert reported.message.startswith("nothing_missing: "), reported.message
