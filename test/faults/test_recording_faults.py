@@ -158,6 +158,7 @@ def test_abort_of_a_run_whose_recording_has_gone_ends_no_node(running):
     assert identification.process.is_running
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(
     ("options", "reason"),
     [

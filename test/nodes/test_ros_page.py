@@ -79,7 +79,7 @@ def test_every_topic_is_published_as_documented(nodes):
         for node in topic.senders:
             documented[node]["/" + topic.name] = topic.type_name.replace("/msg/", "/")
     for node, topics in documented.items():
-        assert published(nodes, NODES[node]) == topics, node
+        nodes.wait(lambda node=node, topics=topics: published(nodes, NODES[node]) == topics, f"the topics of {node}")
 
 
 def test_quality_of_service_is_as_documented(nodes):

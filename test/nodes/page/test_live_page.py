@@ -110,6 +110,7 @@ def driver_report(lab):
 
 
 def test_identify_shows_the_plan_and_moves_nothing_before_it_is_confirmed(nodes, browser):
+    nodes.wait(lambda: nodes.measured.newest.voltage[-1] == 0.0, "the safe voltage")
     plan = nodes.call(Trigger, f"{AXIS}/identification_node/plan").message
     browser.click("Identify …")
     browser.wait(lambda: plan in browser.text("question"), "the plan")
