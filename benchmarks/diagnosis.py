@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.figures import Cell, Figures, alone
 from benchmarks.independent_plant import NATIVE, Plant
+from benchmarks.naming_cases import cases
 from benchmarks.naming_experiments import ReadOptions, rich
 from piezo_hysteresis.discrepancy import diagnose
 from piezo_hysteresis.effects import CATALOGUE, Creep, Effect
@@ -24,6 +25,8 @@ from piezo_hysteresis.record import Experiment
 
 USUAL, LONG, MEMORY = 10.0, 60.0, 4.0
 """Seconds for 150 000 samples, seconds for 8.75 million, GB for these."""
+HALF, NEARLY_ALL = 5.0, 20.0
+"""Processor time that half of the diagnoses, and 95 % of them, may take [s]."""
 
 
 class FullRate:
@@ -99,7 +102,22 @@ def run(options: argparse.Namespace) -> list[Figures]:
         ("effects", "s of one core", "answer"),
         [(count, *outcome) for count, outcome in zip(counts, times, strict=True)],
     )
-    return [samples, library]
+    return [samples, library, distribution()]
+
+
+def distribution() -> Figures:
+    """Processor time over stages with one effect and with none, all of another form than the catalogue."""
+    cost(next(cases(("quick",), 1)).experiment())
+    spent = np.array([cost(case.experiment())[0] for case in cases(("quick",), 1)])
+    half, most = np.quantile(spent, (0.5, 0.95)).tolist()
+    failures = [f"median {half:.1f} s, expected at most {HALF:g} s"] if half > HALF else []
+    failures += [f"95 % within {most:.1f} s, expected at most {NEARLY_ALL:g} s"] if most > NEARLY_ALL else []
+    return Figures(
+        f"Diagnosis of {spent.size} stages, s of one core",
+        ("median", "95 % within", "longest"),
+        [(half, most, float(spent.max()))],
+        tuple(failures),
+    )
 
 
 if __name__ == "__main__":

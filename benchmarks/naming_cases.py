@@ -100,6 +100,28 @@ class Case:
         return poor(player, seed) if self.group == "poor" else rich(player, seed, self.layout)
 
 
+QUICK = (
+    "creep",
+    "thermal_drift",
+    "gain_drift",
+    "asymmetric_hysteresis",
+    "hysteresis_exponent",
+    "hysteresis_memory",
+    "rate_dependent_hysteresis",
+    "initial_state",
+    "backlash",
+    "softening",
+    "amplifier_slew_limit",
+    "amplifier_saturation",
+    "sensor_nonlinearity",
+    "mains_hum",
+    "axis_coupling",
+)
+"""Effects of the group ``quick``, which is run after every change of the rules."""
+EFFECT_FREE = 12
+"""Stages without an effect in that group."""
+
+
 def cases(groups: tuple[str, ...], seeds: int, noises: tuple[float, ...] = NOISES) -> Iterator[Case]:
     """Every effect × `seeds` × `noises` on both plants, and the other groups in proportion."""
     makers = {
@@ -110,6 +132,7 @@ def cases(groups: tuple[str, ...], seeds: int, noises: tuple[float, ...] = NOISE
         "absent": _absent,
         "plays": _plays,
         "poor": _poor,
+        "quick": _quick,
     }
     for group in groups:
         yield from makers[group](seeds, noises)
@@ -213,6 +236,16 @@ def _poor(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
     for seed in range(seeds):
         for k, truth in enumerate(hidden):
             yield Case("poor", truth, seed + 10 * k, noises[(k + seed) % len(noises)])
+
+
+def _quick(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
+    """Cases of the groups ``effects`` and ``effect_free``."""
+    for seed in range(seeds):
+        for k, name in enumerate(QUICK):
+            yield Case(
+                "effects", (name,), seed, noises[len(noises) // 2], ("independent", "thorough", "packaged")[k % 3]
+            )
+    yield from list(_effect_free(seeds, noises))[: EFFECT_FREE * seeds]
 
 
 def _packaged(case: Case, seed: int) -> PlantParameters:

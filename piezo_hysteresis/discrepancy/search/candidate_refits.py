@@ -62,9 +62,16 @@ def refit_candidates(
     return sorted([best, *rest], key=lambda c: c.score.cost)
 
 
-def refits_of_the_drive(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
-    """Refits of effects of the drive: dynamics have taken them up, so that no score test sees them."""
-    return _settled_from_all_starts(model, [c for c in candidates if c.effect.place is ChainPosition.DRIVE], before)
+def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
+    """Refits of effects of the drive and of the loop that dynamics have taken up, so that no score test sees them."""
+    return _settled_from_all_starts(model, [c for c in candidates if _bends_dynamics(c)], before)
+
+
+def _bends_dynamics(candidate: Candidate) -> bool:
+    """Whether the effect stands before the dynamics, which imitate it, and every size has a valley of its own."""
+    effect = candidate.effect
+    many = len(type(effect).starts(candidate.training_data.extent)) >= FEWEST_STARTS
+    return effect.place is ChainPosition.DRIVE or (effect.host is not None and many)
 
 
 def refits_of_twins(

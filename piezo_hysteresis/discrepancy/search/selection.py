@@ -23,7 +23,7 @@ from .candidate_refits import (
     LEAST_GAIN,
     finest,
     refit_candidates,
-    refits_of_the_drive,
+    refits_behind_new_dynamics,
     refits_of_twins,
     settled,
     simplest,
@@ -153,7 +153,7 @@ def _turn(
     if refits[0].score.excess > ADEQUATE and (others := refits_of_twins(model, screened, refits[0], before)):
         refits = _best_of_each([*refits, *others])
     best, alone, rejection = _judged(refits, before, null, keeps)
-    if rejection is not None and (late := refits_of_the_drive(model, screened, before)):
+    if rejection is not None and (late := refits_behind_new_dynamics(model, screened, before)):
         refits = _best_of_each([*refits, *late])
         best, alone, rejection = _judged(refits, before, null, keeps)
     rejection = rejection or _untried_twin(type(best.effect), effects)
