@@ -131,7 +131,8 @@ class Diagnosis:
             owner, _, parameter = name.partition(".")
             row = self.fit.model.row(name)
             if owner == effect and not row.fixed and not row.per_record:
-                interval = list(self.fit.interval(name)) if name in self.fit.names else [value, value]
+                ends = self.fit.interval(name) if name in self.fit.names else (value, value)
+                interval = [min(max(end, row.lower), row.upper) for end in ends]
                 rows[parameter] = {"value": value, "interval_95": interval, "unit": row.unit}
         return rows
 

@@ -21,6 +21,8 @@ from .search.training_data import TrainingData
 
 Array = NDArray[np.float64]
 
+LAG = "lag"
+"""Family of the effects that delay."""
 PIECES = 16.0
 """Independent pieces of the structured misfit in one record, so that a longer record narrows no interval further.
 
@@ -46,6 +48,9 @@ def with_form_uncertainty(fit: Fit, training_data: TrainingData, noise: Array, s
     The misfit of a record is taken as a random function of rms δ that has `PIECES` independent pieces. The right-hand
     side of the normal equations then has the covariance δ² (n/PIECES) SᵀS, S the sensitivities of n samples. δ is the
     adequacy floor, or what the residual holds beyond noise where that is more.
+
+    How a signal goes on between two samples is known to neither side: a lag of the model is uncertain by one sample
+    period T, evenly distributed, which adds T²/12 to its variance.
     """
     directions = gauge(fit.model, fit.names)
     bread = np.zeros((directions.shape[1],) * 2)
@@ -58,4 +63,9 @@ def with_form_uncertainty(fit: Fit, training_data: TrainingData, noise: Array, s
             inner = directions.T @ gram.matrix[:-1, :-1] @ directions
             bread += weight * inner
             meat += weight**2 * misfit * gram.size / PIECES * inner
-    return replace(fit, covariance=fit.covariance + sandwich(bread, meat, directions))
+    covariance = fit.covariance + sandwich(bread, meat, directions)
+    lags = {e.name for e in fit.model.effects if e.family == LAG}
+    for at, name in enumerate(fit.names):
+        if name.partition(".")[0] in lags and fit.model.row(name).unit == "s":
+            covariance[at, at] += fit.model.sample_period**2 / 12.0
+    return replace(fit, covariance=covariance)

@@ -6,7 +6,7 @@ import pytest
 from piezo_hysteresis.discrepancy.form_uncertainty import PIECES, with_form_uncertainty
 from piezo_hysteresis.discrepancy.residual.noise_floor import ADEQUACY
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
-from piezo_hysteresis.effects import Arx, BoucWen, Offset
+from piezo_hysteresis.effects import AmplifierBandwidth, Arx, BoucWen, Offset
 from piezo_hysteresis.identification.fit.fit import fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
@@ -42,3 +42,13 @@ def test_a_misfit_that_is_seen_counts_with_its_size():
     alone, wider = errors_of(10_000, misfit=1e-7)
     expected = 1e-7 / np.sqrt(PIECES) / (1e-5 / np.sqrt(2.0))
     assert np.sqrt(wider**2 - alone**2) == pytest.approx(expected, rel=0.1)
+
+
+def test_a_lag_is_known_to_one_sample_at_best():
+    period, noise, name = MODEL.sample_period, 1e-9, "amplifier_bandwidth.tau"
+    model = MODEL.with_effect(AmplifierBandwidth(tau=0.5 * period))
+    u = np.sin(2 * np.pi * 20 * np.arange(20_000) / 20_000)
+    record = Record(u, model.simulate(Record(u, np.zeros(u.size), period))[0], period)
+    training_data = TrainingData((record,), np.array([noise]), Nuisance(), extent_of([record], model))
+    found = with_form_uncertainty(fit(model, (record,), [name], floors=[noise]), training_data, np.array([noise]), SPAN)
+    assert found.standard_errors[name] > period / np.sqrt(12.0)
