@@ -6,9 +6,8 @@ import pytest
 
 pytest.importorskip("piezo_hysteresis_interfaces", reason="needs the package of the actions, built by colcon")
 from action_msgs.msg import GoalStatus
-from rclpy.action import ActionClient
-
 from piezo_hysteresis_interfaces.action import Diagnose, Identify
+from rclpy.action import ActionClient
 
 from .test_identification_node import DRIVER, Identification
 
