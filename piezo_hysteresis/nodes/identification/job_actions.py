@@ -79,8 +79,7 @@ class JobActions:
             )
         self._executor = MultiThreadedExecutor(num_threads=3, context=node.context)
         self._executor.add_node(self._node)
-        self._thread = threading.Thread(target=self._executor.spin, name="actions", daemon=True)
-        self._thread.start()
+        threading.Thread(target=self._executor.spin, name="actions", daemon=True).start()
 
     def report(self, status: DiagnosticStatus) -> None:
         """Pass a status of the job under way on to the goal that began it."""
@@ -91,7 +90,13 @@ class JobActions:
             goal.put(status)
 
     def end(self) -> None:
-        """Serve nothing any more; harmless when repeated."""
+        """Give up the goal that waits and serve nothing any more; harmless when repeated.
+
+        A thread that went on waiting would keep the process from ending.
+        """
+        goal, self._goal = self._goal, None
+        if goal is not None:
+            goal.put(Trigger.Response(message="the identification node ends"))
         executor, self._executor = self._executor, None
         if executor is not None:
             executor.shutdown(timeout_sec=1.0)

@@ -1,5 +1,6 @@
 """Identification as an action, where the package of the actions is built; the services do the same without it."""
 
+import signal
 import threading
 
 import pytest
@@ -58,3 +59,11 @@ def test_goals_are_refused_followed_and_cancelled(lab):
     assert ended.status == GoalStatus.STATUS_CANCELED
     assert not ended.result.success
     assert "safe voltage" in ended.result.message
+
+
+def test_a_goal_under_way_does_not_keep_the_node_from_ending(lab):
+    identification = Identification(lab)
+    goal = Goal(lab, Identify, "identify")
+    lab.wait(lambda: goal.feedback, "feedback of a node that waits for a driver")
+    identification.process.signal(signal.SIGINT)
+    assert identification.process.wait() == 0
