@@ -61,4 +61,5 @@ class ResampledRecord:
         if self._step == 1.0:
             return np.asarray(channel[index])
         place = (index + 0.5) * self._step - 0.5
-        return np.asarray(np.interp(place, np.arange(channel.size), channel))
+        first, last = (int(p) for p in np.clip((np.floor(place.min()), np.ceil(place.max())), 0, channel.size - 1))
+        return np.asarray(np.interp(place, np.arange(first, last + 1), channel[first : last + 1]))

@@ -97,7 +97,7 @@ class ReplayStage:
     @property
     def voltage(self) -> float:
         """Recorded voltage of the sample played last [V]; before the first one, of that."""
-        return float(self._values(self._last, _voltage_of)[0])
+        return float(self._values(self._last, _voltage_of)[0][0])
 
     @property
     def finished(self) -> bool:
@@ -125,8 +125,10 @@ class ReplayStage:
         index = index % total if self._repeat else np.minimum(index, total - 1)
         end = self._position + count
         self._position = (end - 1) % total + 1 if self._repeat else min(end, total)
-        others = {key: self._values(index, _channel(key)) for key in self._channels}
-        return Acquired(self._values(index, _voltage_of), self._values(index, _displacement_of), others)
+        voltage, displacement, *others = self._values(
+            index, _voltage_of, _displacement_of, *(_channel(key) for key in self._channels)
+        )
+        return Acquired(voltage, displacement, dict(zip(self._channels, others, strict=True)))
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
         """Ignored: nothing is put out."""
@@ -144,7 +146,7 @@ class ReplayStage:
     def read_displacement(self) -> float:
         """Recorded displacement of the sample played last [m]."""
         self._require_open()
-        return float(self._values(self._last, _displacement_of)[0])
+        return float(self._values(self._last, _displacement_of)[0][0])
 
     def safe(self) -> None:
         """Nothing is energised."""
@@ -161,14 +163,15 @@ class ReplayStage:
         """Number of the record of every played sample."""
         return np.searchsorted(self._ends, index, side="right")
 
-    def _values(self, index: NDArray[np.int64], channel: Callable[[Record], Samples]) -> Samples:
-        """One channel at played samples."""
+    def _values(self, index: NDArray[np.int64], *channels: Callable[[Record], Samples]) -> list[Samples]:
+        """Channels at played samples, one array each."""
         places = self._places(index)
-        values = np.empty(index.size)
+        values = [np.empty(index.size) for _ in channels]
         for place in np.unique(places):
             played, here = self._played[place], places == place
-            first = self._ends[place] - played.size
-            values[here] = played.at(channel(played.record), index[here] - first)
+            local = index[here] - (self._ends[place] - played.size)
+            for one, channel in zip(values, channels, strict=True):
+                one[here] = played.at(channel(played.record), local)
         return values
 
     def _require_open(self) -> None:
