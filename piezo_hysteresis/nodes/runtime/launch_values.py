@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from ...errors import ParameterError, printable
+
+Number = TypeVar("Number", int, float)
 
 SWITCH: dict[str, bool] = {
     "true": True,
@@ -54,24 +58,19 @@ def number(name: str, text: str) -> float:
     ParameterError
         On any other text.
     """
-    try:
-        return float(text)
-    except ValueError:
-        raise ParameterError(f"{name}: got '{printable(text)}', expected a number") from None
+    return _converted(name, text, float, "a number")
 
 
 def whole_number(name: str, text: str) -> int:
-    """A whole number.
+    """A whole number; otherwise as `number`."""
+    return _converted(name, text, int, "a whole number")
 
-    Raises
-    ------
-    ParameterError
-        On any other text.
-    """
+
+def _converted(name: str, text: str, kind: Callable[[str], Number], expected: str) -> Number:
     try:
-        return int(text)
+        return kind(text)
     except ValueError:
-        raise ParameterError(f"{name}: got '{printable(text)}', expected a whole number") from None
+        raise ParameterError(f"{name}: got '{printable(text)}', expected {expected}") from None
 
 
 def replayed(stage: str) -> str:
