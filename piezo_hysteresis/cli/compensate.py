@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
         model,
         wanted,
         limits,
-        start=model.rest(args.rest_voltage),
+        start=model.at(model.sample_period).rest(args.rest_voltage),
         approach=args.approach,
         way_back=args.way_back,
         approximate=args.approximate,

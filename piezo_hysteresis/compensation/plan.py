@@ -137,7 +137,7 @@ def plan(
     for name, duration in (("approach", approach), ("way_back", way_back)):
         if not duration >= 0.0:
             raise ModelError(f"{name}: got {duration!r} s, expected zero or more")
-    state = start or model.rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
+    state = start or model.at(model.sample_period).rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
     band = band or Band.of(model.sample_period)
     at = float(model.run([state.inputs[0]], state)[0][0])
     way = smooth_way(at, float(y[0]), round(approach / model.sample_period))

@@ -60,7 +60,7 @@ def reachable(
         As `Inverse`.
     """
     y = samples(wanted, "displacement")
-    state = start or model.rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
+    state = start or model.at(model.sample_period).rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
     limits = limits.resolved
     limited = Inverse(model, limits, band=band, approximate=approximate)
     free = Inverse(model, Limits(resolution=limits.resolution), band=band, approximate=approximate)

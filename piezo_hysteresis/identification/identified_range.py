@@ -1,8 +1,8 @@
-"""Voltages and fastest drive that a model was identified on, in its provenance, and what lies outside of them."""
+"""Voltages, frequencies and rates that a model was identified on, in its provenance, and what lies outside of them."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -10,14 +10,25 @@ from ..model.model import Model
 from ..record import Experiment, Notice, Record
 from .records.excitation_content import excitation_content
 
-LOWEST, HIGHEST, FASTEST = "voltage_min", "voltage_max", "frequency_max"
-"""Keys of the provenance: voltages [V], and frequency below which 95 % of the power of dv/dt lies [Hz]."""
-BEYOND, FASTER = 0.02, 1.5
-"""Share of the range of the voltage, and factor of the frequency, from which a drive is outside."""
+LOWEST, HIGHEST = "voltage_min", "voltage_max"
+"""Keys of the provenance: voltages [V]."""
+SLOWEST, FASTEST = "frequency_min", "frequency_max"
+"""Keys of the provenance: frequencies between which 90 % of the power of dv/dt lies [Hz]."""
+STEEPEST = "slew_rate_max"
+"""Key of the provenance: rate that 1 % of the samples that move exceed [V/s]."""
+KEYS = (LOWEST, HIGHEST, SLOWEST, FASTEST, STEEPEST)
+"""All of them."""
+BEYOND, FASTER, SLOWER = 0.02, 1.5, 3.0
+"""Share of the range of the voltage, and factors of frequency and rate, from which a drive is outside.
+
+What a lag or a mode does grows with the frequency; creep with its logarithm.
+"""
+STEEP = 0.99
+"""Share of the samples that move which are not steeper than the rate of a record."""
 
 
 def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapping[str, str]:
-    """Voltages and fastest drive of the records that were fitted.
+    """Voltages, frequencies and rates of the records that were fitted.
 
     Parameters
     ----------
@@ -28,16 +39,19 @@ def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapp
     """
     chosen = [records[i] for i in fitted]
     voltages = np.concatenate([np.append(r.voltage, r.settled_voltage) for r in chosen])
+    contents = [excitation_content(r) for r in chosen]
     found = {
         LOWEST: voltages.min(),
         HIGHEST: voltages.max(),
-        FASTEST: max(excitation_content(r).bandwidth for r in chosen),
+        SLOWEST: min((c.slowest for c in contents if c.bandwidth > 0.0), default=0.0),
+        FASTEST: max(c.bandwidth for c in contents),
+        STEEPEST: max(_slew_rate(r) for r in chosen),
     }
     return {key: repr(float(f"{number:.6g}")) for key, number in found.items()}
 
 
 def outside(model: Model, experiment: Experiment) -> tuple[Notice, ...]:
-    """One notice for every record that drives the stage farther or faster than the model was identified.
+    """Notices of the records that drive the stage farther, faster or slower than the model was identified.
 
     Parameters
     ----------
@@ -46,19 +60,34 @@ def outside(model: Model, experiment: Experiment) -> tuple[Notice, ...]:
     experiment : Experiment
         What it is compared with.
     """
-    if not {LOWEST, HIGHEST, FASTEST} <= set(model.provenance):
-        return ()
-    low, high, fastest = (float(model.provenance[key]) for key in (LOWEST, HIGHEST, FASTEST))
+    return tuple(notice for record in experiment for notice in outside_of(model, record))
+
+
+def outside_of(model: Model, record: Record) -> Iterator[Notice]:
+    """`outside` of one record, or of a window of samples."""
+    if not set(KEYS) <= set(model.provenance):
+        return
+    low, high, slowest, fastest, steepest = (float(model.provenance[key]) for key in KEYS)
     room = BEYOND * (high - low)
-    notices = []
-    for record in experiment:
-        least, most = float(record.voltage.min()), float(record.voltage.max())
-        rate = excitation_content(record).bandwidth
-        if least < low - room or most > high + room:
-            known = f"the model was identified from {low:.3g} to {high:.3g} V"
-            said = f"the drive goes from {least:.3g} to {most:.3g} V, {known}"
-            notices.append(Notice("outside_amplitudes", said, record.phase))
-        if rate > FASTER * fastest > 0.0:
-            said = f"the drive reaches {rate:.3g} Hz, the model was identified up to {fastest:.3g} Hz"
-            notices.append(Notice("outside_frequencies", said, record.phase))
-    return tuple(notices)
+    least, most = float(record.voltage.min()), float(record.voltage.max())
+    content = excitation_content(record)
+    if least < low - room or most > high + room:
+        known = f"the model was identified from {low:.3g} to {high:.3g} V"
+        said = f"the drive goes from {least:.3g} to {most:.3g} V, {known}"
+        yield Notice("outside_amplitudes", said, record.phase)
+    if content.bandwidth > FASTER * fastest > 0.0:
+        said = f"the drive reaches {content.bandwidth:.3g} Hz, the model was identified up to {fastest:.3g} Hz"
+        yield Notice("outside_frequencies", said, record.phase)
+    if SLOWER * content.slowest < slowest and content.bandwidth > 0.0:
+        said = f"the drive is as slow as {content.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz on"
+        yield Notice("outside_frequencies", said, record.phase)
+    rate = _slew_rate(record)
+    if rate > FASTER * steepest > 0.0:
+        said = f"the drive changes by {rate:.3g} V/s, the model was identified up to {steepest:.3g} V/s"
+        yield Notice("outside_rates", said, record.phase)
+
+
+def _slew_rate(record: Record) -> float:
+    steps = np.abs(np.diff(record.voltage))
+    moving = steps[steps > 0.0]
+    return float(np.quantile(moving, STEEP)) / record.sample_period if moving.size else 0.0

@@ -15,6 +15,7 @@ from ..effects import HYSTERESIS, Arx, HysteresisOperator, Offset
 from ..errors import IdentificationError
 from ..model.model import Model
 from ..model.provenance import provenance
+from ..model.sample_periods import identified_periods
 from ..record import Experiment, Notice
 from .fit.fit import Fit, Progress
 from .fit.joint import fit_dynamics, fit_lag
@@ -202,6 +203,8 @@ def identify(
     )
     origin = provenance(experiment, found.free_run_error, found.free_run_percent)
     origin = {**origin, **identified_range(records, roles.fitted)}
+    if not roles.broadband:
+        origin |= identified_periods(records[i].sample_period for i in roles.fitted)
     return replace(found, model=replace(joint.model, provenance=origin))
 
 

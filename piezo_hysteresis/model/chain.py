@@ -38,6 +38,8 @@ class ChainState:
     """Last input of every block."""
     time: float
     """Time of the next sample [s]."""
+    sample_period: float
+    """Sample period of the chain [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +101,7 @@ class Chain:
             states.append(block.rest(x, time))
             inputs.append(x)
             x = block.static(x)
-        return ChainState(tuple(states), tuple(inputs), time)
+        return ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period)
 
     def rest_tangent(self, voltage: float, wanted: Collection[str]) -> ChainTangent:
         """Tangent state at rest for the parameters `wanted`."""
@@ -118,7 +120,7 @@ class Chain:
             s if block.keeps_state else block.rest(x, state.time)
             for block, s, x in zip(self.blocks, state.blocks, state.inputs, strict=True)
         )
-        return ChainState(states, state.inputs, state.time)
+        return ChainState(states, state.inputs, state.time, self.setting.sample_period)
 
     def resume_tangent(self, state: ChainState, tangent: ChainTangent) -> ChainTangent:
         """`resume` for the tangent state."""
@@ -176,7 +178,7 @@ class Chain:
         if not hand_out(y, self._factor_out, RUNAWAY * self.setting.displacement_scale):
             self._report_divergence(u, state, channels, first)
         time = state.time + u.size * self.setting.sample_period
-        return ChainState(tuple(states), tuple(inputs), time)
+        return ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period)
 
     def _report_divergence(self, u: Array, state: ChainState, channels: Channels, first: int) -> None:
         x = u
@@ -219,5 +221,5 @@ class Chain:
             states.append(s)
             tangents.append(t)
         time = state.time + u.size * self.setting.sample_period
-        state, tangent = ChainState(tuple(states), tuple(inputs), time), ChainTangent(tuple(tangents), tuple(dinputs))
-        return x, tuple(rows), dx, state, tangent
+        state = ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period)
+        return x, tuple(rows), dx, state, ChainTangent(tuple(tangents), tuple(dinputs))

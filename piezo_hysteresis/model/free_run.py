@@ -41,12 +41,15 @@ def free_run(model: Model, records: Iterable[Record]) -> list[Array]:
 
 
 def simulated(
-    model: Model, given: Record | Iterable[Record] | Array | Sequence[float], phase: str | None
+    model: Model,
+    given: Record | Iterable[Record] | Array | Sequence[float],
+    phase: str | None,
+    sample_period: float | None = None,
 ) -> list[Array] | Array:
     """What `Model.simulate` returns: displacement [m] of the records of one phase, or of a voltage from rest."""
     if _is_voltage(given):
         voltage = samples(cast(Array, given), "voltage")
-        return model.run(voltage, model.rest(voltage[0]))[0]
+        return model.run(voltage, model.rest(voltage[0], sample_period=sample_period))[0]
     records = [given] if isinstance(given, Record) else list(cast(Iterable[Record], given))
     wanted = [i for i, r in enumerate(records) if phase is None or phase in (r.phase, r.phase.split("_")[0])]
     if phase is not None and not wanted:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,20 +10,19 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..effects import CHAIN, Discretisation, Effect, HysteresisOperator, Offset
+from ..effects import Discretisation, Effect, HysteresisOperator
 from ..errors import ModelError
 from ..html_table import html_table
-from ..parameter import Parameter, Value
+from ..parameter import Parameter
 from ..record import Record
 from .chain import Chain, ChainState, Channels
+from .chain_order import in_chain_order
 from .free_run import free_run, linearised_run, simulated
+from .named_numbers import numbers_of, with_numbers
+from .sample_periods import require_not_shorter, stated_period
 from .samples import row
 
 Array = NDArray[np.float64]
-
-
-def _place(effect: Effect) -> tuple[int, int]:
-    return int(effect.place), CHAIN.index(type(effect)) if type(effect) in CHAIN else len(CHAIN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +64,7 @@ class Model:
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        effects = tuple(sorted(self.effects, key=_place))
-        object.__setattr__(self, "effects", effects)
-        names = [e.name for e in effects]
-        for name in names:
-            if names.count(name) > 1:
-                raise ModelError(f"effect '{name}' is in the chain twice; expected each at most once")
-        for effect in effects:
-            if effect.host is not None and effect.host not in names:
-                raise ModelError(f"effect '{effect.name}' needs '{effect.host}' in the chain, got {', '.join(names)}")
+        object.__setattr__(self, "effects", in_chain_order(self.effects))
         for name in ("sample_period", "voltage_scale", "displacement_scale"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
@@ -131,25 +121,11 @@ class Model:
 
     def with_values(self, values: Mapping[str, float]) -> Model:
         """With other numbers, named ``"creep.gamma"`` or ``"arx.a[0]"``."""
-        changed: dict[str, dict[str, Value]] = {}
-        for name, number in values.items():
-            owner, _, rest = name.partition(".")
-            inside = changed.setdefault(owner, self[owner].values)
-            match = re.fullmatch(r"(\w+)\[(\d+)\]", rest)
-            if match:
-                row = list(inside[match[1]])  # type: ignore[arg-type]
-                row[int(match[2])] = number
-                inside[match[1]] = tuple(row)
-            else:
-                inside[rest] = number
-        return replace(
-            self,
-            effects=tuple(e.with_values(**changed[e.name]) if e.name in changed else e for e in self.effects),
-        )
+        return replace(self, effects=with_numbers(self.effects, values))
 
     def values(self) -> dict[str, float]:
         """All numbers by name, ``"bouc_wen.A"``, ``"arx.a[0]"``."""
-        return {f"{e.name}.{n}": v for e in self.effects for n, v in zip(e.free_names(), e.free_values(), strict=True)}
+        return numbers_of(self.effects)
 
     def row(self, name: str) -> Parameter:
         """The table row of a number."""
@@ -164,11 +140,7 @@ class Model:
         ModelError
             If the period is shorter than the model's.
         """
-        if sample_period < 0.999 * self.sample_period:
-            raise ModelError(
-                f"sample period: got {sample_period:g} s, expected {self.sample_period:g} s (the model's) or more; "
-                "decimate the record or identify at its rate"
-            )
+        require_not_shorter(self, sample_period)
         kept = self._chains
         if sample_period not in kept:
             setting = Discretisation(sample_period, self.sample_period, self.voltage_scale, self.displacement_scale)
@@ -179,12 +151,34 @@ class Model:
     def _chains(self) -> dict[float, Chain]:
         return {}
 
-    def rest(self, voltage: float, time: float = 0.0) -> ChainState:
-        """State of a stage settled at `voltage` [V], at its own sample period."""
-        return self.at(self.sample_period).rest(voltage, time)
+    def rest(self, voltage: float, time: float = 0.0, sample_period: float | None = None) -> ChainState:
+        """State of a stage settled at `voltage` [V], for samples of the period given.
 
-    def run(self, voltage: ArrayLike, state: ChainState, channels: Channels | None = None) -> tuple[Array, ChainState]:
-        """Displacement [m] of the next samples at the model's sample period, and the state after them.
+        Parameters
+        ----------
+        voltage : float
+            Drive voltage [V].
+        time : float
+            Of the first sample [s].
+        sample_period : float, optional
+            Of the samples to come [s]; default the model's.
+
+        Raises
+        ------
+        ModelError
+            On a period shorter than the model's, and without one where the model was identified at several and has none
+            of its own.
+        """
+        return self.at(stated_period(self, sample_period)).rest(voltage, time)
+
+    def run(
+        self,
+        voltage: ArrayLike,
+        state: ChainState,
+        channels: Channels | None = None,
+        sample_period: float | None = None,
+    ) -> tuple[Array, ChainState]:
+        """Displacement [m] of the next samples, and the state after them.
 
         Bit-identical for every way of cutting the voltage into blocks.
 
@@ -196,24 +190,32 @@ class Model:
             From `rest`, or from the block before.
         channels : mapping, optional
             ``other_displacement`` [m] and ``temperature`` [K], shape (n,).
+        sample_period : float, optional
+            Of these samples [s]; default that of the state. After another one filters start settled.
 
         Raises
         ------
         ModelError
-            On empty or non-finite samples.
+            On empty or non-finite samples, and on a period shorter than the model's.
         DivergenceError
             If the output runs away.
         """
-        return self.at(self.sample_period).run(row(voltage, "voltage"), state, channels)
+        chain = self.at(sample_period or state.sample_period)
+        if chain.setting.sample_period != state.sample_period:
+            state = chain.resume(state)
+        return chain.run(row(voltage, "voltage"), state, channels)
 
     @overload
     def simulate(self, records: Record | Iterable[Record], phase: str | None = None) -> list[Array]: ...
 
     @overload
-    def simulate(self, records: Array | Sequence[float]) -> Array: ...
+    def simulate(self, records: Array | Sequence[float], *, sample_period: float | None = None) -> Array: ...
 
     def simulate(
-        self, records: Record | Iterable[Record] | Array | Sequence[float], phase: str | None = None
+        self,
+        records: Record | Iterable[Record] | Array | Sequence[float],
+        phase: str | None = None,
+        sample_period: float | None = None,
     ) -> list[Array] | Array:
         """Free-run displacement [m] of every record, each at its own sample period; or of a voltage from rest.
 
@@ -223,9 +225,11 @@ class Model:
         ----------
         records : Record, iterable of Record, or (n,) array_like
             Give the whole experiment and `phase`, so that the state is carried into the records of that phase. An array
-            is a drive voltage [V] at the model's sample period, of a stage settled at its first value.
+            is a drive voltage [V] of a stage settled at its first value.
         phase : str, optional
             Return only records whose phase name is, or begins with, `phase`, as `Experiment.named`.
+        sample_period : float, optional
+            Of an array [s], as in `rest`; records have their own.
 
         Returns
         -------
@@ -241,7 +245,7 @@ class Model:
         UnknownStateWarning
             If the first record continues one that is not given: it was simulated from rest, and is wrong at first.
         """
-        return simulated(self, records, phase)
+        return simulated(self, records, phase, sample_period)
 
     def free_run(self, records: Iterable[Record]) -> list[Array]:
         """As `simulate`, of any records, without a word about where the first one begins."""
@@ -271,9 +275,3 @@ class Model:
         """Free-run displacement (n,) of a record from rest, and ∂y/∂θ (n,) of every number `wanted`."""
         ((_, _, y, names, slopes),) = self.linearise([record], wanted, block=record.size)
         return y, dict(zip(names, slopes, strict=True))
-
-    def contributions(self, record: Record) -> dict[str, Array]:
-        """How much each effect beyond hysteresis, dynamics and offset adds to the displacement [m], shape (n,)."""
-        (whole,) = self.free_run([record])
-        core = {e.name for e in self.effects if not any(p.off is not None for p in e.parameters)} | {Offset.name}
-        return {e.name: whole - self.without(e.name).free_run([record])[0] for e in self.effects if e.name not in core}

@@ -28,7 +28,10 @@ _PROVENANCE = {
     "date": "UTC",
     "voltage_min": "V; of the records that were fitted",
     "voltage_max": "V",
-    "frequency_max": "Hz; 95 % of the power of dv/dt lies below it",
+    "frequency_min": "Hz; 95 % of the power of dv/dt lies above it",
+    "frequency_max": "Hz; 95 % of it lies below it",
+    "slew_rate_max": "V/s; that of 99 % of the samples that move",
+    "sample_periods": "s; of those records, where none is broadband",
 }
 """Comments beside the entries of the provenance."""
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.identification.identified_range import identified_range, outside
+from piezo_hysteresis.identification.range_watch import RangeWatch
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
@@ -21,8 +22,32 @@ def test_a_drive_inside_is_not_noticed_and_one_outside_is():
     assert (float(origin["voltage_min"]), float(origin["voltage_max"])) == (2.0, 8.0)
     model = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=1.0)), 1e-3, provenance=origin)
     assert outside(model, Experiment((sine(2.5, 5.0),))) == ()
-    kinds = [n.kind for n in outside(model, Experiment((sine(4.0, 5.0), sine(2.0, 40.0))))]
-    assert kinds == ["outside_amplitudes", "outside_frequencies"]
+    kinds = [[n.kind for n in outside(model, Experiment((r,)))] for r in (sine(4.0, 5.0), sine(2.0, 40.0))]
+    assert kinds == [["outside_amplitudes"], ["outside_frequencies", "outside_rates"]]
+    (slow,) = outside(model, Experiment((sine(2.5, 0.25),)))
+    assert slow.kind == "outside_frequencies"
+    assert slow.message == "the drive is as slow as 0.25 Hz, the model was identified from 1 Hz on"
+
+
+def test_a_stream_is_watched_block_by_block():
+    model = Model((BoucWen(),), 1e-3, provenance=identified_range((sine(3.0, 2.0),), (0,)))
+    for record, kinds in (
+        (sine(3.0, 2.0), []),
+        (sine(5.0, 2.0), ["outside_amplitudes", "outside_rates"]),
+        (sine(1.0, 20.0), ["outside_frequencies", "outside_rates"]),
+        (sine(3.0, 0.2), ["outside_frequencies"]),
+    ):
+        watch = RangeWatch(model, 1e-3)
+        for block in np.split(record.voltage, 40):
+            watch.add(block)
+        assert [n.kind for n in watch.findings()] == kinds
+
+
+def test_one_swing_of_a_slow_drive_has_no_frequency_yet():
+    model = Model((BoucWen(),), 1e-3, provenance=identified_range((sine(3.0, 2.0),), (0,)))
+    watch = RangeWatch(model, 1e-3)
+    watch.add(sine(3.0, 2.0).voltage[:100])
+    assert watch.findings() == ()
 
 
 def test_a_model_without_its_range_gives_no_notice():

@@ -19,6 +19,7 @@ from piezo_hysteresis.effects import (
 )
 from piezo_hysteresis.errors import ModelError, ParameterError, UnknownStateWarning
 from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.sample_periods import identified_periods
 from piezo_hysteresis.record import Record
 
 PERIOD = 1e-3
@@ -63,13 +64,29 @@ def test_the_scales_are_part_of_the_model() -> None:
     np.testing.assert_allclose(doubled.run(2 * u, doubled.rest(2 * u[0]))[0], 3 * y, rtol=1e-12)
 
 
-def test_contributions_are_what_each_added_effect_brings() -> None:
-    model = MODEL.with_effect(ThermalDrift(D=1e-7, tau=1.0)).with_effect(SensorNonlinearity(s2=0.01))
-    data = Record(5.0 + np.sin(np.arange(100) / 9.0), np.zeros(100), PERIOD)
-    parts = model.contributions(data)
-    assert set(parts) == {"thermal_drift", "sensor_nonlinearity"}
-    np.testing.assert_allclose(parts["thermal_drift"], 1e-7 * (1 - np.exp(-data.time)), atol=1e-18)
-    np.testing.assert_allclose(sum(parts.values()), model.simulate(data)[0] - MODEL.simulate(data)[0], atol=1e-17)
+def test_a_lag_holds_at_every_period_and_run_takes_it() -> None:
+    """Samples of 100 µs of a model that has 1 µs only because its fastest record had."""
+    lag = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=300.0)), 1e-6, provenance=identified_periods((1e-6, 1e-4)))
+    u = 5.0 - 5.0 * np.cos(2 * np.pi * 50.0 * 1e-4 * np.arange(400))
+    (wanted,) = lag.simulate(Record(u, u, 1e-4))
+    y, state = lag.run(u[:100], lag.rest(0.0, sample_period=1e-4))
+    y = np.concatenate((y, lag.run(u[100:], state)[0]))
+    np.testing.assert_array_equal(y, wanted)
+    np.testing.assert_array_equal(lag.simulate(u, sample_period=1e-4), wanted)
+    assert np.abs(lag.simulate(u, sample_period=1e-6) - wanted).max() > 0.05 * np.ptp(wanted)
+    for ask in (lag.rest, lambda _: lag.simulate(u)):
+        with pytest.raises(ModelError, match="expected that of the samples; the model was identified at 1e-06, 0.0001"):
+            ask(0.0)
+    with pytest.raises(ModelError, match="expected 1e-06 s"):
+        lag.rest(0.0, sample_period=1e-7)
+
+
+def test_a_run_goes_on_at_another_period_with_its_memory() -> None:
+    _, before = MODEL.run(np.linspace(0.0, 8.0, 200), MODEL.rest(0.0))
+    settled, _ = MODEL.run(np.full(500, 8.0), before)
+    held, state = MODEL.run(np.full(50, 8.0), before, sample_period=1e-2)
+    assert state.sample_period == 1e-2
+    np.testing.assert_allclose(held, settled[-1], rtol=1e-12)
 
 
 @pytest.mark.parametrize(

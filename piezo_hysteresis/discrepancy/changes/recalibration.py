@@ -95,7 +95,7 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     span = stroke(records)
     rms = min(before, after)
     origin = provenance(experiment, rms, 100.0 * rms / span)
-    new = replace(bare.with_effect(old.with_values(y0=zero)), provenance=origin)
+    new = replace(bare.with_effect(old.with_values(y0=zero)), provenance={**model.provenance, **origin})
     kept = after < before
     return Recalibration(
         new,

@@ -35,6 +35,8 @@ class ExcitationContent:
         Range of the drive, the settled voltage before it included [V].
     bandwidth : float
         Frequency below which 95 % of the power of dv/dt lies [Hz].
+    slowest : float
+        Frequency above which 95 % of it lies [Hz], at least that of half a cycle in the record.
     lines : int
         Number of spectral lines that hold 95 % of it.
     moments : float
@@ -46,6 +48,7 @@ class ExcitationContent:
 
     span: float
     bandwidth: float
+    slowest: float
     lines: int
     moments: float
     noise: float
@@ -68,12 +71,15 @@ def excitation_content(record: Record) -> ExcitationContent:
     power = np.abs(spectrum) ** 2
     total = float(power.sum())
     if total == 0.0:
-        return ExcitationContent(span, 0.0, 0, 0.0, noise_of(record))
+        return ExcitationContent(span, 0.0, 0.0, 0, 0.0, noise_of(record))
     speed = np.fft.irfft(spectrum, record.size - 1)
     frequency = np.arange(power.size) / (speed.size * record.sample_period)
-    bandwidth = float(frequency[np.searchsorted(np.cumsum(power), MARKED * total)])
+    grown = np.cumsum(power)
+    bandwidth = float(frequency[np.searchsorted(grown, MARKED * total)])
+    slowest = max(float(frequency[np.searchsorted(grown, (1.0 - MARKED) * total)]), 0.5 / record.duration)
     lines = int(np.searchsorted(np.cumsum(np.sort(power)[::-1]), MARKED * total)) + 1
-    return ExcitationContent(span, bandwidth, lines, min(_spread(speed), _spread(np.diff(speed))), noise_of(record))
+    moments = min(_spread(speed), _spread(np.diff(speed)))
+    return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record))
 
 
 def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:

@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 
 from ...acquisition.sample_block import SampleBlock
+from ...identification.range_watch import RangeWatch
 from ...model.model import Model
 from ...model.model_parameters import model_hash
 from ...online.predictor import Predictor
@@ -48,6 +49,7 @@ class ModelDiagnostics:
         self._frame = ""
         self._model: Model | None = None
         self._predictor: Predictor | None = None
+        self._range: RangeWatch | None = None
         self._free_run_error: float | None = None
         self._latency = 0.0
         self._seen = (time.monotonic(), 0, 0, 0)
@@ -78,13 +80,19 @@ class ModelDiagnostics:
 
     def follow(self, predictor: Predictor) -> None:
         """Report the figures of a predictor from now on."""
-        self._predictor = predictor
+        self._predictor, self._range = predictor, None
         self._seen = (time.monotonic(), 0, 0, 0)
 
     def saw(self, block: SampleBlock, now: int) -> None:
         """Note the age of a block that has been dealt with at `now` [ns]."""
         self._frame = block.frame
         self._latency = max(self._latency, (now - block.stamp) * 1e-9 - float(block.time[-1]))
+        predictor = self._predictor
+        if predictor is None or predictor.model is None:
+            return
+        if self._range is None or self._range.model is not predictor.model:
+            self._range = RangeWatch(predictor.model, predictor.sample_period)
+        self._range.add(block.voltage)
 
     def _publish(self) -> None:
         values: dict[str, object] = {"problems": self._problems, "faults": self._node.faults}
@@ -149,5 +157,7 @@ class ModelDiagnostics:
                 DiagnosticStatus.WARN,
                 "the model is warming up, because the earlier drive voltage is unknown",
             )
+        for notice in self._range.findings() if self._range else ():
+            yield DiagnosticStatus.WARN, notice.message
         if (finding := self._alarm.finding(predictor.residual_rms, self._free_run_error)) is not None:
             yield finding

@@ -2,6 +2,7 @@
 
 import array
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -131,6 +132,19 @@ def test_predictions_are_those_of_the_core_bit_for_bit(lab, tmp_path):
     lab.wait(lambda: live and rms, "live values")
     assert list(live[-1].name) == ["voltage", "displacement", "prediction", "residual"]
     assert live[-1].position[1] - live[-1].position[2] == pytest.approx(live[-1].position[3], abs=1e-15)
+
+
+def test_a_drive_outside_of_what_was_identified_is_a_warning(lab, tmp_path):
+    seen = {"voltage_min": "0.0", "voltage_max": "4.0", "slew_rate_max": "1000.0"}
+    known = replace(MODEL, provenance={**PROVENANCE, **seen, "frequency_min": "1.0", "frequency_max": "5.0"})
+    bench = Bench(lab, model_file=str(save(known, tmp_path / "model.yaml")))
+    blocks = stream(330)
+    bench.send(blocks[:5])
+    bench.predicted(5)
+    assert not bench._reported("the model was identified")
+    bench.send(blocks[5:])
+    bench.report("the drive goes from 0 to 6 V, the model was identified from 0 to 4 V")
+    bench.report("the drive reaches 20 Hz, the model was identified up to 5 Hz")
 
 
 def test_a_model_on_the_topic_takes_over_between_two_blocks(lab, tmp_path):

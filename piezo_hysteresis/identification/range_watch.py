@@ -1,0 +1,68 @@
+"""`RangeWatch`: whether a stream of samples stays inside the range that a model was identified on."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.model import Model
+from ..record import Notice, Record
+from .identified_range import SLOWEST, outside_of
+
+SHORTEST = 1.0
+"""Least time that is looked at [s]."""
+CYCLES = 3.0
+"""Cycles of the slowest identified drive that are looked at, so that a slower one is seen."""
+MOST_SAMPLES = 65536
+"""Most samples that are looked at: a few milliseconds of computing."""
+
+
+class RangeWatch:
+    """The newest drive of a stream, and what of it the model was not identified on.
+
+    Parameters
+    ----------
+    model : Model
+        With its identified range in its provenance; without it nothing is found.
+    sample_period : float
+        Of the stream [s].
+
+    Examples
+    --------
+    >>> from ..effects import BoucWen
+    >>> known = {"voltage_min": "0", "voltage_max": "5", "frequency_min": "1", "frequency_max": "10"}
+    >>> watch = RangeWatch(Model((BoucWen(),), 1e-3, provenance={**known, "slew_rate_max": "200"}), 1e-3)
+    >>> watch.add(np.linspace(0.0, 8.0, 100))
+    >>> [n.kind for n in watch.findings()]
+    ['outside_amplitudes']
+    """
+
+    def __init__(self, model: Model, sample_period: float) -> None:
+        self.model = model
+        self._period = sample_period
+        slowest = float(model.provenance.get(SLOWEST, "0"))
+        window = max(SHORTEST, CYCLES / slowest if slowest > 0.0 else 0.0)
+        self._size = int(np.clip(window / sample_period, 2, MOST_SAMPLES))
+        self._blocks: deque[NDArray[np.float64]] = deque()
+        self._count = 0
+
+    def add(self, voltage: NDArray[np.float64]) -> None:
+        """Take in the next samples [V], shape (n,)."""
+        self._blocks.append(voltage[-self._size :].copy())
+        self._count += self._blocks[-1].size
+        while self._count - self._blocks[0].size >= self._size:
+            self._count -= self._blocks.popleft().size
+
+    def findings(self) -> tuple[Notice, ...]:
+        """What the newest samples do that the model was not identified on.
+
+        A frequency is judged once the window is full, since a part of a slow drive has no frequency of its own.
+        """
+        if self._count < 2:
+            return ()
+        seen = np.concatenate(self._blocks)[-self._size :]
+        found = outside_of(self.model, Record(seen, seen, self._period, continues=True))
+        is_full = seen.size == self._size
+        return tuple(n for n in found if is_full or n.kind != "outside_frequencies")

@@ -1,0 +1,55 @@
+"""The sample periods at which a model holds, as its provenance states them.
+
+Dynamics that were identified from broadband records belong to one period, that of the model. Without them the dynamics
+are a lag, which holds at every period of the records, and the period of the model is only the shortest of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from ..errors import ModelError
+
+if TYPE_CHECKING:
+    from .model import Model
+
+SAMPLE_PERIODS = "sample_periods"
+"""Key of the provenance: the periods of the records of a model without dynamics of its own period [s]."""
+
+
+def identified_periods(periods: Iterable[float]) -> Mapping[str, str]:
+    """Provenance of a model that was identified without broadband records.
+
+    >>> identified_periods((1e-3, 1e-4, 1e-3))
+    {'sample_periods': '0.0001 0.001'}
+    """
+    return {SAMPLE_PERIODS: " ".join(f"{p:.9g}" for p in sorted(set(periods)))}
+
+
+def stated_period(model: Model, given: float | None) -> float:
+    """The period of samples that come without one: `given`, or the model's where it has one of its own.
+
+    Raises
+    ------
+    ModelError
+        If none is given and the model was identified from records of several periods.
+    """
+    if given is not None:
+        return given
+    known = model.provenance.get(SAMPLE_PERIODS, "").split()
+    if len(known) > 1:
+        raise ModelError(
+            f"sample period: got none, expected that of the samples; the model was identified at {', '.join(known)} s "
+            "and has no period of its own; give sample_period"
+        )
+    return model.sample_period
+
+
+def require_not_shorter(model: Model, sample_period: float) -> None:
+    """Raise `ModelError` where samples come faster than the model's period [s]."""
+    if sample_period < 0.999 * model.sample_period:
+        raise ModelError(
+            f"sample period: got {sample_period:g} s, expected {model.sample_period:g} s (the model's) or more; "
+            "decimate the record or identify at its rate"
+        )
