@@ -1,4 +1,7 @@
-"""Effects that an experiment cannot show, because it does not contain the necessary kind of drive."""
+"""Effects that an experiment cannot show, because it does not contain the necessary kind of drive.
+
+Every effect declares the drive that it needs as its `excitation_need`.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import Creep, ExtraResonance, GainDrift, HysteresisExponent, HysteresisMemory, ThermalDrift
+from ..effects import CATALOGUE, ExcitationNeed
 from ..identification.records.excitation_content import SLOW, excitation_content
 from ..record import Notice, Record
 
@@ -16,10 +19,17 @@ MOVED = 0.02
 """Share of the range of the drive by which a level must have changed."""
 DISTINCT = 0.8
 """Ratio of two amplitudes below which they count as different."""
+REASONS = {
+    ExcitationNeed.HELD_LEVEL: ("", "no level is held for a second or more after a change"),
+    ExcitationNeed.REPEATED_PHASE: ("", "no kind of phase was recorded twice"),
+    ExcitationNeed.SEVERAL_AMPLITUDES: ("", "all loops have the same amplitude"),
+    ExcitationNeed.BROADBAND: (" and lags", "no drive excites the dynamics (noise, multisine)"),
+}
+"""What each kind of drive shows besides the effects that declare it, and the message where it is missing."""
 
 
 def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
-    """Kinds of effect that the drive of the records hardly shows, each with what is not there.
+    """One notice for every kind of drive that the records do not contain, with the effects that need it.
 
     Parameters
     ----------
@@ -27,18 +37,21 @@ def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
         Those that take part.
     """
     span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
-    missing = []
-    if not any(_longest_hold(r, MOVED * span) >= HOLD for r in records):
-        missing.append((Creep.name, "no level is held for a second or more after a change"))
     contents = [excitation_content(r) for r in records]
     kinds = ["slow loops" if c.is_slow else r.phase.split("_")[0] for r, c in zip(records, contents, strict=True)]
-    if len(set(kinds)) == len(kinds):
-        missing.append((f"{ThermalDrift.name} and {GainDrift.name}", "no kind of phase was recorded twice"))
-    if not _has_smaller_loops(records):
-        missing.append((f"{HysteresisMemory.name} and {HysteresisExponent.name}", "all loops have the same amplitude"))
-    if not any(c.is_broadband for c in contents):
-        missing.append((f"{ExtraResonance.name} and lags", "no drive excites the dynamics (noise, multisine)"))
-    return tuple(Notice("not_tested", f"these data can hardly show {what}: {why}") for what, why in missing)
+    present = {
+        ExcitationNeed.HELD_LEVEL: any(_longest_hold(r, MOVED * span) >= HOLD for r in records),
+        ExcitationNeed.REPEATED_PHASE: len(set(kinds)) < len(kinds),
+        ExcitationNeed.SEVERAL_AMPLITUDES: _has_smaller_loops(records),
+        ExcitationNeed.BROADBAND: any(c.is_broadband for c in contents),
+    }
+    return tuple(_notice(need) for need, is_present in present.items() if not is_present)
+
+
+def _notice(need: ExcitationNeed) -> Notice:
+    names = " and ".join(dict.fromkeys(e.public_name() for e in CATALOGUE if e.excitation_need is need))
+    others, reason = REASONS[need]
+    return Notice("not_tested", f"these data can hardly show {names}{others}: {reason}")
 
 
 def _longest_hold(record: Record, least: float) -> float:

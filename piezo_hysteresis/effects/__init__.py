@@ -21,6 +21,7 @@ from .environment.axis_coupling import AxisCoupling
 from .environment.mains_hum import MainsHum
 from .environment.thermal_drift import ThermalDrift
 from .environment.thermal_expansion import ThermalExpansion
+from .excitation_need import ExcitationNeed
 from .hysteresis.asymmetric_hysteresis import AsymmetricHysteresis
 from .hysteresis.bouc_wen import BoucWen
 from .hysteresis.even_input_polynomial import EvenInputPolynomial
@@ -132,6 +133,7 @@ __all__ = [
     "CreepFractional",
     "CreepTwoRates",
     "Effect",
+    "ExcitationNeed",
     "EvenInputPolynomial",
     "ExtraDelay",
     "ExtraResonance",

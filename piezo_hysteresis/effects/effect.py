@@ -17,6 +17,7 @@ import numpy as np
 from ..blocks.block import Block
 from ..errors import ModelError, ParameterError
 from ..parameter import Parameter, Value
+from .excitation_need import ExcitationNeed
 from .extent import Extent
 from .invertibility import Invertibility
 
@@ -89,7 +90,11 @@ class Effect(ABC):
     channel: ClassVar[str | None] = None
     """Extra channel of the record that is needed: ``other_displacement`` or ``temperature``."""
     twin: ClassVar[str | None] = None
-    """Effect that is one with this one on slow drive: what remains beside the one is the form of it, not the other."""
+    """Effect that slow drive cannot tell from this one: a residual left by one of them does not prove the other."""
+    excitation_need: ClassVar[ExcitationNeed | None] = None
+    """Drive without which no record can show the effect; None where nearly every record can."""
+    loop_names: ClassVar[tuple[str, ...]] = ()
+    """Parameters to which the height of the hysteresis loop is proportional."""
     invertibility: ClassVar[Invertibility]
     """Whether `piezo_hysteresis.compensation` can turn the effect round."""
     equation: ClassVar[str]
@@ -149,6 +154,10 @@ class Effect(ABC):
                 yield from (f"{row.name}[{i}]" for i in range(len(value)))
             else:
                 yield row.name
+
+    def loop_numbers(self) -> tuple[str, ...]:
+        """Names of the single numbers of `loop_names`."""
+        return tuple(n for n in self.free_names() if n.partition("[")[0] in self.loop_names)
 
     def free_values(self) -> Iterator[float]:
         """All scalar numbers, in the order of `free_names`."""

@@ -8,7 +8,16 @@ import pytest
 
 import piezo_hysteresis
 from piezo_hysteresis.discrepancy.search.baseline import exact
-from piezo_hysteresis.effects import CHAIN, Arx, BoucWen, HysteresisOperator, Loop, Offset, PublishedBoucWen
+from piezo_hysteresis.effects import (
+    CHAIN,
+    Arx,
+    BoucWen,
+    ChainPosition,
+    HysteresisOperator,
+    Loop,
+    Offset,
+    PublishedBoucWen,
+)
 from piezo_hysteresis.effects.hysteresis.hysteresis_memory import HysteresisMemoryBlock
 from piezo_hysteresis.effects.hysteresis.operator import outputs
 from piezo_hysteresis.errors import IdentificationError, ModelError
@@ -23,6 +32,10 @@ SOURCE = Path(piezo_hysteresis.__file__).parent
 ROOMS = ("cli", "compensation", "discrepancy", "identification", "model", "nodes", "online", "report")
 ORDINARY = {"offset"}
 OTHER_MEANINGS = {("report/figures/creep.py", "creep")}  # the name of the figure
+ABOUT_ONE_OPERATOR = {
+    "cli/identify.py",  # its option --published means the published operator
+    "discrepancy/residual/explicit_step.py",  # recognises the step of Eq. (7)
+}
 LIMITS = DriveLimits(sample_period=2e-4)
 
 
@@ -122,6 +135,25 @@ def test_no_room_above_the_catalogue_names_an_effect_in_a_string():
                 word = node.value.partition(".")[0]
                 if word in names and node.value not in ORDINARY and (where, node.value) not in OTHER_MEANINGS:
                     found.append(f"{where}:{node.lineno}: '{node.value}'")
+    assert not found, "\n".join(found)
+
+
+def test_no_room_above_the_catalogue_names_a_class_of_the_hysteresis():
+    """Operators, their terms and the memory are reached through `Model.hysteresis`, `HYSTERESIS` and `MEMORY`."""
+    members = {e.__name__ for e in CHAIN if e.family == "hysteresis" and e.place is ChainPosition.HYSTERESIS}
+    found = []
+    for path in (p for room in ROOMS for p in (SOURCE / room).rglob("*.py")):
+        where = str(path.relative_to(SOURCE))
+        if where in ABOUT_ONE_OPERATOR:
+            continue
+        named = {
+            alias.name
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        found += [f"{where}: {name}" for name in sorted(named & members)]
+    assert "HysteresisMemory" in members
     assert not found, "\n".join(found)
 
 

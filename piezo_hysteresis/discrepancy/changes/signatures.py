@@ -14,15 +14,12 @@ from numpy.typing import NDArray
 
 from ...effects import (
     Arx,
-    BoucWen,
     Creep,
     CreepFractional,
     CreepTwoRates,
     ExtraDelay,
     ExtraResonance,
-    HysteresisMemory,
     Offset,
-    PublishedBoucWen,
     SensorBandwidth,
     Softening,
 )
@@ -60,8 +57,8 @@ class ChangeablePrediction:
 def loop_numbers(model: Model) -> dict[str, float]:
     """Numbers that together are the height of the loop, with their values."""
     values = model.values()
-    heights = [f"{name}.A" for name in (BoucWen.name, PublishedBoucWen.name)]
-    return {n: v for n, v in values.items() if (n.startswith(f"{HysteresisMemory.name}.c[") or n in heights) and v}
+    names = [f"{effect.name}.{number}" for effect in model.effects for number in effect.loop_numbers()]
+    return {name: values[name] for name in names if values[name]}
 
 
 def creep_numbers(model: Model) -> dict[str, float]:

@@ -7,12 +7,11 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from ...effects import (
+    MEMORY,
     Creep,
     CreepTwoRates,
     EvenInputPolynomial,
     ExtraResonance,
-    HysteresisMemory,
-    LevelDependentMemory,
     ThermalDrift,
 )
 from ...errors import PiezoError
@@ -33,12 +32,12 @@ from .training_data import TrainingData
 DECIDES = 0.35
 """Lead in score (mean ln R²) from which what was left out decides that an effect is there: 1.2 in the error."""
 ORDER = (
-    HysteresisMemory.name,
+    MEMORY.name,
     ExtraResonance.name,
     Creep.name,
     CreepTwoRates.name,
     EvenInputPolynomial.name,
-    LevelDependentMemory.name,
+    MEMORY.level_term.name,
 )
 """Optional effects of a structure, the largest first."""
 SLOW = (Creep.name, CreepTwoRates.name)
@@ -88,8 +87,8 @@ def structure_steps(
         model = found.model
         for other in later:
             model = model.without(other)
-        if LevelDependentMemory.name in model and HysteresisMemory.name not in model:
-            model = model.without(LevelDependentMemory.name)
+        if MEMORY.name not in model:
+            model = model.without(MEMORY.level_term.name)
         try:
             fit = found.fit if not later else _refitted(model, records, floors, fitted)
             score = score_model(fit.model, training_data)

@@ -13,6 +13,7 @@ from ...blocks.kernel import kernel
 from ...blocks.linear import AddedBlock, Section
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
+from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
 
@@ -41,6 +42,7 @@ class ExtraResonance(Effect):
     invertibility = Invertibility.EXACT
     family = "dynamics"
     place = ChainPosition.DYNAMICS
+    excitation_need = ExcitationNeed.BROADBAND
     equation = "y = x + r (q − x),  q̈/ω0² + 2 ζ q̇/ω0 + q = x,  ω0 = 2π f0"
     signature = "The stage rings at one frequency after steps. The ratio of residual to response has a peak there"
     source = "modes of the structure, ζ 0.005–0.03"

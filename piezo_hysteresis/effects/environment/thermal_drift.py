@@ -10,6 +10,7 @@ from ...blocks.block import Array, Block
 from ...blocks.time import TimeBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
+from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
 
@@ -33,6 +34,7 @@ class ThermalDrift(Effect):
     invertibility = Invertibility.EXACT
     family = "drift"
     place = ChainPosition.ENVIRONMENT
+    excitation_need = ExcitationNeed.REPEATED_PHASE
     equation = "y = x + D (1 − e^(−t/τ))"
     signature = "The residual depends on absolute time only. It is the same in rest phases and under drive"
     source = "first-order warm-up of the stage; 0.1–1 µm/K, 1–60 min"

@@ -39,6 +39,7 @@ class ModifiedBoucWen(HysteresisOperator):
 
     gain_names = ("A", "p1", "p2")
     memory_names = ("A", "beta", "gamma")
+    loop_names = ("A",)
 
     def check(self) -> None:
         check_bounded(self)

@@ -6,6 +6,7 @@ from typing import Self
 
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
+from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
 
@@ -30,6 +31,7 @@ class HysteresisExponent(Term):
     invertibility = Invertibility.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
+    excitation_need = ExcitationNeed.SEVERAL_AMPLITUDES
     host = "bouc_wen"
     equation = "dh = A dv − (β |dv| h + γ dv |h|)·|h/h_ref|^(n−1),  h_ref = 0.2"
     signature = "The shape of the loop changes with amplitude. Four amplitudes or more are needed to see it"

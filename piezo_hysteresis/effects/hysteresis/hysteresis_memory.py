@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -10,10 +10,11 @@ from ...blocks.block import Array, Block, State
 from ...blocks.kernel import kernel
 from ...errors import ParameterError
 from ...parameter import Parameter
-from ..effect import ChainPosition, Discretisation, Effect
+from ..effect import ChainPosition, Discretisation, Effect, Term
+from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
-from .level_dependent_memory import LevelDependentMemoryBlock
+from .level_dependent_memory import LevelDependentMemory, LevelDependentMemoryBlock
 
 SPAN = 32.0
 """Largest radius over the smallest."""
@@ -41,12 +42,16 @@ class HysteresisMemory(Effect):
     invertibility = Invertibility.EXACT
     family = "hysteresis"
     place = ChainPosition.HYSTERESIS
+    excitation_need = ExcitationNeed.SEVERAL_AMPLITUDES
     equation = "w + Σ_j c_j p_j,  p_j = max(v − r_j, min(v + r_j, p_j before))"
     signature = (
         "The residual is large in nested and decaying minor loops, where the stage returns to the point at "
         "which it left a loop"
     )
     source = "Prandtl-Ishlinskii operator; Gu et al. 2016"
+    loop_names = ("c",)
+    level_term: ClassVar[type[Term]] = LevelDependentMemory
+    """Term that lets the weights of the plays depend on the level."""
     parameters = (
         Parameter("c", "c_j", "1", (0.0,) * 8, 0.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
         Parameter("reach", "r_max", "1", 0.5, 1e-3, 10.0, "half width of the widest play", "Gu 2016", fixed=True),

@@ -11,6 +11,7 @@ from ...blocks.relaxation import RelaxationBlock
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
+from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
 
@@ -50,6 +51,7 @@ class Creep(Effect):
     invertibility = Invertibility.EXACT
     family = "creep"
     place = ChainPosition.MATERIAL
+    excitation_need = ExcitationNeed.HELD_LEVEL
     equation = "y = w + γ Σ_j ½ (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w;  after a step: 1 + γ log10(t/0.1 s)"
     signature = (
         "The residual grows with log t after each change of level. On sines the gain falls linearly in log f "

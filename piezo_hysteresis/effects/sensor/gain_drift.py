@@ -10,6 +10,7 @@ from ...blocks.block import Array, Block
 from ...blocks.time import TimeBlock
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
+from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
 
@@ -33,6 +34,7 @@ class GainDrift(Effect):
     invertibility = Invertibility.EXACT
     family = "drift"
     place = ChainPosition.SENSOR
+    excitation_need = ExcitationNeed.REPEATED_PHASE
     equation = "y = x [1 + g (1 − e^(−t/τ))]"
     signature = (
         "The residual is proportional to the displacement and grows with time. Repeat the first triangle at "

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import Creep, CreepTwoRates, EvenInputPolynomial, LevelDependentMemory
+from ...effects import MEMORY, Creep, CreepTwoRates, EvenInputPolynomial
 from ..fit.bounded_step import bounded_step
 from ..steps.linear_start import dynamics_of
 from .piece_fit import GAIN, POLE, STIFF, PieceFit
@@ -53,14 +53,14 @@ class ModelStructure:
         """Names of the optional effects."""
         creep = ((), (Creep.name,), (CreepTwoRates.name,))[self.creep_rates]
         square = (EvenInputPolynomial.name,) if self.square else ()
-        return (*square, *creep, *((LevelDependentMemory.name,) if self.level else ()))
+        return (*square, *creep, *((MEMORY.level_term.name,) if self.level else ()))
 
     def is_held(self, name: str) -> bool:
         """Whether the number `name` is off in this structure."""
         owner = name.partition(".")[0]
         return (
             (owner == EvenInputPolynomial.name and not self.square)
-            or (owner == LevelDependentMemory.name and not self.level)
+            or (owner == MEMORY.level_term.name and not self.level)
             or (owner == CreepTwoRates.name and self.creep_rates == 0)
         )
 

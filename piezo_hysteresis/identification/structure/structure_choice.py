@@ -1,8 +1,9 @@
-"""`choose_structure`: the effects of a model that predict rates, amplitudes and records which were left out.
+"""`choose_structure`: chooses the effects of a model by how well they predict rates, amplitudes and records left out.
 
-Free relaxations and free weights fit better and predict disastrously. What is offered is bounded, and predicts: plays
-with weights that are not negative or a Bouc-Wen state, cubic and square of the drive, logarithmic creep with one rate
-or two, weights that depend on the level, a delay, one pole and one lightly damped mode.
+Relaxations and weights without bounds fit the data better, but their predictions are much worse. Therefore only
+bounded effects are offered: play operators with weights that are not negative, or the state of a hysteresis operator;
+the cube and the square of the drive; logarithmic creep with one rate or two; weights that depend on the level; a delay,
+one pole and one lightly damped mode.
 """
 
 from __future__ import annotations
@@ -13,14 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...effects import (
+    MEMORY,
     Arx,
     Creep,
     CreepTwoRates,
     Effect,
     EvenInputPolynomial,
     ExtraResonance,
-    HysteresisMemory,
-    LevelDependentMemory,
 )
 from ...errors import PiezoError
 from ...model.model import Model
@@ -34,17 +34,20 @@ from .scores import STRUCTURES, Judged, ModelStructure, judge
 from .uncertainty import as_fit, spread_of
 
 PLAYS = 16
-"""Plays, geometric in their half widths."""
+"""Number of play operators; their half widths form a geometric series."""
 WIDEST = 0.94
-"""Half width of the widest play over the largest drive; on the way from rest a play moves beyond its half width."""
+"""Half width of the widest play, as a share of the largest drive; a play at rest moves once the drive exceeds it."""
 START_CREEP = 0.005
-"""Creep per decade at which a fit begins."""
+"""Creep per decade of time at which a fit starts."""
 TIE = 0.02
-"""Difference of scores (mean ln R²) within which the structure with fewer numbers is taken."""
+"""Difference of scores (mean ln R²) within which the structure with fewer parameters is chosen."""
 CREEPS = (Creep.name, CreepTwoRates.name)
 """Forms of creep."""
 LEADS = 0.35
-"""Lead in score that a Bouc-Wen state needs over plays: they are bounded by what the loops show."""
+"""Difference of scores (mean ln R²) from which the state of the operator is preferred to plays.
+
+Plays are preferred below it, because they stay inside the largest measured loop.
+"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -54,12 +57,12 @@ class StructureChoice:
     Parameters
     ----------
     fit : Fit
-        Of the structure chosen; its covariance holds what folds left out and rival structures leave open.
+        Fit of the chosen structure; its covariance includes the spread over the folds and over rival structures.
     judged : tuple of Judged
         Every structure, best first.
     leads : mapping of str to float
-        By how much in score (mean ln R²) every optional effect of the model predicts better what was left out than the
-        best structure without it; empty where a Bouc-Wen state was kept.
+        For every optional effect, the score (mean ln R²) of the best structure without it minus the score of the chosen
+        one; empty where the state of the operator was kept.
     notices : tuple of Notice
         ``structure``, ``memory``, ``ringing``.
     """
@@ -73,20 +76,20 @@ class StructureChoice:
 def choose_structure(
     start: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int], progress: Progress
 ) -> StructureChoice:
-    """Choose the structure of the model and fit it.
+    """Choose the structure of the model, and fit it.
 
     Parameters
     ----------
     start : Model
-        With a hysteresis that was fitted to the loops; its scales and its gain are kept.
+        Its hysteresis was fitted to the loops; its scales and its gain are kept.
     records : sequence of Record
-        In order.
+        Records in the order of the experiment.
     floors : sequence of float
-        Floor of every record [m].
+        Noise floor of every record [m].
     fitted : collection of int
         Indices of the records to fit.
     progress : callable
-        Called with a word and the fraction done.
+        Called with the name of the step and the fraction done.
     """
     kept = carried(records, fitted)
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
@@ -95,7 +98,7 @@ def choose_structure(
     plain, ringing, notices = fit_linear_part(_with_plays(start, used), pieces, sizes)
     progress("structure: effects", 0.4)
     held = held_by(plain)
-    full = fit_structure(plain.model.with_effect(LevelDependentMemory()), pieces, sizes, held)
+    full = fit_structure(plain.model.with_effect(MEMORY.level_term()), pieces, sizes, held)
     judged = sorted(judge(full, pieces, STRUCTURES), key=lambda j: j.score)
     best = judged[0]
     chosen = min((j for j in judged if not j.score > best.score + TIE), key=lambda j: (j.structure.size, j.score))
@@ -106,24 +109,24 @@ def choose_structure(
     notices.append(
         Notice(
             "structure",
-            f"chosen on rates, amplitudes and records left out: {_words(chosen.structure)}; "
-            f"error there in floors: {described}",
+            f"by prediction of rates, amplitudes and records left out, {_words(chosen.structure)} was chosen; "
+            f"prediction errors in units of the noise floor: {described}",
         )
     )
     rival, lead = _rival(start, final, chosen, pieces, sizes)
     if rival is not None:
-        factor = f"by a factor of {np.exp(0.5 * lead):.3g}"
-        notices.append(Notice("memory", f"a Bouc-Wen state predicts what was left out better {factor}: it is kept"))
+        message = f"{start.hysteresis.name} predicts data left out better by a factor of {np.exp(0.5 * lead):.3g}"
+        notices.append(Notice("memory", f"{message}, so it is used instead of plays"))
         nothing = np.zeros((len(rival.names),) * 2)
         return StructureChoice(as_fit(rival, pieces, sizes, nothing), tuple(judged), {}, tuple(notices))
-    notices.append(Notice("memory", f"{HysteresisMemory.name} is taken: turning points are remembered"))
+    notices.append(Notice("memory", f"{MEMORY.name} is used: the stage remembers its turning points"))
     spread = spread_of(full, final, chosen, judged)
-    leads = {HysteresisMemory.name: -lead, ExtraResonance.name: ringing, **_leads(chosen, judged)}
+    leads = {MEMORY.name: -lead, ExtraResonance.name: ringing, **_leads(chosen, judged)}
     return StructureChoice(as_fit(final, pieces, sizes, spread), tuple(judged), leads, tuple(notices))
 
 
 def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
-    """Lead of the chosen structure over the best structure without one of its effects."""
+    """Score of the best structure without an effect, minus the score of the chosen one."""
     found = {}
     for name in chosen.structure.effects:
         family = CREEPS if name in CREEPS else (name,)
@@ -133,7 +136,7 @@ def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
 
 
 def _with_plays(start: Model, records: Sequence[Record]) -> Model:
-    """All effects but those that depend on the level, at values from which a fit goes downhill."""
+    """The model with all effects that are offered, except weights that depend on the level, at start values."""
     period = start.sample_period
     farthest = max(float(np.abs(np.append(r.voltage, r.settled_voltage)).max()) for r in records)
     low = min(float(np.append(r.voltage, r.settled_voltage).min()) for r in records)
@@ -142,7 +145,7 @@ def _with_plays(start: Model, records: Sequence[Record]) -> Model:
     longest = max(r.duration for r in records)
     effects: tuple[Effect, ...] = (
         start.hysteresis.memoryless() or start.hysteresis,
-        HysteresisMemory(c=(0.02,) * PLAYS, reach=reach, virgin=1.0),
+        MEMORY(c=(0.02,) * PLAYS, reach=reach, virgin=1.0),
         EvenInputPolynomial(),
         CreepTwoRates(
             gamma_fast=START_CREEP, gamma_slow=START_CREEP, tau_min=period, tau_max=max(10.0 * longest, 20.0 * period)
@@ -158,7 +161,7 @@ def _reduced(model: Model, chosen: Judged) -> Model:
     if not structure.square:
         model = model.without(EvenInputPolynomial.name)
     if not structure.level:
-        model = model.without(LevelDependentMemory.name)
+        model = model.without(MEMORY.level_term.name)
     if structure.creep_rates < 2:
         creep = model[CreepTwoRates.name]
         model = model.without(CreepTwoRates.name)
@@ -171,8 +174,8 @@ def _reduced(model: Model, chosen: Judged) -> Model:
 def _rival(
     start: Model, final: PieceFit, chosen: Judged, pieces: Sequence[RecordPiece], floors: Sequence[float]
 ) -> tuple[PieceFit | None, float]:
-    """The Bouc-Wen state in the place of the plays where it leads clearly, and by how much in score."""
-    model = final.model.without(LevelDependentMemory.name).without(HysteresisMemory.name)
+    """The fit with the operator instead of plays if it predicts clearly better, and the difference of the scores."""
+    model = final.model.without(MEMORY.level_term.name).without(MEMORY.name)
     model = model.with_hysteresis(start.hysteresis)
     same = ModelStructure(True, 2, True)
     try:
