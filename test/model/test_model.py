@@ -75,7 +75,7 @@ def test_a_lag_holds_at_every_period_and_run_takes_it() -> None:
     np.testing.assert_array_equal(lag.simulate(u, sample_period=1e-4), wanted)
     assert np.abs(lag.simulate(u, sample_period=1e-6) - wanted).max() > 0.05 * np.ptp(wanted)
     for ask in (lag.rest, lambda _: lag.simulate(u)):
-        with pytest.raises(ModelError, match="expected that of the samples; the model was identified at 1e-06, 0.0001"):
+        with pytest.raises(ModelError, match=r"of the samples; the model was identified at 1e-06, 0.0001"):
             ask(0.0)
     with pytest.raises(ModelError, match="expected 1e-06 s"):
         lag.rest(0.0, sample_period=1e-7)
