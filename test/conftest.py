@@ -3,8 +3,12 @@
 Tests of real processes over DDS need the processor in time. One that fails is tried once more, and reported as RERUN: a
 promise that does not hold fails twice, a computer that was busy elsewhere does not. Nor does it fail a property: no
 example has a deadline.
+
+A shell starts a background job with SIGINT ignored, and every process below it inherits that. Tests that interrupt nodes
+need the signal to arrive.
 """
 
+import signal
 from zlib import crc32
 
 import pytest
@@ -12,6 +16,8 @@ from hypothesis import settings
 
 settings.register_profile("patient", deadline=None)
 settings.load_profile("patient")
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(tryfirst=True)
