@@ -1,6 +1,6 @@
 /* The inverse of creep and hysteresis as one would write it in C, with the arithmetic of the package: relaxations solved
-   algebraically, the exact Bouc-Wen step turned round by Newton's first step and the secant, plays beside it, limits in
-   the loop. The dynamics are taps and a recursion of eight before it. */
+   algebraically, the exact Bouc-Wen step turned round by Newton's method, plays beside it, limits in the loop. The
+   dynamics are taps and a recursion of eight before it. */
 
 #include <math.h>
 
@@ -28,13 +28,22 @@ static double step(double h, double dv, double A, double beta, double gamma)
     return end;
 }
 
-static double output(const double *p, const double *c, const double *radii, long plays, double h, double last,
-                     const double *held, double v)
+static double output(const double *p, const double *c, const double *radii, long plays, const double *held, double v)
 {
-    double w = p[3] * v * v * v + p[4] * v + (v == last ? h : step(h, v - last, p[0], p[1], p[2])), total = 0.0;
+    double total = 0.0;
     for (long j = 0; j < plays; j++)
         total += c[j] * fmax(v - radii[j], fmin(v + radii[j], held[j]));
-    return w + total;
+    return p[3] * v * v * v + p[4] * v + total;
+}
+
+static double slope_at(const double *p, const double *c, const double *radii, long plays, double h, double v,
+                       const double *held, double s)
+{
+    double slope = 3.0 * p[3] * v * v + p[4] + p[0] - (p[1] * s + p[2] * copysign(1.0, h)) * h;
+    for (long j = 0; j < plays; j++)
+        if (s * (v - held[j]) >= radii[j] * (1.0 - 1e-9))
+            slope += c[j];
+    return slope;
 }
 
 /* y (n + taps - 1) to targets (n); a has eight coefficients. */
@@ -75,20 +84,14 @@ void invert(const double *targets, long n, const double *p, const double *c, con
         const double enough = 1e-15 * (fabs(wanted) + fabs(now));
         if (fabs(gap) > enough) {
             const double s = copysign(1.0, gap);
-            double slope = (3.0 * p[3] * last) * last + p[4] + p[0] - (p[1] * s + p[2] * copysign(1.0, h)) * h;
-            for (long j = 0; j < plays; j++)
-                if (s * (last - held[j]) >= radii[j] * (1.0 - 1e-9))
-                    slope += c[j];
-            if (slope < 0.02 * p[4])
-                slope = p[4];
-            double x0 = last, g0 = gap;
-            v = last + gap / slope;
+            double end = h;
+            v += gap / slope_at(p, c, radii, plays, end, v, held, s);
             for (int k = 0; k < 80; k++) {
-                const double g = wanted - output(p, c, radii, plays, h, last, held, v);
-                if (fabs(g) <= enough || g == g0)
+                end = step(h, v - last, p[0], p[1], p[2]);
+                const double g = wanted - output(p, c, radii, plays, held, v) - end;
+                if (fabs(g) <= enough)
                     break;
-                const double next = v + g * (v - x0) / (g0 - g);
-                x0 = v, g0 = g, v = next;
+                v += g / slope_at(p, c, radii, plays, end, v, held, s);
             }
         }
         u[i] = fmin(fmax(v * limits[0], u_last - limits[3]), u_last + limits[3]);

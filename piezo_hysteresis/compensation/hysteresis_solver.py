@@ -2,7 +2,8 @@
 
 w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j (p_j + b_j p_j²) with the plays p_j(v); c and b are the rows of
 one array. The loop is stepped by the kernels that the model runs, so that the root is that of the model to rounding.
-The search is Newton's first step and then the secant, kept inside a bracket.
+Where the slope of the loop is known in closed form, the search is Newton's method. Otherwise, and where Newton's method
+leaves the range or does not settle, it is Newton's first step and then the secant, kept inside a bracket.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 from math import copysign
 
 from ..blocks.bouc_wen_kernel import BETA, GAMMA, A, general_step, plain_step
-from ..blocks.kernel import inlined
+from ..blocks.kernel import fma, inlined
 from ..effects.hysteresis.published_bouc_wen import step as published_step
 
 NO_LOOP, PLAIN, GENERAL, PUBLISHED = range(4)
@@ -19,6 +20,8 @@ P1, P2, SQUARE, FOURTH = range(4)
 """Numbers of the static polynomial: of v³, v, v² and v⁴."""
 ROUNDING = 1e-15
 """Share of w, and of v, below which a difference is rounding."""
+NEWTON = 6
+"""Steps of Newton's method before the search keeps a bracket."""
 MOST = 80
 """Steps of the search at most; the bracket is halved at every sixth."""
 
@@ -39,7 +42,7 @@ def loop_end(kind, p, periods, h, last, v):
 def static_part(poly, v):
     """p1 v³ + p2 v + p_e v² + p_4 v⁴."""
     square = v * v
-    return poly[P1] * v * v * v + poly[P2] * v + (poly[SQUARE] + poly[FOURTH] * square) * square
+    return fma(fma(poly[P1], square, poly[P2]), v, fma(poly[FOURTH], square, poly[SQUARE]) * square)
 
 
 @inlined
@@ -62,15 +65,15 @@ def output(kind, p, periods, poly, c, radii, h, last, plays, v):
 
 
 @inlined
-def slope_at(kind, p, poly, c, radii, h, last, plays, s):
-    """∂w/∂v where v leaves `last` in the direction s."""
-    v = last
-    slope = (3.0 * poly[P1] * v + 2.0 * poly[SQUARE]) * v + poly[P2] + 4.0 * poly[FOURTH] * v * v * v
+def slope_at(kind, p, poly, c, radii, h, v, plays, s):
+    """∂w/∂v where v moves on in the direction s and the loop is at h; plays as before the sample."""
+    square = v * v
+    slope = fma(3.0 * poly[P1], square, poly[P2]) + 2.0 * v * fma(2.0 * poly[FOURTH], square, poly[SQUARE])
     if kind != NO_LOOP:
         slope += p[A] - (p[BETA] * s + p[GAMMA] * copysign(1.0, h)) * h
     for j in range(radii.size):
         if s * (v - plays[j]) >= radii[j] * (1.0 - 1e-9):
-            slope += c[0, j] * (1.0 + 2.0 * c[1, j] * plays[j])
+            slope += c[0, j] * (1.0 + 2.0 * c[1, j] * (v - s * radii[j]))
     return slope
 
 
@@ -88,6 +91,15 @@ def solve(kind, p, periods, poly, c, radii, h, last, plays, wanted, now, orienta
     slope = slope_at(kind, p, poly, c, radii, h, last, plays, s)
     if slope * orientation < 0.02 * abs(poly[P2]):
         slope = orientation * max(abs(poly[P2]), 1e-3)
+    x = last + gap / slope
+    for _ in range(NEWTON if kind <= PLAIN else 0):
+        if not (s * (x - last) > 0.0 and s * (edge - x) >= 0.0):
+            break
+        end = loop_end(kind, p, periods, h, last, x)
+        g = wanted - static_part(poly, x) - end - plays_end(c, radii, plays, x)
+        if abs(g) <= enough:
+            return x
+        x += g / slope_at(kind, p, poly, c, radii, end, x, plays, s)
     near = last  # wanted − w has the sign of gap here,
     far, closed = edge, False  # and the other one here, once found
     x0, g0 = last, gap

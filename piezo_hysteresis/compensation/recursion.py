@@ -96,12 +96,13 @@ def settle_before(target, starts, direct, fade, lead, weights, lasts, banks, gai
 def relax_to(w, starts, direct, lead, weights, lasts, banks, ahead):
     """States of the banks for the w that comes."""
     for b in range(direct.size):
-        moved, y = w - lasts[b], w + direct[b] * w
+        moved, lasts[b] = w - lasts[b], w
         for j in range(starts[b], starts[b + 1]):
             banks[j] = ahead[j] + lead[j] * moved
-            y += weights[j] * banks[j]
-        lasts[b] = w
-        w = y
+        if b + 1 < direct.size:
+            w += direct[b] * w
+            for j in range(starts[b], starts[b + 1]):
+                w += weights[j] * banks[j]
 
 
 @kernel
@@ -112,18 +113,19 @@ def invert(targets, kind, p, periods, poly, c, radii, d, bank, state, plays, las
     """
     starts, direct, fade, lead, weights, gains = bank
     ahead = banks.copy()
+    h, last, now = state[H], state[LAST], state[W]
     for i in range(targets.size):
         target = settle_before(targets[i], starts, direct, fade, lead, weights, lasts, banks, gains, ahead)
-        h, last = state[H], state[LAST]
-        v = solve(kind, p, periods, poly, c, radii, h, last, plays, target, state[W], d[TURN], d[LOW], d[HIGH])
+        v = solve(kind, p, periods, poly, c, radii, h, last, plays, target, now, d[TURN], d[LOW], d[HIGH])
         u[i] = voltage_for(v / d[PER_VOLT], d, state)
         v = drive(u[i], d, state) * d[PER_VOLT]
-        state[H], state[LAST] = loop_end(kind, p, periods, h, last, v), v
-        state[W] = static_part(poly, v) + state[H]
+        h, last = loop_end(kind, p, periods, h, last, v), v
+        now = static_part(poly, v) + h
         if radii.size:
             total = 0.0
             for j in range(radii.size):
                 plays[j] = max(v - radii[j], min(v + radii[j], plays[j]))
                 total += c[0, j] * (plays[j] + c[1, j] * plays[j] * plays[j])
-            state[W] += total
-        relax_to(state[W], starts, direct, lead, weights, lasts, banks, ahead)
+            now += total
+        relax_to(now, starts, direct, lead, weights, lasts, banks, ahead)
+    state[H], state[LAST], state[W] = h, last, now
