@@ -30,6 +30,7 @@ setup(
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={
         NAME: ["py.typed"],
+        f"{NAME}.export": ["templates/*.jinja"],
         f"{NAME}.report": ["page.css", "page.html.jinja"],
         f"{NAME}.report.live": ["page.css", "page.html.jinja", "panels.css"],
     },

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..c_form import HISTORY, CForm
 from .block import Array, State
 from .kernel import fma, kernel
 from .linear import LinearBlock, Section
@@ -145,6 +146,41 @@ def dc_gain_slopes(a: Array, b: Array) -> Array:
     return np.concatenate((np.full(a.size, -b.sum() / at_a**2), np.full(b.size, 1.0 / at_a), [0.0]))
 
 
+INPUTS = """\
+const double *u = remember(s->inputs, INPUTS, &s->newest_input, x - s->x_rest) + OFFSET;
+double y = 0.0;
+int i, k;
+for (i = 0; i < TAPS; i += 8) {
+    for (k = (i + 8 < TAPS ? i + 8 : TAPS) - 1; k >= i; k--) {
+        y = FMA(b[k], u[k], y);
+    }
+}
+"""
+"""C code of `weigh` for one sample."""
+FEEDBACK = """\
+for (k = ORDER - 1; k >= 0; k--) {
+    y = FMA(-a[k], s->outputs[s->newest_output + k], y);
+}
+remember(s->outputs, ORDER, &s->newest_output, y);
+"""
+"""C code of `recur` for one sample."""
+
+
+def difference_equation(taps: Array, offset: int, feedback: Array, rest: str, **numbers: float) -> CForm:
+    """`arx_row` as C code, without zeros at the end of taps and feedback.
+
+    `rest` is C code that sets ``s->x_rest`` and ``s->y_rest`` for x, using `numbers`, and returns the output.
+    """
+    b, a = np.trim_zeros(taps, "b") if taps.any() else taps[:1], np.trim_zeros(feedback, "b")
+    state = ["double x_rest, y_rest", f"double inputs[{2 * (offset + b.size)}]", "int newest_input"]
+    counts = {"INPUTS": offset + b.size, "OFFSET": offset, "TAPS": b.size}
+    if a.size:
+        state += [f"double outputs[{2 * a.size}]", "int newest_output"]
+    step = INPUTS + (FEEDBACK if a.size else "") + "return s->y_rest + y;"
+    start = f"memset(s, 0, sizeof *s);\n{rest}"
+    return CForm(step, start, {**counts, "ORDER": a.size, "b": b, "a": a, **numbers}, tuple(state), (HISTORY,))
+
+
 class ArxBlock(LinearBlock):
     """State: history of inputs, oldest first, and of outputs, newest first."""
 
@@ -189,6 +225,10 @@ class ArxBlock(LinearBlock):
         arx_filter(dx, dx0, self.gain * dx0, self.taps, self.offset, self.feedback, dz, rows[:m])
         own = self._slopes(x - x0, y - self.gain * x0, self.gain_slopes() * x0, own, rows[m:])
         return y, rows, after, (dx0, dz, own)
+
+    def c_form(self) -> CForm:
+        rest = "s->x_rest = x;\ns->y_rest = gain * x;\nreturn s->y_rest;"
+        return difference_equation(self.taps, self.offset, self.feedback, rest, gain=float(self.gain))
 
     def gain_slopes(self) -> Array:
         return self._gain_slopes

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..c_form import CForm
+
 Array = NDArray[np.float64]
 State = Any
 """Opaque to everyone but the block that made it."""
@@ -61,6 +63,10 @@ class Block(ABC):
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         """`run`, and the sensitivities: y (n,), dy (m + p, n), state, tangent state."""
 
+    def c_form(self) -> CForm | str:
+        """The block as C code, equal to `run`; or the reason why there is none, for a message."""
+        return "has no C form"
+
 
 class MemorylessBlock(Block):
     """y_i = f(x_i; θ)."""
@@ -107,8 +113,8 @@ class SumBlock(Block):
 
     keeps_state = True
 
-    def __init__(self, members: tuple[Block, ...]) -> None:
-        self.members = members
+    def __init__(self, members: tuple[Block, ...], labels: tuple[str, ...] = ()) -> None:
+        self.members, self.labels = members, labels or tuple(f"part_{k}" for k in range(len(members)))
         self.names = tuple(name for member in members for name in member.names)
 
     def static(self, x0: float) -> float:
@@ -139,6 +145,16 @@ class SumBlock(Block):
             states.append(s)
             tangents.append(t)
         return y, np.vstack((mapped, *mine)), tuple(states), tuple(tangents)
+
+    def c_form(self) -> CForm | str:
+        parts: dict[str, CForm] = {}
+        for label, member in zip(self.labels, self.members, strict=True):
+            form = member.c_form()
+            if isinstance(form, str):
+                return form
+            parts[label] = form
+        step, rest = (" + ".join(part.call(f, label, "x") for label, part in parts.items()) for f in ("step", "rest"))
+        return CForm(f"return {step};", f"return {rest};", parts=parts)
 
 
 class SeriesBlock(Block):

@@ -137,3 +137,89 @@ def run_general(v, p, p1, p2, sample_period, jump_period, state, w):
             h = general_step(h, dv, p, sample_period, jump_period)
         w[i] = p1 * x * x * x + p2 * x + h
     state[0], state[1] = h, last
+
+
+ADVANCE_IN_C = """\
+/* (1 - exp(-r length))/r, also for small r. */
+static double decay(double r, double length)
+{
+    const double x = r * length;
+    if (fabs(x) < 0.02) {
+        return length
+            * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0))))));
+    }
+    return -expm1(-x) / r;
+}
+
+/* Path length at which h, driven through zero, gets there. */
+static double crossing(double h, double drive, double r)
+{
+    return fabs(r) < 1e-12 ? -h / drive : log1p(-h * r / drive) / r;
+}
+"""
+"""C functions of `decay` and `crossing`."""
+PLAIN_IN_C = """\
+/* h of the Bouc-Wen loop after a straight way of dv, which is not zero. */
+static double plain_step(double h, double dv, double a, double beta, double gamma)
+{
+    const double s = copysign(1.0, dv), length = fabs(dv), drive = s * a;
+    const double r_above = beta + gamma * s, r_below = beta - gamma * s;
+    const int is_above = h > 0.0 || (h == 0.0 && drive > 0.0);
+    const double r_same = is_above ? r_above : r_below, r_flipped = is_above ? r_below : r_above;
+    const double end = h + (drive - r_same * h) * decay(r_same, length);
+    if (end * h < 0.0) {
+        return drive * decay(r_flipped, fmax(0.0, length - crossing(h, drive, r_same)));
+    }
+    return end;
+}
+"""
+"""C function of `plain_step`."""
+GENERAL_IN_C = (
+    f"""\
+static const double JUMP = {JUMP!r}, SLOWEST = {SLOWEST!r}, SUB_STEP = {SUB_STEP!r}, H_REFERENCE = {H_REFERENCE!r};
+
+"""
+    """\
+/* h after `length` with loss rate r_same, and r_flipped once h has crossed zero. */
+static double advance(double h, double drive, double length, double r_same, double r_flipped)
+{
+    const double end = h + (drive - r_same * h) * decay(r_same, length);
+    if (end * h < 0.0) {
+        return drive * decay(r_flipped, fmax(0.0, length - crossing(h, drive, r_same)));
+    }
+    return end;
+}
+
+/* h of the Bouc-Wen loop with all its terms after a straight way of dv, which is not zero;
+   p = A, beta, gamma, phi1, phi2, n, k, a. */
+static double general_step(double h, double dv, const double *p, double sample_period, double jump_period)
+{
+    const double n = p[5], k = p[6], s = copysign(1.0, dv);
+    double drive = s * p[0], length = fabs(dv);
+    int steps = 1, i;
+    if (k != 0.0) {
+        const double rate = log(fmax(length / (length > JUMP ? jump_period : sample_period), SLOWEST));
+        drive = drive * (1.0 + k * (fabs(p[7]) < 1e-9 ? rate : expm1(p[7] * rate) / p[7]));
+    }
+    if (n != 1.0) {
+        steps = (int)fmax(1.0, ceil(length / SUB_STEP));
+    }
+    length = length / steps;
+    for (i = 0; i < steps; i++) {
+        const double g = copysign(1.0, h == 0.0 ? drive : h), bend = p[3] * s, gm = p[4] * g;
+        double same = p[1] + p[2] * s * g, flipped = p[1] - p[2] * s * g;
+        if (n != 1.0) {
+            double power = pow(fabs(h / H_REFERENCE), n - 1.0);
+            const double middle
+                = advance(h, drive, 0.5 * length, power * same - bend - gm, power * flipped - bend + gm);
+            power = pow(fabs(middle / H_REFERENCE), n - 1.0);
+            same = power * same;
+            flipped = power * flipped;
+        }
+        h = advance(h, drive, length, same - bend - gm, flipped - bend + gm);
+    }
+    return h;
+}
+"""
+)
+"""C function of `general_step`."""

@@ -6,6 +6,7 @@ from abc import abstractmethod
 
 import numpy as np
 
+from ..c_form import CForm, Number
 from .block import Array, Block, State
 
 
@@ -44,3 +45,7 @@ class ChannelBlock(Block):
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         rows = np.zeros((len(self.names), x.size)) if state is None else self.by_parameter(state)
         return self.run(x, state)[0], np.vstack((dx, rows)), None, None
+
+    def added_in_c(self, value: str, **numbers: Number) -> CForm:
+        """C form from the C expression `value` of f(c)."""
+        return CForm(f"return x + {value};", "return x;", numbers, channel=self.channel)

@@ -4,8 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..c_form import HISTORY, CForm
 from .block import Array, State
 from .linear import AddedBlock, Section
+
+STEP = """\
+const double *u = remember(s->inputs, INPUTS, &s->newest, x - s->x_rest);
+double y = direct * u[0];
+int k;
+for (k = 0; k < TAPS; k++) {
+    y += taps[k] * u[FIRST + k];
+}
+return x + y;
+"""
+"""C code of one sample."""
 
 
 class FirBlock(AddedBlock):
@@ -45,6 +57,25 @@ class FirBlock(AddedBlock):
     def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
         for k, weights in enumerate(self.slopes):
             self._weigh(x[None, :], z[None, :], weights, rows[k : k + 1])
+
+    def c_form(self) -> CForm:
+        later = np.flatnonzero(self.added[1:]) + 1
+        if not later.size:
+            return CForm("return x;")
+        taps = self.added[later[0] :]
+        return CForm(
+            STEP,
+            "memset(s, 0, sizeof *s);\ns->x_rest = x;\nreturn x;",
+            {
+                "INPUTS": self.added.size,
+                "FIRST": int(later[0]),
+                "TAPS": taps.size,
+                "direct": self.added[0],
+                "taps": taps,
+            },
+            ("double x_rest", f"double inputs[{2 * self.added.size}]", "int newest"),
+            (HISTORY,),
+        )
 
     def _weigh(self, x: Array, z: Array, weights: Array, y: Array) -> Array:
         past, n = np.concatenate((z, x), axis=1), x.shape[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..c_form import CForm
 from .block import Array, State
 from .kernel import kernel
 from .linear import AddedBlock, Section
@@ -39,6 +40,20 @@ def poles_by_tau(u, left, lead, back, left_slope, lead_slope, back_slope, z, dz,
             before, x, dbefore, dx = z[k], after, dz[k], dafter
             z[k], dz[k] = after, dafter
         dy[i] = dx
+
+
+STEP = """\
+double y = x - s->x_rest, before = s->z[0], after;
+int k;
+s->z[0] = y;
+for (k = 1; k <= POLES; k++) {
+    after = left * s->z[k] + lead * y + back * before;
+    before = s->z[k];
+    s->z[k] = y = after;
+}
+return x + (y - (x - s->x_rest));
+"""
+"""C code of `run_poles` for one sample."""
 
 
 class LowPassBlock(AddedBlock):
@@ -78,6 +93,12 @@ class LowPassBlock(AddedBlock):
         run_poles(x, *self.step, z, y)
         y -= x
         return z
+
+    def c_form(self) -> CForm:
+        left, lead, back = self.step
+        numbers = {"POLES": self.count, "left": left, "lead": lead, "back": back}
+        state = ("double x_rest", f"double z[{1 + self.count}]")
+        return CForm(STEP, "memset(s, 0, sizeof *s);\ns->x_rest = x;\nreturn x;", numbers, state)
 
     def own_rest(self) -> State:
         return np.zeros(1 + self.count)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..c_form import CForm, Number
 from .block import Array
 from .kernel import kernel
 from .linear import AddedBlock
@@ -66,6 +67,23 @@ def relax(u, fade, lead, weights, z, y):
         z[r, 0] = u[r, n - 1]
 
 
+STEP = """\
+const double u = x - s->x_rest, du = u - s->last;
+double y = 0.0;
+int j;
+for (j = 0; j < SIZE; j++) {
+    s->z[j] += fade[j] * (s->last - s->z[j]) + lead[j] * du;
+}
+for (j = 0; j < SIZE; j += 4) {
+    y += (weight[j] * s->z[j] + weight[j + 1] * s->z[j + 1])
+       + (weight[j + 2] * s->z[j + 2] + weight[j + 3] * s->z[j + 3]);
+}
+s->last = u;
+return x + (gain * s->x_rest + (y + direct * u));
+"""
+"""C code of `relax` for one sample."""
+
+
 class RelaxationBlock(AddedBlock):
     """y = x + direct·x + Σ weight_j x_j, with x_j the relaxation of x with τ_j.
 
@@ -108,6 +126,17 @@ class RelaxationBlock(AddedBlock):
         relax(x, self.hold.fade, self.hold.lead, mix[1:].copy(), z, y)
         y += mix[0] * x
         return z
+
+    def c_form(self) -> CForm:
+        numbers: dict[str, Number] = {
+            "SIZE": self.mix.size - 1,
+            "fade": self.hold.fade,
+            "lead": self.hold.lead,
+            "gain": self.gain,
+        }
+        numbers |= {"direct": float(self.mix[0]), "weight": self.mix[1:]}
+        state = ("double x_rest, last", f"double z[{self.mix.size - 1}]")
+        return CForm(STEP, "memset(s, 0, sizeof *s);\ns->x_rest = x;\nreturn x + gain * x;", numbers, state)
 
     def gain_slopes(self) -> Array:
         return self.mix_slopes.sum(axis=1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..c_form import CForm
 from .block import Array, MemorylessBlock, State
 from .kernel import kernel
 
@@ -46,3 +47,6 @@ class ChangeOfUnit(MemorylessBlock):
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         dx *= self.factor
         return x * self.factor, dx, None, None
+
+    def c_form(self) -> CForm:
+        return CForm("return factor * x;", numbers={"factor": self.factor})

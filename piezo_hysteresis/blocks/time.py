@@ -6,6 +6,7 @@ from abc import abstractmethod
 
 import numpy as np
 
+from ..c_form import CForm, Number
 from .block import Array, Block, State
 
 
@@ -46,6 +47,12 @@ class TimeBlock(Block):
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         t, state = self._times(x.size, state)
         return self.value(x, t), state
+
+    def value_in_c(self, code: str, **numbers: Number) -> CForm:
+        """C form from C `code` that returns the value for x and t."""
+        step = f"const double t = period * s->count;\ns->count += 1.0;\n{code}"
+        rest = "s->count = 0.0;\nreturn x;"
+        return CForm(step, rest, {"period": self.sample_period, **numbers}, ("double count",))
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         t, state = self._times(x.size, state)

@@ -73,7 +73,7 @@ class Chain:
 
         hysteresis = blocks(ChainPosition.HYSTERESIS)
         if len(hysteresis) > 1:
-            hysteresis = [(hysteresis[0][0], SumBlock(tuple(b for _, b in hysteresis)))]
+            hysteresis = [(hysteresis[0][0], SumBlock(*zip(*((b, n) for n, b in hysteresis), strict=True)))]
         parts = [
             *blocks(ChainPosition.DRIVE),
             ("voltage_scale", ChangeOfUnit(1.0 / setting.voltage_scale)),

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...c_form import CForm
 from ..arx import ArxBlock
 from ..block import Array, Block, MemorylessBlock, SeriesBlock, State
 from ..group_delay import GroupDelayBlock
 from ..kernel import kernel
 from .mode_path import Path
+from .softened_arx_c import FORCE, REST, SETTLE, STEP
 
 
 @kernel
@@ -149,6 +151,12 @@ class SoftenedArxBlock(Block):
         added = np.empty((1, x.size))
         filtered = self.path.filter.filter(xi[None, :], filtered, added)
         return y + (self.path.share * (x0 - w0) + added[0]), (arx, (w0, x0), z, filtered)
+
+    def c_form(self) -> CForm:
+        numbers = dict(zip(("m1", "m2", "k2", "k3"), self.loop.tolist(), strict=True)) | {"share": self.path.share}
+        state = ("double w0, x0", "double mode[2]", "double xi[2]")
+        parts = {"linear": self.arx.c_form(), "path": self.path.filter.c_form()}
+        return CForm(STEP, REST, numbers, state, (FORCE, SETTLE), parts)
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
         slope, own = self.settled.static_slopes(x0)

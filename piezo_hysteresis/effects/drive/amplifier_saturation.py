@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from ...blocks.block import Array, Block, MemorylessBlock
+from ...c_form import CForm
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
@@ -59,6 +60,19 @@ class AmplifierSaturation(Effect):
         return AmplifierSaturationBlock(self["lower"], self["upper"], self["corner"])
 
 
+RAMP = """\
+/* Ramp with a bend of half width c. */
+static double ramp(double excess, double c)
+{
+    if (fabs(excess) < c) {
+        return (excess + c) * (excess + c) / (4.0 * c);
+    }
+    return fmax(excess, 0.0);
+}
+"""
+"""C function of the bend into each limit."""
+
+
 class AmplifierSaturationBlock(MemorylessBlock):
     """x − ramp(x − upper) + ramp(lower − x)."""
 
@@ -88,3 +102,7 @@ class AmplifierSaturationBlock(MemorylessBlock):
         _, above, above_corner = self._ramp(x - self.upper)
         _, below, below_corner = self._ramp(self.lower - x)
         return np.vstack((below, above, below_corner - above_corner))
+
+    def c_form(self) -> CForm:
+        numbers = {"lower": self.lower, "upper": self.upper, "corner": self.corner}
+        return CForm("return x - ramp(x - upper, corner) + ramp(lower - x, corner);", "", numbers, (), (RAMP,))

@@ -9,6 +9,7 @@ import numpy as np
 from ...blocks.block import Array, Block, State
 from ...blocks.held import HeldBlock
 from ...blocks.kernel import kernel
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
@@ -98,3 +99,7 @@ class AmplifierSlewLimitBlock(HeldBlock):
 
     def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
         linearise_limit(x, dx, self.reach, self.sample_period, state, tangent, y, dy)
+
+    def c_form(self) -> CForm:
+        step = "s->y = fmin(fmax(x, s->y - reach), s->y + reach);\nreturn s->y;"
+        return CForm(step, "s->y = x;\nreturn x;", {"reach": self.reach}, ("double y",))

@@ -7,6 +7,7 @@ from typing import Self
 from ...blocks.block import Array, Block, State
 from ...blocks.held import HeldBlock
 from ...blocks.kernel import kernel
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
@@ -93,3 +94,7 @@ class BacklashBlock(HeldBlock):
 
     def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
         linearise_play(x, dx, self.b, state, tangent, y, dy)
+
+    def c_form(self) -> CForm:
+        step = "s->y = fmax(x - b, fmin(x + b, s->y));\nreturn s->y;"
+        return CForm(step, "s->y = x;\nreturn x;", {"b": self.b}, ("double y",))

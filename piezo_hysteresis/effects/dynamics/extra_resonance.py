@@ -11,6 +11,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.fir import FirBlock
 from ...blocks.kernel import kernel
 from ...blocks.linear import AddedBlock, Section
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..excitation_need import ExcitationNeed
@@ -122,6 +123,18 @@ def mode_slopes(u, step, slopes, z, dz, dq):
         z[1], z[0] = moved, u[i]
 
 
+STEP = """\
+const double u = x - s->x_rest, du = u - s->last;
+const double pushed = p[2] * s->last + p[3] * du, turned = v[2] * s->last + v[3] * du;
+const double moved = p[0] * s->position + p[1] * s->velocity + pushed;
+s->velocity = v[0] * s->position + v[1] * s->velocity + turned;
+s->position = moved;
+s->last = u;
+return x + r * (moved - u);
+"""
+"""C code of `run_mode` for one sample."""
+
+
 class ModeBlock(AddedBlock):
     """x + r (q − x); state: last input, position, velocity/ω0."""
 
@@ -162,3 +175,8 @@ class ModeBlock(AddedBlock):
         mode_slopes(x, self.step, self.slopes, z.copy(), own, rows[1:])
         rows[1:] *= self.r
         return own
+
+    def c_form(self) -> CForm:
+        state = ("double x_rest, last, position, velocity",)
+        numbers = {"r": self.r, "p": self.step[0], "v": self.step[1]}
+        return CForm(STEP, "memset(s, 0, sizeof *s);\ns->x_rest = x;\nreturn x;", numbers, state)

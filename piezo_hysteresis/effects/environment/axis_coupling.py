@@ -6,6 +6,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block
 from ...blocks.channel import ChannelBlock
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..invertibility import Invertibility
@@ -57,3 +58,7 @@ class AxisCouplingBlock(ChannelBlock):
 
     def by_parameter(self, c: Array) -> Array:
         return np.vstack((c, c * c))
+
+    def c_form(self) -> CForm:
+        q = self.channel
+        return self.added_in_c(f"(kappa0 + kappa1 * {q}) * {q}", kappa0=self.kappa0, kappa1=self.kappa1)

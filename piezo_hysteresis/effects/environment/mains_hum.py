@@ -8,6 +8,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block, State
 from ...blocks.time import TimeBlock
+from ...c_form import CForm
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
@@ -85,6 +86,21 @@ def harmonics(frequency: float, count: int, t: Array) -> tuple[Array, Array]:
     return cosines, sines
 
 
+SUM = """\
+const double c1 = cos(rate * t), s1 = sin(rate * t);
+double c = c1, sine = s1, before;
+int k;
+for (k = 0; k < HARMONICS; k++) {
+    x += c_k[k] * c + s_k[k] * sine;
+    before = c;
+    c = c * c1 - sine * s1;
+    sine = sine * c1 + before * s1;
+}
+return x;
+"""
+"""C code of the sum of harmonics."""
+
+
 class MainsHumBlock(TimeBlock):
     """x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)], t from the start of the record."""
 
@@ -113,3 +129,9 @@ class MainsHumBlock(TimeBlock):
         for k, (c, s) in enumerate(zip(self.cosine, self.sine, strict=True)):
             by_frequency += 2.0 * np.pi * (k + 1) * t * (s * cosines[k] - c * sines[k])
         return np.vstack((by_frequency, cosines, sines))
+
+    def c_form(self) -> CForm:
+        if not self.cosine.size:
+            return CForm("return x;")
+        rate = 2.0 * np.pi * self.frequency
+        return self.value_in_c(SUM, HARMONICS=self.cosine.size, rate=rate, c_k=self.cosine, s_k=self.sine)

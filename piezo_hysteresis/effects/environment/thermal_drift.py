@@ -8,6 +8,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block
 from ...blocks.time import TimeBlock
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..excitation_need import ExcitationNeed
@@ -65,3 +66,6 @@ class ThermalDriftBlock(TimeBlock):
 
     def by_parameter(self, x: Array, t: Array) -> Array:
         return np.vstack((-np.expm1(-t / self.tau), -self.drift * t / self.tau**2 * np.exp(-t / self.tau)))
+
+    def c_form(self) -> CForm:
+        return self.value_in_c("return x - D * expm1(-t / tau);", D=self.drift, tau=self.tau)

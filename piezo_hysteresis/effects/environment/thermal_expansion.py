@@ -8,6 +8,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block
 from ...blocks.channel import ChannelBlock
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
@@ -68,3 +69,6 @@ class ThermalExpansionBlock(ChannelBlock):
 
     def by_parameter(self, c: Array) -> Array:
         return np.array([c - self.reference])
+
+    def c_form(self) -> CForm:
+        return self.added_in_c(f"kappa * ({self.channel} - T0)", kappa=self.kappa, T0=self.reference)

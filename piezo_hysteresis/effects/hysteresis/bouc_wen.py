@@ -8,8 +8,9 @@ from typing import Self
 import numpy as np
 
 from ...blocks.block import Array, Block, State
-from ...blocks.bouc_wen_kernel import LOOP, LOOP_OFF, run_general, run_plain
+from ...blocks.bouc_wen_kernel import ADVANCE_IN_C, GENERAL_IN_C, LOOP, LOOP_OFF, PLAIN_IN_C, run_general, run_plain
 from ...blocks.bouc_wen_sensitivities import START, linearise_general, linearise_plain
+from ...c_form import CForm, Number
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
@@ -154,3 +155,18 @@ class BoucWenBlock(Block):
             periods = self.sample_period, self.jump_period
             linearise_general(x, dx, *chosen, self.own, *periods, state, slopes, last, w, rows)
         return w, rows, state, (slopes, last)
+
+    def c_form(self) -> CForm:
+        numbers: dict[str, Number] = {"p1": self.p1, "p2": self.p2, "h0": self.start}
+        if self.is_plain:
+            loop, call = PLAIN_IN_C, "plain_step(s->h, dv, A, beta, gamma)"
+            numbers |= dict(zip(LOOP[:3], self.loop.tolist(), strict=False))
+        else:
+            loop, call = GENERAL_IN_C, "general_step(s->h, dv, loop, period, jump_period)"
+            numbers |= {"loop": self.loop, "period": self.sample_period, "jump_period": self.jump_period}
+        step = (
+            f"const double dv = x - s->v;\nif (dv != 0.0) {{\n    s->v = x;\n    s->h = {call};\n}}\n"
+            "return p1 * x * x * x + p2 * x + s->h;"
+        )
+        rest = "s->h = h0;\ns->v = x;\nreturn p1 * x * x * x + p2 * x + h0;"
+        return CForm(step, rest, numbers, ("double h, v",), (ADVANCE_IN_C, loop))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...blocks.block import Array, Block, MemorylessBlock
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..invertibility import Invertibility
@@ -53,3 +54,6 @@ class EvenInputPolynomialBlock(MemorylessBlock):
 
     def by_parameter(self, x: Array) -> Array:
         return np.vstack((x * x, (x * x) * (x * x)))
+
+    def c_form(self) -> CForm:
+        return CForm("return (p_e + p_4 * (x * x)) * (x * x);", numbers={"p_e": self.p_e, "p_4": self.p_4})

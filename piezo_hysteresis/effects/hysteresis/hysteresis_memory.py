@@ -8,13 +8,14 @@ import numpy as np
 
 from ...blocks.block import Array, Block, State
 from ...blocks.kernel import kernel
+from ...c_form import CForm
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect, Term
 from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
-from .level_dependent_memory import LevelDependentMemory, LevelDependentMemoryBlock
+from .level_dependent_memory import LevelDependentMemory, LevelDependentMemoryBlock, plays_in_c
 
 SPAN = 32.0
 """Largest radius over the smallest."""
@@ -165,3 +166,6 @@ class HysteresisMemoryBlock(Block):
         else:
             linearise_plays(x, np.ascontiguousarray(dx), self.c, self.radii, state, tangent, y, mapped, own)
         return y, rows, state, tangent
+
+    def c_form(self) -> CForm:
+        return plays_in_c("p", self.c, self.radii, self.virgin)

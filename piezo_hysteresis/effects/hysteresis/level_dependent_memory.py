@@ -6,6 +6,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block, State
 from ...blocks.kernel import kernel
+from ...c_form import CForm, Number
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
 from ..invertibility import Invertibility
@@ -81,6 +82,35 @@ def linearise_level_plays(v, dv, c, bends, by_bend, radii, plays, dplays, y, dy,
         y[i] = total
 
 
+REST = """\
+double total = 0.0;
+int j;
+for (j = 0; j < PLAYS; j++) {
+    const double p = s->p[j] = x - virgin * fmin(fmax(x, -radius[j]), radius[j]);
+    total += c[j] * VALUE;
+}
+return total;
+"""
+"""C code of plays at rest; VALUE is the function of each play."""
+STEP = """\
+double total = 0.0;
+int j;
+for (j = 0; j < PLAYS; j++) {
+    const double p = s->p[j] = fmax(x - radius[j], fmin(x + radius[j], s->p[j]));
+    total += c[j] * VALUE;
+}
+return total;
+"""
+"""C code of plays for one sample."""
+
+
+def plays_in_c(value: str, c: Array, radii: Array, virgin: float, **numbers: Array) -> CForm:
+    """Σ c_j value(p_j) as C code, from a C expression of p."""
+    constants: dict[str, Number] = {"PLAYS": c.size, "c": c, "radius": radii, "virgin": virgin, **numbers}
+    step, rest = (code.replace("VALUE", value) for code in (STEP, REST))
+    return CForm(step, rest, constants, (f"double p[{c.size}]",))
+
+
 class LevelDependentMemoryBlock(Block):
     """Σ c_j (p_j + b_j p_j²), b = numbers @ by_bend; state p (s,).
 
@@ -136,3 +166,6 @@ class LevelDependentMemoryBlock(Block):
         incoming = np.ascontiguousarray(dx)
         linearise_level_plays(x, incoming, self.c, self.bends, self.by_bend, self.radii, state, tangent, y, mapped, own)
         return y, rows, state, tangent
+
+    def c_form(self) -> CForm:
+        return plays_in_c("(p + bend[j] * p * p)", self.c, self.radii, self.virgin, bend=self.bends)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block, State
 from ...blocks.kernel import fma, kernel
+from ...c_form import CForm
 from ...errors import ModelError
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
@@ -143,6 +144,19 @@ def linearise_published(v, dv_in, p, state, tangent, last_in, w, dw):
     tangent[m], tangent[m + 1], tangent[m + 2] = by_a, by_beta, by_gamma
 
 
+STEP = """\
+/* h of Eq. (7) after dv. */
+static double published_step(double h, double dv, double a, double beta, double gamma, double n)
+{
+    if (n == 1.0) {
+        return FMA(-gamma * dv, fabs(h), FMA(h, FMA(-beta, fabs(dv), 1.0), a * dv));
+    }
+    return h + (a * dv - (beta * fabs(dv) * h + gamma * dv * fabs(h)) * pow(fabs(h), n - 1.0));
+}
+"""
+"""C function of `step`."""
+
+
 class PublishedBlock(Block):
     """State [h, v_last]."""
 
@@ -175,3 +189,12 @@ class PublishedBlock(Block):
         rows = np.empty((len(dx) + 5, x.size))
         linearise_published(x, dx, self.p, state, slopes, last, w, rows)
         return w, rows, state, (slopes, last)
+
+    def c_form(self) -> CForm:
+        step = (
+            "s->h = published_step(s->h, x - s->v, A, beta, gamma, n);\ns->v = x;\n"
+            "return FMA(FMA(p1 * x, x, p2), x, s->h);"
+        )
+        rest = "s->h = 0.0;\ns->v = x;\nreturn p1 * x * x * x + p2 * x;"
+        numbers = dict(zip(("A", "beta", "gamma", "n", "p1", "p2"), self.p.tolist(), strict=True))
+        return CForm(step, rest, numbers, ("double h, v",), (STEP,))

@@ -9,6 +9,7 @@ import numpy as np
 from ...blocks.block import Array, Block, State
 from ...blocks.linear import AddedBlock
 from ...blocks.low_pass import LowPassBlock
+from ...c_form import CForm
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
@@ -61,6 +62,21 @@ class CreepExponential(Effect):
         return CreepExponentialBlock(names, self.array("c"), self.array("tau"), setting.sample_period)
 
 
+STEP = """\
+const double u = x - s->x_rest;
+double y = 0.0, after;
+int k;
+for (k = 0; k < SIZE; k++) {
+    after = left[k] * s->z[k] + lead[k] * u + back[k] * s->last;
+    s->z[k] = after;
+    y += c[k] * (u + (after - u));
+}
+s->last = u;
+return x + (gain * s->x_rest + y);
+"""
+"""C code of one sample."""
+
+
 class CreepExponentialBlock(AddedBlock):
     """x + Σ_k c_k x_k; the state holds last input and x_k for every k."""
 
@@ -101,3 +117,11 @@ class CreepExponentialBlock(AddedBlock):
             states.append(pole.by_parameter(x, y, here, own[k], by_tau[None, :]))
             by_tau *= self.c[k]
         return np.array(states)
+
+    def c_form(self) -> CForm:
+        if not self.c.size:
+            return CForm("return x;")
+        left, lead, back = np.transpose([pole.step for pole in self.poles])
+        numbers = {"SIZE": self.c.size, "left": left, "lead": lead, "back": back, "c": self.c, "gain": self.gain}
+        state = ("double x_rest, last", f"double z[{self.c.size}]")
+        return CForm(STEP, "memset(s, 0, sizeof *s);\ns->x_rest = x;\nreturn x + gain * x;", numbers, state)

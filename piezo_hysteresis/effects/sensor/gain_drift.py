@@ -8,6 +8,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block
 from ...blocks.time import TimeBlock
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..excitation_need import ExcitationNeed
@@ -71,3 +72,6 @@ class GainDriftBlock(TimeBlock):
 
     def by_parameter(self, x: Array, t: Array) -> Array:
         return x * np.vstack((-np.expm1(-t / self.tau), -self.change * t / self.tau**2 * np.exp(-t / self.tau)))
+
+    def c_form(self) -> CForm:
+        return self.value_in_c("return x * (1.0 - g * expm1(-t / tau));", g=self.change, tau=self.tau)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...blocks.block import Array, Block, State
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..invertibility import Invertibility
@@ -82,3 +83,8 @@ class OffsetBlock(Block):
         rows[-2] = 1.0
         rows[-1] = state
         return self.run(x, state)[0], rows, state, tangent
+
+    def c_form(self) -> CForm:
+        step = "return x + (y0 + settling * s->x_rest);"
+        rest = "s->x_rest = x;\nreturn x + (y0 + settling * x);"
+        return CForm(step, rest, {"y0": self.y0, "settling": self.settling}, ("double x_rest",))

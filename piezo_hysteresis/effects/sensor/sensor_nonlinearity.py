@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...blocks.block import Array, Block, MemorylessBlock
+from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..invertibility import Invertibility
@@ -61,3 +62,6 @@ class SensorNonlinearityBlock(MemorylessBlock):
 
     def by_parameter(self, x: Array) -> Array:
         return np.vstack((x * x, x * x * x))
+
+    def c_form(self) -> CForm:
+        return CForm("return x + (s2 + s3 * x) * x * x;", numbers={"s2": self.s2, "s3": self.s3})

@@ -1,0 +1,54 @@
+"""C code of `SoftenedArxBlock`, one sample of its kernels."""
+
+from __future__ import annotations
+
+FORCE = """\
+/* Force of a spring beyond the linear one. */
+static double force(double x, double k2, double k3)
+{
+    return (k2 * fabs(x) + k3 * x * x) * x;
+}
+"""
+"""C function of `force`."""
+SETTLE = """\
+/* Static deflection x with x + force(x) = w; not a number where the stiffness vanishes on the way. */
+static double settle(double w, double k2, double k3)
+{
+    double x = w;
+    int i;
+    for (i = 0; i < 50; i++) {
+        const double stiffness = 1.0 + (2.0 * k2 * fabs(x) + 3.0 * k3 * x * x);
+        double step;
+        if (!(stiffness > 0.0)) {
+            return NAN;
+        }
+        step = (w - x - force(x, k2, k3)) / stiffness;
+        x += step;
+        if (fabs(step) <= 1e-15 * fabs(x)) {
+            break;
+        }
+    }
+    return x;
+}
+"""
+"""C function of `settle`."""
+REST = """\
+memset(s, 0, sizeof *s);
+s->w0 = x;
+s->x0 = settle(x, k2, k3);
+ME_path_rest(&s->path, 0.0);
+return ME_linear_rest(&s->linear, x) + share * (s->x0 - x);
+"""
+"""C code of the state at rest."""
+STEP = """\
+const double gain = 1.0 + m1 + m2, w = x - s->w0;
+const double excess = force(s->x0 + (s->mode[0] + s->xi[0]), k2, k3) - force(s->x0, k2, k3);
+const double mode = gain * w - m1 * s->mode[0] - m2 * s->mode[1];
+const double xi = -m1 * s->xi[0] - m2 * s->xi[1] - gain * excess;
+s->mode[1] = s->mode[0];
+s->mode[0] = mode;
+s->xi[1] = s->xi[0];
+s->xi[0] = xi;
+return ME_linear_step(&s->linear, x) + (share * (s->x0 - s->w0) + ME_path_step(&s->path, xi));
+"""
+"""C code of one sample."""

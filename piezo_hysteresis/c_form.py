@@ -1,0 +1,75 @@
+"""`CForm`: a block as C code, declared beside the kernel that it repeats.
+
+The code is plain C99. A block becomes two functions, ``rest`` and ``step``, and the state that stands between their
+calls. `piezo_hysteresis.export` writes the frame around them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Number = int | float | NDArray[np.float64]
+"""Constant of a C form: a count, a number, or an array of numbers."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CForm:
+    """Two C functions and the state between their calls.
+
+    ``double rest(state *s, double x)`` sets the state of a stage settled at the input x and returns the output there;
+    ``double step(state *s, double x)`` takes the next input. A form without state has no argument s. ``ME_`` in a body
+    or a member stands for the name that the block gets in the program.
+
+    Parameters
+    ----------
+    step : str
+        Body of ``step``.
+    rest : str, optional
+        Body of ``rest``; default that of ``step``, for forms without state.
+    numbers : mapping of str to int, float or ndarray
+        Constants by the name under which the bodies use them. A count becomes an enumeration constant.
+    state : tuple of str
+        Declarations of the members of the state.
+    library : tuple of str
+        Functions that the bodies call, in an order in which each knows those before it. A text is written once,
+        however many forms need it.
+    parts : mapping of str to CForm
+        Blocks inside, called as `call` says.
+    channel : str
+        Further measured input of ``step``, by its name in the record; empty for none.
+    """
+
+    step: str
+    rest: str = ""
+    numbers: Mapping[str, Number] = field(default_factory=dict)
+    state: tuple[str, ...] = ()
+    library: tuple[str, ...] = ()
+    parts: Mapping[str, CForm] = field(default_factory=dict)
+    channel: str = ""
+
+    @property
+    def has_state(self) -> bool:
+        """Whether the functions have an argument s."""
+        return bool(self.state) or any(part.has_state for part in self.parts.values())
+
+    def call(self, function: str, name: str, x: str) -> str:
+        """C expression, inside a form that has this one as part `name`, that calls its ``step`` or ``rest``."""
+        return f"ME_{name}_{function}(&s->{name}, {x})" if self.has_state else f"ME_{name}_{function}({x})"
+
+
+HISTORY = """\
+/* Puts x before the `size` samples of a history and returns it, newest first. Every sample is kept twice, so that the
+   history is always in one piece and nothing has to be moved. */
+static const double *remember(double *history, int size, int *newest, double x)
+{
+    *newest = (*newest > 0 ? *newest : size) - 1;
+    history[*newest] = x;
+    history[*newest + size] = x;
+    return history + *newest;
+}
+"""
+"""C function of delays and filters."""

@@ -1,0 +1,70 @@
+"""Write a model as a program that runs without Python.
+
+The C files need a C99 compiler and nothing else: a header, a source, and a self-test that compares the source with the
+model. Every effect of the catalogue can be written. The program is right for the sample period of the model only.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..errors import ModelError
+from ..export import c_program
+from ..model import model_file
+from ..model.model import Model
+from .options.destination import add_force, require_new_folder
+from .terminal import console
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("export", description=__doc__)
+    parser.add_argument("model", metavar="MODEL", help="model file")
+    parser.add_argument("--to", choices=("c",), default="c", help="what to write (default: c)")
+    parser.add_argument("-o", "--output", metavar="FOLDER", required=True, help="folder of the files")
+    parser.add_argument(
+        "--name",
+        metavar="NAME",
+        default="piezo",
+        help="begins the names of files, functions and types, so that one program can hold several models "
+        "(default: piezo)",
+    )
+    add_force(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the files; returns 0.
+
+    Raises
+    ------
+    PiezoError
+        On a model that cannot be read or exported, a name that is no identifier, or a folder that holds files.
+    """
+    require_new_folder("-o", args.output, args.force)
+    model = _load(args.model)
+    _write(c_program(model, args.name), Path(args.output).expanduser())
+    out = console()
+    out.print(f"wrote {args.name}.h, {args.name}.c and {args.name}_test.c to {args.output}")
+    out.print(f"sample period: {model.sample_period:g} s; call {args.name}_step once in every such period")
+    out.print(f"check: cc -std=c99 {args.name}_test.c {args.name}.c -lm -o {args.name}_test && ./{args.name}_test")
+    return 0
+
+
+def _load(path: str) -> Model:
+    if Path(path).suffix == ".npz":
+        raise ModelError(f"{path}: a model of several axes cannot be exported, expected a model file of one axis")
+    return model_file.load(path)
+
+
+def _write(files: Mapping[str, str], folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in files.items():
+            draft = folder / f"{name}.tmp"
+            draft.write_text(text, encoding="utf-8")
+            draft.replace(folder / name)
+    except OSError as error:
+        raise ModelError(f"{folder}: cannot be written ({error.strerror or error})") from None

@@ -1,0 +1,69 @@
+"""The prediction of a model as C forms, in the order of its chain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..blocks.block import SumBlock
+from ..c_form import CForm
+from ..errors import ModelError
+from ..model.model import Model
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CChain:
+    """What turns a drive voltage into a displacement, at the sample period of the model.
+
+    Parameters
+    ----------
+    forms : mapping of str to CForm
+        By name, in chain order; the first takes volts, the last returns metres.
+    channels : tuple of str
+        Further measured inputs.
+    """
+
+    forms: dict[str, CForm]
+    channels: tuple[str, ...]
+
+
+def prediction(model: Model) -> CChain:
+    """The chain of a model as C forms.
+
+    Raises
+    ------
+    ModelError
+        If an effect has no C form; the message names it.
+    """
+    chain, forms = model.at(model.sample_period), {}
+    for label, block in zip(chain.labels, chain.blocks, strict=True):
+        form = block.c_form()
+        if isinstance(form, str):
+            raise ModelError(f"{label}: {form}, so the model cannot be exported; expected a model without it")
+        forms["hysteresis" if isinstance(block, SumBlock) else label] = form
+    return CChain(forms, tuple(form.channel for form in forms.values() if form.channel))
+
+
+def rest_calls(forms: dict[str, CForm], state: str) -> Sequence[str]:
+    """C calls that set every form to rest at x, and make x its output, one after the other."""
+    return [f"x = {name}_rest({f'&{state}->{name}, ' if form.has_state else ''}x);" for name, form in forms.items()]
+
+
+def step_calls(forms: dict[str, CForm], state: str) -> Sequence[str]:
+    """C calls of one sample."""
+    calls = []
+    for name, form in forms.items():
+        arguments = [f"&{state}->{name}"] * form.has_state + ["x"] + [form.channel] * bool(form.channel)
+        calls.append(f"x = {name}_step({', '.join(arguments)});")
+    return calls
+
+
+def units(names: Sequence[str]) -> dict[str, str]:
+    """Units of input and output of every form of a chain."""
+    at = [names.index(scale) for scale in ("voltage_scale", "displacement_scale")]
+    normalised = "normalised [1]"
+    found = {}
+    for k, name in enumerate(names):
+        unit, after = ("V" if k <= at[0] else normalised if k <= at[1] else "m" for k in (k, k + 1))
+        found[name] = f"{unit} in, {after} out"
+    return found

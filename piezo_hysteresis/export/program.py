@@ -1,0 +1,75 @@
+"""A model as a C program: header, source and self-test."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import cache
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from .. import __version__
+from ..errors import ModelError
+from ..model.chain import RUNAWAY
+from ..model.model import Model
+from ..model.model_parameters import PREFIX, to_parameters
+from . import c_text
+from .prediction import prediction, rest_calls, step_calls, units
+from .vectors import vectors
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,40}")
+"""Names that a program can have: they begin every function, type and file."""
+
+
+@cache
+def templates() -> Environment:
+    """Where the frames of the files come from."""
+    environment = Environment(
+        loader=PackageLoader("piezo_hysteresis.export"), undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    environment.filters |= {"number": c_text.number, "array": c_text.array, "comment": _comment}
+    return environment
+
+
+def c_program(model: Model, name: str = "piezo") -> Mapping[str, str]:
+    """Files of a C program by their names: NAME.h, NAME.c and NAME_test.c.
+
+    Parameters
+    ----------
+    model : Model
+        To be exported, at its own sample period.
+    name : str
+        Begins the names of all files, functions and types.
+
+    Raises
+    ------
+    ModelError
+        If the name is no lower-case C identifier, or an effect has no C form.
+    """
+    if not NAME.fullmatch(name):
+        raise ModelError(f"name: got {name!r}, expected lower-case letters, digits and '_', a letter first")
+    found = prediction(model)
+    values = {
+        "name": name,
+        "model": model,
+        "version": __version__,
+        "hash": to_parameters(model)[f"{PREFIX}hash"],
+        "channels": found.channels,
+        "limit": RUNAWAY * model.displacement_scale,
+        "has_state": [n for n, form in found.forms.items() if form.has_state],
+        "structures": [s for n, form in found.forms.items() for s in c_text.structures(name, n, form)],
+        "library": c_text.library(found.forms),
+        "functions": {n: "\n".join(c_text.functions(name, n, form)) for n, form in found.forms.items()},
+        "units": units(tuple(found.forms)),
+        "rest_calls": rest_calls(found.forms, "state"),
+        "step_calls": step_calls(found.forms, "state"),
+        "vectors": vectors(model),
+    }
+    files = {f"{name}.h": "header.h.jinja", f"{name}.c": "source.c.jinja", f"{name}_test.c": "self_test.c.jinja"}
+    return {file: templates().get_template(source).render(values) for file, source in files.items()}
+
+
+def _comment(text: str) -> str:
+    """Text that does not end a C comment."""
+    return text.replace("*/", "* /")

@@ -1,0 +1,77 @@
+"""Test vectors of an exported model: a drive with swings, steps and holds, and what the model says to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.model import Model
+
+Array = NDArray[np.float64]
+
+SIZE = 400
+"""Samples of a self-test."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Vectors:
+    """Inputs and outputs of a self-test.
+
+    Parameters
+    ----------
+    start : float
+        Voltage at rest before [V].
+    voltage : (n,) ndarray
+        Drive [V].
+    channels : mapping of str to (n,) ndarray
+        Further measured inputs.
+    displacement : (n,) ndarray
+        What the model says [m].
+    """
+
+    start: float
+    voltage: Array
+    channels: Mapping[str, Array]
+    displacement: Array
+
+
+def drive(low: float, high: float, size: int = SIZE) -> Array:
+    """Swings that grow and decay, a step, a hold and a small loop between two voltages [V], shape (size,)."""
+    t = np.arange(size) / size
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    swing = np.sin(2.0 * np.pi * 7.0 * t) * np.sin(np.pi * t) + 0.1 * np.sin(2.0 * np.pi * 41.0 * t)
+    swing[size // 2 : size // 2 + size // 8] = 0.6
+    swing[-size // 8 :] = -0.4 + 0.05 * np.sin(2.0 * np.pi * 60.0 * t[-size // 8 :])
+    return np.asarray(middle + 0.9 * half * swing, dtype=np.float64)
+
+
+def vectors(model: Model) -> Vectors:
+    """What the exported model has to reproduce, inside the voltages that were identified where the model states them.
+
+    Raises
+    ------
+    DivergenceError
+        If the model runs away under this drive.
+    """
+    low, high = (_stated(model, f"voltage_{end}", other) for end, other in (("min", 0.0), ("max", model.voltage_scale)))
+    voltage = drive(low, high) if high > low else drive(0.0, model.voltage_scale)
+    chain, t = model.at(model.sample_period), np.arange(SIZE) / SIZE
+    courses = {
+        "other_displacement": 0.1 * model.displacement_scale * np.sin(9.0 * t),
+        "temperature": 293.15 + np.sin(5.0 * t),
+    }
+    channels = {name: courses[name] for name in sorted(chain.channels)}
+    start = float(voltage[0])
+    displacement, _ = chain.run(voltage, chain.rest(start), channels)
+    return Vectors(start, voltage, channels, displacement)
+
+
+def _stated(model: Model, key: str, otherwise: float) -> float:
+    try:
+        value = float(model.provenance[key])
+    except (KeyError, ValueError):
+        return otherwise
+    return value if np.isfinite(value) else otherwise

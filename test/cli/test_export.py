@@ -1,0 +1,61 @@
+"""``piezo export``: a model file becomes a program, or a refusal in one line."""
+
+from __future__ import annotations
+
+import subprocess
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.model import axes_file, model_file
+from piezo_hysteresis.model.axes_model import AxesModel
+from piezo_hysteresis.model.model import Model
+
+from ..contract.compiled import needs_compiler
+
+MODEL = Model((BoucWen(), Arx(a=[-1.2, 0.6], b=[0.3, 0.1], delay=2)), 2e-5, 10.0, 1e-5)
+
+
+@pytest.fixture
+def model(tmp_path):
+    return model_file.save(MODEL, tmp_path / "model.yaml")
+
+
+@needs_compiler
+def test_the_files_pass_the_check_that_it_prints(piezo, model, tmp_path):
+    done = piezo("export", model, "--to", "c", "-o", tmp_path / "c", "--name", "stage_x")
+    assert done.status == 0, done.err
+    (check,) = (line for line in done.out.splitlines() if line.startswith("check: "))
+    ran = subprocess.run(
+        check.removeprefix("check: ").replace("cc ", "gcc ", 1), shell=True, cwd=tmp_path / "c", capture_output=True,
+        check=False,
+    )  # fmt: skip
+    assert ran.returncode == 0, ran.stderr
+    assert {p.suffix for p in (tmp_path / "c").iterdir()} >= {".h", ".c"}
+
+
+def test_what_exists_is_kept_unless_force_is_given(piezo, model, tmp_path):
+    words = ("export", model, "-o", tmp_path / "c")
+    assert piezo(*words).status == 0
+    (tmp_path / "c" / "piezo.h").write_text("mine")
+    refused = piezo(*words)
+    assert refused.status == 2 and "--force" in refused.err and len(refused.err.splitlines()) == 1
+    assert (tmp_path / "c" / "piezo.h").read_text() == "mine"
+    assert piezo(*words, "--force").status == 0
+    assert "PIEZO_MODEL_HASH" in (tmp_path / "c" / "piezo.h").read_text()
+
+
+def test_models_that_cannot_be_exported_are_refused_in_one_line(piezo, tmp_path):
+    axes = AxesModel(np.zeros((1, 2, 3, 8)), np.eye(2), np.ones(1), np.zeros(2), 1e-3, 1.0, 0.1)
+    place = axes_file.save(axes, tmp_path / "axes.npz")
+    refused = piezo("export", place, "-o", tmp_path / "c")
+    assert refused.status == 2 and "several axes" in refused.err and len(refused.err.splitlines()) == 1
+    assert not (tmp_path / "c").exists()
+    refused = piezo("export", tmp_path / "none.yaml", "-o", tmp_path / "c")
+    assert refused.status == 2 and "none.yaml" in refused.err
+
+
+def test_a_name_that_is_no_identifier_is_refused(piezo, model, tmp_path):
+    refused = piezo("export", model, "-o", tmp_path / "c", "--name", "My Stage")
+    assert refused.status == 2 and "My Stage" in refused.err and not (tmp_path / "c").exists()

@@ -1,0 +1,35 @@
+"""What every effect promises about its C form: it agrees with the model, or says why there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.effects import CHAIN, Effect
+from piezo_hysteresis.errors import ModelError
+from piezo_hysteresis.export import c_program
+
+from .compiled import needs_compiler, run_c
+from .test_effect import channels, drive, model_with, run, typical
+
+WORST = 1e-12
+"""Largest deviation, as a share of the largest displacement."""
+
+
+@needs_compiler
+@pytest.mark.parametrize("kind", CHAIN, ids=lambda kind: kind.name)
+def test_c_code_agrees_or_the_effect_says_why_there_is_none(kind: type[Effect], tmp_path) -> None:
+    model, u = model_with(typical(kind)), drive()
+    files, refusal = {}, ""
+    try:
+        files = c_program(model)
+    except ModelError as error:
+        refusal = str(error)
+    if refusal:
+        assert kind.name in refusal and "cannot be exported" in refusal
+        return
+    used = model.at(model.sample_period).channels
+    rows = [u, *(channels()[name] for name in channels() if name in used)]
+    y, expected = run_c(files, tmp_path, u[0], rows), run(model, u)
+    assert y.size == u.size
+    assert np.abs(y - expected).max() <= WORST * np.abs(expected).max()

@@ -1,0 +1,125 @@
+"""The exported C program as a whole: what it promises to somebody who has only its files."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis import __version__
+from piezo_hysteresis.blocks.block import Block
+from piezo_hysteresis.effects import Arx, BoucWen, Creep, HysteresisMemory, Offset
+from piezo_hysteresis.effects.sensor.sensor_nonlinearity import SensorNonlinearity, SensorNonlinearityBlock
+from piezo_hysteresis.errors import ModelError
+from piezo_hysteresis.export import c_program
+from piezo_hysteresis.model.model import Model
+
+from ..contract.compiled import compiled, needs_compiler, run_c
+
+PERIOD = 2e-5
+MODEL = Model(
+    (
+        BoucWen(),
+        HysteresisMemory(c=(0.05, 0.03, 0.02)),
+        Creep(gamma=0.012),
+        Arx(a=[-1.6, 0.9, -0.1], b=[0.1, 0.2, 0.05], delay=37.4),
+        Offset(y0=2e-7, settling=0.01),
+    ),
+    PERIOD,
+    10.0,
+    1e-5,
+    {"voltage_min": "1.0", "voltage_max": "9.0", "source": "a folder */ with an odd name"},
+)
+
+
+def drive() -> np.ndarray:
+    """Noise, a hold and a sine [V]."""
+    rng = np.random.default_rng(3)
+    t = PERIOD * np.arange(20_000)
+    return np.concatenate((4.0 + rng.normal(scale=0.7, size=5_000), np.full(5_000, 6.0), 5.0 + 3.0 * np.sin(900.0 * t)))
+
+
+def has_fused_multiply_add() -> bool:
+    """Whether this processor rounds x y + z once, as the kernels then do."""
+    return "fma" in re.findall(r"\w+", Path("/proc/cpuinfo").read_text()) if Path("/proc/cpuinfo").exists() else False
+
+
+@needs_compiler
+def test_the_self_test_passes_and_notices_another_number(tmp_path):
+    files = c_program(MODEL)
+    program = compiled(files, tmp_path)
+    done = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "largest deviation" in done.stdout, done.stdout + done.stderr
+    spoilt = files["piezo.c"].replace(repr(BoucWen()["beta"]), repr(BoucWen()["beta"] * (1.0 + 1e-9)))
+    assert spoilt != files["piezo.c"]
+    program = compiled({**files, "piezo.c": spoilt}, tmp_path)
+    assert subprocess.run([program], capture_output=True, check=False).returncode == 1
+
+
+@needs_compiler
+@pytest.mark.skipif(not has_fused_multiply_add(), reason="no fused multiply-add here: equal to rounding only")
+def test_every_bit_is_that_of_the_model_where_the_rounding_is(tmp_path):
+    expected, _ = MODEL.run(drive(), MODEL.rest(drive()[0]))
+    y = run_c(c_program(MODEL), tmp_path, drive()[0], [drive()], "", "-O2", "-mfma", "-ffp-contract=off")
+    np.testing.assert_array_equal(y, expected)
+
+
+@needs_compiler
+def test_a_sample_that_is_not_finite_ends_the_block(tmp_path):
+    u = drive()[:300].copy()
+    u[250] = np.nan
+    assert run_c(c_program(MODEL), tmp_path, u[0], [u]).size == 250
+
+
+@needs_compiler
+def test_two_models_and_cpp_share_a_program(tmp_path):
+    files = {**c_program(MODEL, "stage_x"), **c_program(MODEL.without("creep"), "stage_y")}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "both.cpp").write_text(
+        '#include "stage_x.h"\n#include "stage_y.h"\nint main() { stage_x_state x; stage_y_state y;\n'
+        "stage_x_reset(&x, 1.0); stage_y_reset(&y, 1.0); return stage_x_step(&x, 2.0) == stage_y_step(&y, 2.0); }\n"
+    )
+    strict = ("-Wall", "-Wextra", "-Werror")
+    for command in (
+        ["gcc", *strict, "-std=c99", "-c", "stage_x.c", "stage_y.c"],
+        *([["g++", *strict, "both.cpp", "stage_x.o", "stage_y.o", "-lm", "-o", "both"], ["./both"]] * bool(
+            shutil.which("g++")
+        )),
+    ):  # fmt: skip
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_the_header_says_which_model_it_is():
+    header = c_program(MODEL, "stage_x")["stage_x.h"]
+    (digest,) = re.findall(r'#define STAGE_X_MODEL_HASH "(sha256:\w+)"', header)
+    assert digest in c_program(MODEL)["piezo.h"]
+    assert digest not in c_program(MODEL.with_values({"creep.gamma": 0.013}))["piezo.h"]
+    assert f'STAGE_X_VERSION "{__version__}"' in header and "STAGE_X_SAMPLE_PERIOD 2e-05 /* s */" in header
+    assert "gamma = 0.012 [1/decade]" in header and "y0 = 2e-07 [m]" in header
+
+
+def test_there_is_no_memory_but_the_state():
+    source = c_program(MODEL)["piezo.c"]
+    code = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
+    assert not re.search(r"\b(malloc|calloc|realloc|alloca|free)\b", code)
+    assert re.findall(r'#include [<"](\S+)[>"]', code) == ["piezo.h", "math.h", "string.h"]
+    for declared in re.findall(r"^ *static (?!const).*$", code, flags=re.MULTILINE):
+        assert "(" in declared, declared  # functions only: nothing that two stages would share
+
+
+def test_a_block_without_a_c_form_is_refused_by_name(monkeypatch):
+    monkeypatch.setattr(SensorNonlinearityBlock, "c_form", Block.c_form)
+    with pytest.raises(ModelError, match=r"sensor_nonlinearity: has no C form, so the model cannot be exported"):
+        c_program(MODEL.with_effect(SensorNonlinearity(s2=0.01)))
+
+
+@pytest.mark.parametrize("name", ["", "2x", "Stage", "a-b", "x/y", "é"])
+def test_a_name_that_c_does_not_allow_is_refused(name):
+    with pytest.raises(ModelError, match="expected lower-case letters"):
+        c_program(MODEL, name)
