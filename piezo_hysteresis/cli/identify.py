@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ..effects import HYSTERESIS, MEMORY, OPERATORS, PublishedBoucWen
-from ..identification.identification import Identification
+from ..identification.identification import Identification, undetermined
 from ..identification.identify import identify
 from ..identification.records.roles import HELD_OUT
 from ..model import model_file
@@ -119,7 +119,8 @@ def verdict_line(found: Identification) -> str:
     doubt = (
         f" {severe} severe finding{'s' * (severe > 1)} above make{'s' * (severe == 1)} it doubtful." if severe else ""
     )
-    at_bounds = f" At a bound, so undetermined: {', '.join(fit.at_bounds)}." if fit.at_bounds else ""
+    names = ", ".join(undetermined(fit))
+    at_bounds = f" At a bound, so undetermined: {names}." if names else ""
     return f"Verdict: {error_sentence(percent)}{doubt}{at_bounds}"
 
 

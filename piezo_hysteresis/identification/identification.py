@@ -24,6 +24,11 @@ CORRELATED = 0.95
 """Correlation from which two numbers are reported to be hard to separate."""
 
 
+def undetermined(fit: Fit) -> tuple[str, ...]:
+    """Numbers that a fit left at a bound, those that are off there apart: a play without weight is none."""
+    return tuple(n for n in fit.at_bounds if fit.model.row(n).off != fit.values[n])
+
+
 @dataclass(frozen=True, slots=True)
 class PhaseError:
     """Free-run error of one record, its own offset removed.

@@ -20,7 +20,7 @@ from ..record import Experiment, Notice
 from .fit.fit import Fit, Progress
 from .fit.joint import fit_dynamics, fit_lag
 from .fit.normal_equations import residuals
-from .identification import Identification, phase_errors
+from .identification import Identification, phase_errors, undetermined
 from .identified_range import identified_range
 from .one_core import on_one_core
 from .records.conditioning_split import known_from_within
@@ -186,11 +186,7 @@ def identify(
     joint = replace(joint, converged=joint.converged or joint.cost <= AT_THE_FLOOR)
     if not joint.converged:
         notices.append(Notice("not_converged", f"the joint fit did not converge in {joint.iterations} linearisations"))
-    notices += [
-        Notice("at_bound", f"{name} reached a bound of its range")
-        for name in joint.at_bounds
-        if joint.model.row(name).off != joint.values[name]  # a play without weight is none
-    ]
+    notices += [Notice("at_bound", f"{name} reached a bound of its range") for name in undetermined(joint)]
     if not any(not p.is_fitted for p in phases):
         notices.append(
             Notice(

@@ -1,5 +1,7 @@
 """The structure of a model of a stage that creeps, bends and rings: steps and growing sines of an independent plant."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.effects import CreepTwoRates, ExtraResonance, HysteresisMemory
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.structure.left_out import score_left_out
 from piezo_hysteresis.identification.structure.pieces import Kind, pieces_of
 from piezo_hysteresis.record import Experiment
 
@@ -31,6 +34,14 @@ def identified():
 
 def test_a_rate_between_two_is_predicted(identified):
     assert max(percents(identified.model, played(STAGE, (1.0, 10.0, 50.0)))) < 0.3
+
+
+def test_a_model_as_it_is_is_scored_on_other_records(identified):
+    """No number of it is free: what `diagnose --model` asks of the given model."""
+    again = played(replace(STAGE, noise_seed=1), (1.0, 50.0)).records
+    kept = score_left_out(identified.model, again, [STAGE.noise * STAGE.stroke] * 2, (0, 1), adjusts=False)
+    worse = identified.model.with_values({"creep_two_rates.gamma_slow": 0.05})
+    assert 0.0 <= kept < score_left_out(worse, again, [STAGE.noise * STAGE.stroke] * 2, (0, 1), adjusts=False)
 
 
 def test_what_the_stage_does_is_in_the_model(identified):

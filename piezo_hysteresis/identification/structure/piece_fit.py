@@ -90,7 +90,7 @@ class PieceFit:
         ends = [(r.lower, r.upper) for r in rows]
         if POLE in self.names:
             ends[self.names.index(POLE)] = (-LARGEST_POLE, 0.0)
-        low, high = np.array(ends).T - now
+        low, high = np.array(ends).reshape(-1, 2).T - now
         return np.concatenate((low, -zeros)), np.concatenate((high, zeros))
 
 
