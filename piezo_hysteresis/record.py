@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .channels import ChannelMapping, Samples, are_finite
+from .channel_mapping import ChannelMapping, Samples, are_finite
 from .errors import RecordError, printable
 from .html_table import html_table
 from .notice import Notice

@@ -9,10 +9,10 @@ from .expected_error import ExpectedError, ParameterCovariance
 from .inverse import Inverse, InverseState
 from .learning import IterativeLearning, LearningRound, learn
 from .learning_filter import LearningFilter, ResponseCheck
+from .limit_check import reachable
 from .limits import Limits
 from .plan import Plan, plan
 from .reachability import NearestPath, Reachability, UnreachablePart
-from .reachable import reachable
 
 __all__ = [
     "Band",

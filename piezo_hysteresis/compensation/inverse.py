@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..blocks.arx import ArxBlock
 from ..blocks.block import Block, State, SumBlock
-from ..blocks.channel import ChannelBlock
+from ..blocks.channel_addition import ChannelBlock
 from ..blocks.fir import FirBlock
 from ..blocks.low_pass import LowPassBlock
 from ..blocks.scaling import ChangeOfUnit

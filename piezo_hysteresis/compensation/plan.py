@@ -15,9 +15,9 @@ from ..model.samples import samples
 from .band import Band
 from .expected_error import ExpectedError, ParameterCovariance, free_run_error, parameter_error
 from .inverse import Inverse
+from .limit_check import reachable
 from .limits import Limits
 from .reachability import Reachability
-from .reachable import reachable
 
 Array = NDArray[np.float64]
 

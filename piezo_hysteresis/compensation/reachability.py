@@ -1,4 +1,4 @@
-"""Reachability of a path: `UnreachablePart`, `NearestPath`, `Reachability`."""
+"""`Reachability`: the answer of `reachable`, with every `UnreachablePart` and the `NearestPath`."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..blocks.block import Block, State, SumBlock
-from ..blocks.channel import ChannelBlock
+from ..blocks.channel_addition import ChannelBlock
 from ..blocks.scaling import ChangeOfUnit, hand_out, take_in
 from ..effects import ChainPosition, Discretisation, Effect
 from ..errors import DivergenceError

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from ..channels import ChannelMapping
+from ..channel_mapping import ChannelMapping
 from .description import Description, Samples
 
 __all__ = ["Acquired", "Description", "MemoryStage", "Samples", "Stage", "StreamingStage"]

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...channels import quantity_of
+from ...channel_mapping import quantity_of
 from ...identification.records.excitation_content import noise_on_motion
 from ...record import Record
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...blocks.block import Array, Block
-from ...blocks.channel import ChannelBlock
+from ...blocks.channel_addition import ChannelBlock
 from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect

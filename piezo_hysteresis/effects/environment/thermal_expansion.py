@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from ...blocks.block import Array, Block
-from ...blocks.channel import ChannelBlock
+from ...blocks.channel_addition import ChannelBlock
 from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect

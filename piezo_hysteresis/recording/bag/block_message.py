@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from ...channels import quantity_of
+from ...channel_mapping import quantity_of
 from ...point_cloud import packed, point_layout, stored_as, unpacked
 from ...record import Samples
 

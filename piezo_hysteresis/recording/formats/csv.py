@@ -6,7 +6,7 @@ import io
 from csv import writer
 from pathlib import Path
 
-from ...channels import QUANTITIES, quantity_of
+from ...channel_mapping import QUANTITIES, quantity_of
 from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming

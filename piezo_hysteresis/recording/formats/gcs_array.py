@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ...channels import quantity_of
+from ...channel_mapping import quantity_of
 from ...errors import RecordingError
 from ...record import Experiment, Notice
 from ..checks.error_context import naming

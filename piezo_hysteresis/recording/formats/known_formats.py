@@ -12,14 +12,14 @@ from typing import Protocol, runtime_checkable
 from ...record import Experiment
 from ..bag.rosbag2 import Rosbag2
 from ..table.read_options import ReadOptions
+from .array_file_format import ArrayFileFormat
 from .csv import Csv
 from .gcs_array import GcsArrayFormat
-from .hdf5_variables import Hdf5Variables
+from .hdf5 import Hdf5Arrays
 from .mat import Mat
-from .named_arrays import NamedArrays
-from .npy_variables import NpyVariables
+from .npy import NpyArrays
 from .npz import Npz
-from .tdms_variables import TdmsVariables
+from .tdms import TdmsArrays
 
 
 class Format(Protocol):
@@ -44,9 +44,9 @@ FORMATS: Mapping[str, Format] = {
     "npz": Npz(),
     "rosbag2": Rosbag2(),
     "mat": Mat(),
-    "hdf5": NamedArrays((".h5", ".hdf5", ".hdf"), "an HDF5 file", Hdf5Variables),
-    "npy": NamedArrays((".npy",), "a NumPy array", NpyVariables),
-    "tdms": NamedArrays((".tdms",), "a LabVIEW TDMS file", TdmsVariables),
+    "hdf5": ArrayFileFormat((".h5", ".hdf5", ".hdf"), "an HDF5 file", Hdf5Arrays),
+    "npy": ArrayFileFormat((".npy",), "a NumPy array", NpyArrays),
+    "tdms": ArrayFileFormat((".tdms",), "a LabVIEW TDMS file", TdmsArrays),
     "gcs_array": GcsArrayFormat(),
     "csv": Csv(),
 }

@@ -10,9 +10,9 @@ from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
 from ..table.read_options import LABELS, ReadOptions
-from .hdf5_variables import Hdf5Variables, is_hdf5
-from .mat5_variables import Mat5Variables
-from .variable_records import variable_records
+from .hdf5 import Hdf5Arrays, is_hdf5
+from .mat5 import Mat5Arrays
+from .records_from_arrays import records_from_arrays
 
 _STRUCT = "phase_"
 """Beginning of the names of the structures that hold phases."""
@@ -33,12 +33,12 @@ class Mat:
 
     def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The structs in order of their numbers, or the variables as one record."""
-        with naming(path, "a MAT file"), (Hdf5Variables if is_hdf5(path) else Mat5Variables)(path) as variables:
+        with naming(path, "a MAT file"), (Hdf5Arrays if is_hdf5(path) else Mat5Arrays)(path) as variables:
             structs = sorted({name.partition(".")[0] for name in variables if re.match(_STRUCT + r"\d+\.", name)})
             records: list[Record] = []
             notices: list[Notice] = []
             for prefix in [""] if options.columns or not structs else [f"{struct}." for struct in structs]:
-                parts, more_notices = variable_records(variables, prefix, options, records)
+                parts, more_notices = records_from_arrays(variables, prefix, options, records)
                 records += parts
                 notices += more_notices
             return Experiment(tuple(records), str(path), tuple(notices))

@@ -1,39 +1,99 @@
-"""`NamedArrays`: files of other software that hold the channels of one record as arrays under names."""
+"""`NamedArrays`: base of the readers of files that contain arrays under names."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, Self
 
-from ...record import Experiment
-from ..checks.error_context import naming
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecordingError
+from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
 from ..table.read_options import ReadOptions
-from .variable_records import variable_records
-from .variables import Variables
 
 
-class NamedArrays:
-    """One record from the arrays of a file; `ReadOptions.columns` says which is which where their names do not.
+class NamedArrays(Mapping[str, NDArray[Any]]):
+    """Mapping of dotted names to arrays. It is a context manager, and the file is open until it ends."""
 
-    Parameters
-    ----------
-    endings : tuple of str
-        Of the names of such files.
-    expected : str
-        What such a file is, in messages.
-    opened : callable
-        From the path to the arrays by name.
-    """
+    kind = "the variables"
+    """What messages call the names."""
 
-    def __init__(self, endings: tuple[str, ...], expected: str, opened: Callable[[Path], Variables]) -> None:
-        self._endings, self._expected, self._opened = endings, expected, opened
+    def __enter__(self) -> Self:
+        return self
 
-    def recognises(self, path: Path) -> bool:
-        """True for the endings."""
-        return path.is_file() and path.suffix.lower() in self._endings
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
-    def read(self, path: Path, options: ReadOptions) -> Experiment:
-        """The arrays as phases named by what the drive looks like, unless `ReadOptions.phases` says otherwise."""
-        with naming(path, self._expected), self._opened(path) as variables:
-            records, notices = variable_records(variables, "", options)
-            return Experiment(tuple(records), str(path), tuple(notices))
+    def __contains__(self, name: object) -> bool:
+        return name in set(self)  # the default of a mapping would read the array
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the file, and release what was read from it."""
+
+    @abstractmethod
+    def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
+        """The samples of a vector, or of one column of a matrix, as `options` select and average them.
+
+        Parameters
+        ----------
+        name : str
+            Dotted name.
+        column : int or None
+            Column, counted from 0, with the axes ordered as in MATLAB.
+        options : ReadOptions
+            Its `rows`, where they count from the beginning, and its `average` apply.
+
+        Raises
+        ------
+        RecordingError
+            If the array holds no real numbers, has no such column, or has several columns and none is chosen.
+        """
+
+    @staticmethod
+    def in_pieces(
+        name: str, size: int, options: ReadOptions, piece: Callable[[slice], NDArray[Any]]
+    ) -> DecimatingBuffer:
+        """A column that is read in pieces, so that its length is not limited by the memory.
+
+        Parameters
+        ----------
+        name : str
+            Of the array, for messages.
+        size : int
+            Length of the column.
+        options : ReadOptions
+            Pieces outside its `rows` are not read.
+        piece : callable
+            From a slice of the column to its numbers.
+
+        Raises
+        ------
+        RecordingError
+            If they are not real numbers.
+        """
+        buffer = DecimatingBuffer.of(1, options)
+        for first in range(0, size, PIECE):
+            part = slice(first, min(first + PIECE, size))
+            is_wanted = part.stop > buffer.start
+            values = np.asarray(piece(part)) if is_wanted else np.empty(part.stop - first)
+            if values.dtype.kind not in "fiub":
+                raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
+            buffer.add_column(values)
+            if buffer.is_full:
+                break
+        return buffer
+
+    @staticmethod
+    def check_column(name: str, shape: tuple[int, ...], column: int | None) -> None:
+        """Raise RecordingError if an array of this shape has no such column, or has several and none is chosen."""
+        if column is None and math.prod(shape) != max(shape, default=1):
+            raise RecordingError(f"{name}: got shape {shape}, expected a vector; choose a column as {name}[1]")
+        if column is not None and (len(shape) != 2 or column >= shape[1]):
+            raise RecordingError(f"{name}: got shape {shape}, expected a matrix with that column")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...channels import quantity_of
+from ...channel_mapping import quantity_of
 from ...errors import RecordingError
 from ...record import Samples
 from .units import si_factor

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from ...channels import QUANTITIES
+from ...channel_mapping import QUANTITIES
 from ...errors import RecordingError
 from ...record import Notice, Record, Samples
 from ..checks.split_at_gaps import split_at_gaps

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...channels import QUANTITIES, quantity_of
+from ...channel_mapping import QUANTITIES, quantity_of
 from ...record import Experiment, Record
 from ...recording.checks.lag import lag_of
 from ..words import duration

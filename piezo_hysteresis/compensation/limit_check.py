@@ -1,4 +1,4 @@
-"""`reachable`: which part of a path cannot be reached, by how much, and the nearest path that can."""
+"""`reachable`: whether the limits allow a path, where they do not and by how much, and the nearest path they allow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Mat5Variables`: the variables of a MATLAB file of version 5 to 7.2, long ones read in pieces."""
+"""`Mat5Arrays`: the variables of a MATLAB file of version 5 to 7.2, long ones read in pieces."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...errors import RecordingError
 from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
 from ..table.read_options import ReadOptions
 from .mat5_sizes import COMPRESSED, HEADER, MATRIX, ORDERS, Inflated, check_sizes
-from .variables import Variables
+from .named_arrays import NamedArrays
 
 _LONG = 1 << 20
 """Numbers from which a matrix is read in part."""
@@ -40,7 +40,7 @@ class _Matrix:
     kind: np.dtype[Any]
 
 
-class Mat5Variables(Variables):
+class Mat5Arrays(NamedArrays):
     """Dotted name to array of every variable and field; one variable is in memory at a time.
 
     Parameters
@@ -87,16 +87,13 @@ class Mat5Variables(Variables):
         matrix = self._long.get(name)
         shape = self[name].shape if matrix is None else matrix.shape
         self.check_column(name, shape, column)
-        buffer = DecimatingBuffer.of(1, options)
         if matrix is not None:
+            buffer = DecimatingBuffer.of(1, options)
             count = math.prod(shape) if column is None else shape[0]
             _read(self._path, matrix, (column or 0) * count, count, buffer)
             return buffer
-        values = self[name]
-        if values.dtype.kind not in "fiub":
-            raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
-        buffer.add_column(values.ravel() if column is None else values[:, column])
-        return buffer
+        values = self[name].ravel() if column is None else self[name][:, column]
+        return self.in_pieces(name, values.size, options, lambda part: np.asarray(values[part]))
 
     def _variable(self, top: str) -> dict[str, NDArray[Any]]:
         """Everything in one variable, by dotted names."""

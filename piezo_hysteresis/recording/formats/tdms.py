@@ -1,4 +1,4 @@
-"""`TdmsVariables`: the channels of a LabVIEW file, read through npTDMS."""
+"""`TdmsArrays`: the channels of a LabVIEW file, read through npTDMS."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import RecordingError
-from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
+from ..segmentation.decimating_buffer import DecimatingBuffer
 from ..table.read_options import ReadOptions
-from .variables import Variables
+from .named_arrays import NamedArrays
 
 _BRACKETS = str.maketrans("[]", "()")
 """Brackets stand for the column of a matrix."""
 
 
-class TdmsVariables(Variables):
+class TdmsArrays(NamedArrays):
     """``"group.channel (unit)"`` to array, and ``"dt"``, the increment of the waveforms [s].
 
     Parameters
@@ -77,12 +77,4 @@ class TdmsVariables(Variables):
     def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         channel = self._channels[name]
         self.check_column(name, (len(channel),), column)
-        buffer = DecimatingBuffer.of(1, options)
-        for first in range(0, len(channel), PIECE):
-            values = np.asarray(channel[first : first + PIECE])
-            if values.dtype.kind not in "fiub":
-                raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
-            buffer.add_column(values)
-            if buffer.is_full:
-                break
-        return buffer
+        return self.in_pieces(name, len(channel), options, lambda part: np.asarray(channel[part]))

@@ -1,4 +1,4 @@
-"""`NpyVariables`: the columns of a NumPy array in a file of its own."""
+"""`NpyArrays`: the columns of a NumPy array in a file of its own."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ...errors import RecordingError
 from ..segmentation.decimating_buffer import DecimatingBuffer
 from ..table.read_options import ReadOptions
-from .variables import Variables
+from .named_arrays import NamedArrays
 
 
-class NpyVariables(Variables):
+class NpyArrays(NamedArrays):
     """Column to array: fields of a structured array by their names, columns of a matrix by their numbers from 1.
 
     Parameters
@@ -53,8 +53,4 @@ class NpyVariables(Variables):
     def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         values = self._columns[name]
         self.check_column(name, values.shape, column)
-        if values.dtype.kind not in "fiub":
-            raise RecordingError(f"{name}: got {values.dtype}, expected real numbers")
-        buffer = DecimatingBuffer.of(1, options)
-        buffer.add_column(values)
-        return buffer
+        return self.in_pieces(name, values.size, options, lambda part: np.asarray(values[part]))

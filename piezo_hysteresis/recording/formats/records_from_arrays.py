@@ -14,20 +14,20 @@ from ..segmentation.decimating_buffer import DecimatingBuffer, averaged_notice
 from ..table.column_inference import inference_notice, inferred_columns, inferred_period, unit_in
 from ..table.read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from ..table.table import table_records
-from .variables import Variables
+from .named_arrays import NamedArrays
 
 _PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
 """Where a channel stands: ``name[column]``."""
 
 
-def variable_records(
-    variables: Variables, prefix: str, options: ReadOptions, before: Sequence[Record] = ()
+def records_from_arrays(
+    arrays: NamedArrays, prefix: str, options: ReadOptions, before: Sequence[Record] = ()
 ) -> tuple[list[Record], list[Notice]]:
     """Records of what a file holds under names.
 
     Parameters
     ----------
-    variables : Variables
+    arrays : NamedArrays
         Name to array.
     prefix : str
         Beginning of the names of one record, e.g. ``"phase_01."``; empty for all.
@@ -41,24 +41,24 @@ def variable_records(
     RecordingError, RecordError
         If voltage or displacement is not found, or they form no record.
     """
-    fields = [name.removeprefix(prefix) for name in variables if name.startswith(prefix)]
+    fields = [name.removeprefix(prefix) for name in arrays if name.startswith(prefix)]
     others = [name for name in (*fields, *options.columns) if is_channel(name)]
     given = {c: str(options.columns.get(c, prefix + c)) for c in (*CHANNELS, *others, *LABELS)}
-    places = {c: place for c, place in given.items() if c in options.columns or place in variables}
-    labels = {name: _label(variables[places[name]], places[name]) for name in LABELS if name in places}
-    if options.sample_period is None and "sample_period" not in places and (found := inferred_period(variables)):
-        value = float(_label(variables[found[0]], found[0]))
+    places = {c: place for c, place in given.items() if c in options.columns or place in arrays}
+    labels = {name: _label(arrays[places[name]], places[name]) for name in LABELS if name in places}
+    if options.sample_period is None and "sample_period" not in places and (found := inferred_period(arrays)):
+        value = float(_label(arrays[found[0]], found[0]))
         labels["sample_period"] = repr(1.0 / value if found[1] else value)
     timed = options.sample_period is not None or "sample_period" in labels
-    names = [name for name in variables if name not in places.values()]
+    names = [name for name in arrays if name not in places.values()]
     wanted = [c for c in ("time", "voltage", "displacement") if c not in places and not (c == "time" and timed)]
     inferred = {c: names[at] for c, at in inferred_columns([n.rpartition(".")[2] for n in names], (), wanted).items()}
     places |= inferred
     for channel in ("voltage", "displacement"):
         if channel not in places:
-            raise RecordingError(f"got {_listed(variables)}, expected {given[channel]}; name it by `columns`")
+            raise RecordingError(f"got {_listed(arrays)}, expected {given[channel]}; name it by `columns`")
     units = {c: unit_in(place, c) for c, place in places.items() if is_channel(c)}
-    buffers = {c: _channel(variables, places[c], options) for c in units}
+    buffers = {c: _channel(arrays, places[c], options) for c in units}
     columns = {c: options.in_si(c, buffer.column(0), units[c]) for c, buffer in buffers.items()}
     needed = {*CHANNELS, *options.columns}
     columns = {c: v for c, v in columns.items() if c in needed or v.size == columns["voltage"].size}
@@ -73,13 +73,13 @@ def variable_records(
     return records, [*notices, *inference_notice(inferred, units)]
 
 
-def _channel(variables: Variables, place: str, options: ReadOptions) -> DecimatingBuffer:
+def _channel(arrays: NamedArrays, place: str, options: ReadOptions) -> DecimatingBuffer:
     match = _PLACE.fullmatch(place)
     name, number = (match["name"], match["column"]) if match else (place, None)
-    if name not in variables:
-        raise RecordingError(f"got {_listed(variables)}, expected {place}")
+    if name not in arrays:
+        raise RecordingError(f"got {_listed(arrays)}, expected {place}")
     column = None if number is None else int(number) - 1
-    return variables.samples(name, column, options)
+    return arrays.samples(name, column, options)
 
 
 def _label(value: NDArray[Any], place: str) -> str:
@@ -89,5 +89,5 @@ def _label(value: NDArray[Any], place: str) -> str:
     return str(int(item)) if isinstance(item, bool) else str(item)
 
 
-def _listed(variables: Variables) -> str:
-    return f"{variables.kind} " + ", ".join(list(variables)[:30])
+def _listed(arrays: NamedArrays) -> str:
+    return f"{arrays.kind} " + ", ".join(list(arrays)[:30])

@@ -1,4 +1,4 @@
-"""`Hdf5Variables`: the variables of a MATLAB 7.3 file, read one by one."""
+"""`Hdf5Arrays`: the arrays of an HDF5 file, which a MATLAB 7.3 file is, too; read one by one."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import RecordingError
-from ..segmentation.decimating_buffer import PIECE, DecimatingBuffer
+from ..segmentation.decimating_buffer import DecimatingBuffer
 from ..table.read_options import ReadOptions
-from .variables import Variables
+from .named_arrays import NamedArrays
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of a file."""
@@ -33,7 +33,7 @@ def is_hdf5(path: Path) -> bool:
     return _SIGNATURE in (head[:8], head[512:])
 
 
-class Hdf5Variables(Variables):
+class Hdf5Arrays(NamedArrays):
     """Dotted name to array, that of MATLAB oriented as there; texts are arrays of one string.
 
     Parameters
@@ -77,15 +77,13 @@ class Hdf5Variables(Variables):
         self.check_column(name, shape, column)
         last = dataset.ndim - 1 if self._rows_last else 0
         along = last if column is not None else int(np.argmax(dataset.shape))
-        buffer = DecimatingBuffer.of(1, options)
-        for first in range(0, dataset.shape[along], PIECE):
+
+        def piece(part: slice) -> NDArray[Any]:
             index: list[int | slice] = [column or 0] * dataset.ndim
-            index[along] = slice(first, first + PIECE)
-            skipped = first + PIECE <= buffer.start
-            buffer.add(np.empty((PIECE, 1)) if skipped else np.asarray(dataset[tuple(index)], np.float64)[:, None])
-            if buffer.is_full:
-                break
-        return buffer
+            index[along] = part
+            return np.asarray(dataset[tuple(index)])
+
+        return self.in_pieces(name, dataset.shape[along], options, piece)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         dataset = self._numbers(name)
