@@ -4,8 +4,8 @@ Tests of real processes over DDS need the processor in time. One that fails is t
 promise that does not hold fails twice, a computer that was busy elsewhere does not. Nor does it fail a property: no
 example has a deadline.
 
-A shell starts a background job with SIGINT ignored, and every process below it inherits that. Tests that interrupt nodes
-need the signal to arrive.
+A shell starts a background job with SIGINT ignored, and every process below it inherits that. Tests that interrupt
+nodes need the signal to arrive.
 """
 
 import signal
