@@ -192,7 +192,7 @@ class Soak:
         except AssertionError as error:
             outside = "some"
             self.keeper.break_promise(f"voltages outside the limits or too steep: {error}")
-        applied = int(np.isfinite(self.log.voltages).sum())
+        applied = self.log.given
         counts = self.keeper.counts
         unaccounted = applied - counts["samples received"] - counts[LOST] - counts[BEFORE]
         if abs(unaccounted) > ALLOWED * self.soaked.starts["driver_node"]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,10 @@ import piezo_hysteresis
 
 STEP = 20.0 / 2**16
 """Step of the converter of the simulated stage [V]. The applied and the reported voltage are rounded to it."""
+
+
+PIECE = 1 << 22
+"""Samples of a log that are looked at together: hours at 100 kHz do not fit into memory."""
 
 
 class StageLog:
@@ -46,10 +51,22 @@ class StageLog:
         data = self.path.read_bytes()
         return np.frombuffer(data[: len(data) // 8 * 8])
 
+    def pieces(self) -> Iterator[np.ndarray]:
+        """The log in order; each piece but the first begins with the last sample of the one before it."""
+        size, begin = self.path.stat().st_size // 8, 0
+        while begin + 1 < size or begin == 0:
+            yield np.fromfile(self.path, count=min(PIECE, size - begin), offset=8 * begin)
+            begin += PIECE - 1
+
+    @property
+    def given(self) -> int:
+        """Voltages that the stage was given."""
+        return self.path.stat().st_size // 8 - self.starts
+
     @property
     def starts(self) -> int:
         """Drivers that were started."""
-        return int(np.isnan(self.voltages).sum())
+        return sum(int(np.isnan(piece[bool(k) :]).sum()) for k, piece in enumerate(self.pieces()))
 
     def shift_clock(self, offset: float) -> None:
         """Let the clock of the computer be off by so much [s], as drivers see it."""
@@ -59,12 +76,11 @@ class StageLog:
 
     def check(self) -> None:
         """Every sample is inside the limits, and no steeper than allowed, from the safe voltage of every start on."""
-        voltages = self.voltages
-        begins = np.isnan(voltages)
-        given = voltages[~begins]
-        assert given.size > 100
-        assert self._low <= given.min()
-        assert given.max() <= self._high
-        step = np.abs(np.diff(np.where(begins, 0.0, voltages)))
-        step[begins[1:]] = 0.0
-        assert step.max() <= self._step * (1 + 1e-9) + STEP
+        assert self.given > 100
+        for voltages in self.pieces():
+            begins = np.isnan(voltages)
+            inside = voltages[~begins]
+            assert ((self._low <= inside) & (inside <= self._high)).all(), f"{inside.min():g} to {inside.max():g} V"
+            step = np.abs(np.diff(np.where(begins, 0.0, voltages)))
+            step[begins[1:]] = 0.0
+            assert (step <= self._step * (1 + 1e-9) + STEP).all(), f"{step.max():g} V in one sample"
