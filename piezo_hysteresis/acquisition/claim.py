@@ -11,7 +11,7 @@ _OWNER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 
 
 class Claim:
-    """At most one owner at a time. The owner repeats its claim. Times are in s on the steady clock.
+    """At most one owner at a time. The owner renews its claim. Times are in s on the steady clock.
 
     Parameters
     ----------
@@ -45,6 +45,13 @@ class Claim:
         is_new = not self.owner
         self.owner, self._heard = owner, now
         return is_new
+
+    def renew(self, owner: str, now: float) -> bool:
+        """Repeat the claim where it holds; False where it has ended, which an owner that stood still must learn."""
+        if not owner or owner != self.owner:
+            return False
+        self._heard = now
+        return True
 
     def release(self, owner: str) -> bool:
         """Give the claim up; False where this owner does not hold it."""

@@ -8,7 +8,9 @@ from piezo_hysteresis.acquisition.claim import Claim
 from piezo_hysteresis.errors import StageError
 
 NAMES = st.sampled_from(["a", "b", "c.1"])
-ASKED = st.lists(st.tuples(st.sampled_from(["take", "release", "expire"]), NAMES, st.floats(0.0, 3.0)), max_size=40)
+ASKED = st.lists(
+    st.tuples(st.sampled_from(["take", "renew", "release", "expire"]), NAMES, st.floats(0.0, 3.0)), max_size=40
+)
 
 
 @given(ASKED)
@@ -22,6 +24,9 @@ def test_a_claim_changes_hands_only_when_it_was_given_up_or_has_expired(asked):
         elif what == "take":
             with pytest.raises(StageError, match=f"claimed by {owner}"):
                 claim.take(name, now)
+        elif what == "renew":
+            assert claim.renew(name, now) == (name == owner)
+            heard = now if name == owner else heard
         elif what == "release":
             assert claim.release(name) == (name == owner)
             owner = "" if name == owner else owner

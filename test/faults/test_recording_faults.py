@@ -1,10 +1,10 @@
 """The identification node when the disk is full, when it may not write, and when it is killed."""
 
-import os
 import resource
 import shutil
 import signal
 import subprocess
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -17,6 +17,8 @@ from benchmarks.naming_cases import Case
 from piezo_hysteresis.nodes.messages.conversions import values_of
 from piezo_hysteresis.nodes.runtime.qos import LATCHED
 from piezo_hysteresis.recording import read, write
+
+from .campaign import children
 
 pytestmark = pytest.mark.nodes
 
@@ -31,16 +33,23 @@ class Identification:
 
     def __init__(self, lab, root):
         self.lab, self.root, self.statuses = lab, root, lab.listen(DiagnosticStatus, "status", LATCHED)
+        self._goal = ""
         root.mkdir(exist_ok=True)
         self.process = lab.start(NODE, experiment_root=str(root))
         lab.wait(lambda: self.ask("plan").success, "the driver's limits")
 
     def ask(self, name):
-        return self.lab.call(Trigger, f"{NODE}/{name}")
+        answer = self.lab.call(Trigger, f"{NODE}/{name}")
+        if "; goal " in answer.message:
+            self._goal = answer.message.rpartition("; goal ")[2]
+        return answer
 
     def await_state(self, *states):
+        """The last status of what was begun last, once it is one of `states`."""
+
         def reached():
-            return self.statuses and values_of(self.statuses[-1])["state"] in states
+            values = values_of(self.statuses[-1]) if self.statuses else {}
+            return values.get("goal") == self._goal and values["state"] in states
 
         self.lab.wait(reached, f"state {' or '.join(states)}, not {self.statuses[-1:]}")
         return self.statuses[-1]
@@ -107,7 +116,7 @@ def deleted(folder):
 
 
 def moved(folder):
-    folder.rename(folder.with_name("moved_away"))
+    folder.rename(folder.parent.with_name(f"moved_{folder.name}"))
 
 
 def replaced(folder):
@@ -131,12 +140,12 @@ def test_a_recording_that_is_lost_ends_the_run_within_a_second_of_samples(runnin
     assert "deleted or moved" in reported
     lab.wait(lambda: statuses and values_of(statuses[-1])["state"] == "stopped", "the stop of the driver")
     lab.wait(lambda: samples.newest.index[-1] > end, "the samples after it")
-    inside = samples.index <= end
-    assert samples.voltage[inside][-1] < samples.voltage[inside].max(), "on its way to the safe voltage"
+    heard = samples.so_far()
+    inside = heard.index <= end
+    assert heard.voltage[inside][-1] < heard.voltage[inside].max(), "on its way to the safe voltage"
     at_rest(lab, samples)
     assert identification.process.is_running
     assert not identification.ask("abort").success
-    shutil.rmtree(identification.root / "moved_away", ignore_errors=True)
 
 
 def test_abort_of_a_run_whose_recording_has_gone_ends_no_node(running):
@@ -158,33 +167,64 @@ def test_abort_of_a_run_whose_recording_has_gone_ends_no_node(running):
     assert identification.process.is_running
 
 
-@pytest.mark.soak
+def run(*command):
+    """Do something that only some machines and users can."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True)
+    except FileNotFoundError as error:
+        pytest.skip(f"no file system can be made here: {error}")
+    if done.returncode:
+        pytest.skip(f"no file system can be mounted here: {' '.join(command)}: {done.stderr.strip()}")
+
+
+@contextmanager
+def temporary_disk(root, options):
+    """A file system of its own in memory."""
+    run("mount", "-t", "tmpfs", "-o", options, "tmpfs", str(root))
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", "--lazy", str(root)], check=True)
+
+
+@contextmanager
+def disk_with_quota(root, limit):
+    """A btrfs in a file; what is below `root` may hold so much."""
+    image = root.with_name("image")
+    with image.open("wb") as file:
+        file.truncate(128 << 20)
+    run("mkfs.btrfs", "--quiet", str(image))
+    run("mount", "-o", "loop", str(image), str(root))
+    try:
+        run("btrfs", "quota", "enable", str(root))
+        run("btrfs", "qgroup", "limit", limit, str(root))
+        yield
+    finally:
+        subprocess.run(["umount", "--lazy", str(root)], check=True)
+        image.unlink()
+
+
 @pytest.mark.parametrize(
-    ("options", "reason"),
+    ("disk", "option", "reason"),
     [
-        ("size=1m", "No space left on device"),
-        ("nr_inodes=2", "No space left on device"),
-        ("ro", "Read-only file system"),
+        (temporary_disk, "size=1m", "No space left on device"),
+        (temporary_disk, "nr_inodes=2", "No space left on device"),
+        (temporary_disk, "ro", "Read-only file system"),
+        (disk_with_quota, "1M", "Disk quota exceeded"),
     ],
-    ids=["full", "no more files", "read-only"],
+    ids=["full", "no more files", "read-only", "quota"],
 )
-def test_a_real_disk_that_takes_no_more_ends_the_run_and_not_the_node(running, options, reason):
+def test_a_real_disk_that_takes_no_more_ends_the_run_and_not_the_node(running, disk, option, reason):
     """A file system of its own, where the machine lets one be mounted: root may write into any folder of another."""
     lab, samples, identification = running
     at_rest(lab, samples)
-    root = identification.root
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(root)], capture_output=True)
-    if mounted.returncode:
-        pytest.skip(f"no file system can be mounted here: {mounted.stderr.decode().strip()}")
-    try:
+    with disk(identification.root, option):
         assert identification.ask("identify").success
         assert reason in identification.await_state("failed").message
         at_rest(lab, samples)
-        if options == "size=1m":
+        if option in ("size=1m", "1M"):
             assert read(identification.newest(), include=("idle", "hold")).records
         assert identification.process.is_running
-    finally:
-        subprocess.run(["umount", "--lazy", str(root)], check=True)
     assert identification.ask("identify").success
     identification.await_state("running")
     assert identification.ask("abort").success
@@ -226,20 +266,6 @@ def test_killed_while_it_fits_it_takes_the_fit_along_and_starts_again(running, t
     assert again.ask("identify").success
     again.await_state("running")
     assert again.ask("abort").success
-
-
-def children(pid):
-    """Processes started by a process."""
-    found = []
-    for name in filter(str.isdigit, os.listdir("/proc")):
-        try:
-            with open(f"/proc/{name}/stat") as stat:
-                parent = int(stat.read().rpartition(")")[2].split()[1])
-        except OSError:
-            continue
-        if parent == pid:
-            found.append(int(name))
-    return found
 
 
 def alive(pid):

@@ -19,11 +19,13 @@ import yaml
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import GetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
@@ -159,6 +161,7 @@ class Lab:
         self.processes: list[NodeProcess] = []
         self._added: list[Any] = []
         self._heard: list[Any] = []
+        self._clients: dict[str, tuple[Any, Any]] = {}
         self._others: list[tuple[Node, Spinning]] = []
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
@@ -291,23 +294,36 @@ class Lab:
         self._command.publish(command_to_cloud(voltage, sample_period, phase, stamp))
 
     def call(self, kind: type, service: str, request: Any = None) -> Any:
-        """Answer of a service."""
-        client = self.node.create_client(kind, service)
-        self.wait(client.service_is_ready, f"the service {service}")
-        time.sleep(0.1)  # until the node has found this client too: its answer would be lost
-        futures = [client.call_async(request or kind.Request())]
+        """Answer of a service. A `Trigger` is sent once; anything else again where no answer comes."""
+        client, probe = self._client(kind, service)
+        if probe is not None:  # an answer to a client that the node has not found yet is lost
+            self._answer(probe, GetParameters.Request(), f"{service} to find its client", 1.0)
+        interval = PATIENCE if kind is Trigger else 10.0
+        return self._answer(client, request or kind.Request(), f"an answer of {service}", interval)
+
+    def _client(self, kind: type, service: str) -> tuple[Any, Any]:
+        """A client, kept for the next call, and for a `Trigger` another one of the same node, made after it.
+
+        A node finds both in the order in which they were made: one that answers the second knows the first.
+        """
+        if service not in self._clients:
+            client, probe = self.node.create_client(kind, service), None
+            if kind is Trigger:
+                probe = self.node.create_client(GetParameters, f"{service.rpartition('/')[0]}/get_parameters")
+            self._clients[service] = client, probe
+        return self._clients[service]
+
+    def _answer(self, client: Any, request: Any, what: str, interval: float) -> Any:
+        self.wait(client.service_is_ready, f"the service {client.srv_name}")
+        futures: list[Any] = []
         asked = time.monotonic()
 
         def answered() -> Any:
-            if time.monotonic() > asked + 10.0 * len(
-                futures
-            ):  # a node that had not found this client yet answers nobody
-                futures.append(client.call_async(request or kind.Request()))
+            if time.monotonic() >= asked + interval * len(futures):
+                futures.append(client.call_async(request))
             return next((future for future in futures if future.done()), None)
 
-        future = self.wait(answered, f"an answer of {service}")
-        self.do(lambda: self.node.destroy_client(client))
-        return future.result()
+        return self.wait(answered, what).result()
 
     def transition(self, name: str, node: str = "driver_node") -> bool:
         """Ask a lifecycle node for a transition."""

@@ -54,11 +54,13 @@ class DriverClaims:
                 if self._claim.take(message.key, time.monotonic()):
                     self._node.get_logger().info(f"claimed by {self._claim.owner}")
                     self._show()
+            elif message.value == "renew":
+                self._claim.renew(message.key, time.monotonic())  # one that has ended is seen on 'claimed_by'
             elif message.value == "release":
                 if self._claim.release(message.key):
                     self._end(f"{message.key} has released the stage")
             else:
-                raise StageError(f"claim: got {message.value[:80]!r}, expected 'claim' or 'release'")
+                raise StageError(f"claim: got {message.value[:80]!r}, expected 'claim', 'renew' or 'release'")
         except StageError as error:
             self._refuse("claim", 0, error)
 

@@ -53,20 +53,32 @@ class CommandSender:
         lost : callable
             Called with the reason where the message did not leave, in the thread.
         """
-        self.call_off()
+        self._join()  # nobody waits for what came before: its fate is known
         self._called_off.clear()
         self._thread = threading.Thread(
             target=self._send, args=(phase, owner, leaving, lost), name="command", daemon=True
         )
         self._thread.start()
 
-    def call_off(self) -> None:
-        """Return when nothing is on its way any more: what arrived after a stop would be played."""
+    def call_off(self, has_arrived: bool) -> None:
+        """Return when nothing is on its way any more: what arrived after a stop would be played.
+
+        Parameters
+        ----------
+        has_arrived : bool
+            Whether the driver has answered what was sent last. The middleware confirms it seconds later, and one that
+            has died confirms nothing.
+        """
         self._called_off.set()
-        if self._thread is not None:
-            self._thread.join()
+        if self._join() and not has_arrived:
             self._publisher.wait_for_all_acked(Duration(seconds=_LONGEST_WAY))
-            self._thread = None
+
+    def _join(self) -> bool:
+        """Wait until the thread has ended; False where there was none."""
+        thread, self._thread = self._thread, None
+        if thread is not None:
+            thread.join()
+        return thread is not None
 
     def _send(
         self, phase: ProtocolPhase, owner: str, leaving: Callable[[Time], None], lost: Callable[[str], None]

@@ -81,7 +81,7 @@ class DriverClient:
         self.first_index = self.voltages = 0
         self.owner, self.holder = f"{node.get_name()}.{os.getpid()}", ""
         self._claims = advertise(node, "claim")
-        self._is_claiming = False
+        self._is_claiming = self._has_owned = False
         self._sent: tuple[str, str] | None = None
         self._newest: float | None = None
         self._pending: Future | None = None
@@ -135,8 +135,8 @@ class DriverClient:
         return f"it begins at {voltage:.3g} V, and the stage is at {self._newest:.3g} V"
 
     def claim(self) -> None:
-        """Ask for the stage, and repeat the claim until it is released."""
-        self._is_claiming = True
+        """Ask for the stage; once granted, the claim is renewed until it is released. An ended one stays ended."""
+        self._is_claiming, self._has_owned = True, False
         self._repeat_claim()
 
     def release(self) -> None:
@@ -147,10 +147,11 @@ class DriverClient:
 
     def _repeat_claim(self) -> None:
         if self._is_claiming:
-            send(self._claims, KeyValue(key=self.owner, value="claim"))
+            send(self._claims, KeyValue(key=self.owner, value="renew" if self._has_owned else "claim"))
 
     def _on_holder(self, message: String) -> None:
         self.holder = message.data
+        self._has_owned = self._has_owned or (self._is_claiming and self.owns)
 
     def send(self, phase: ProtocolPhase) -> None:
         """Send a phase as a command, without waiting until it has left."""
@@ -170,7 +171,7 @@ class DriverClient:
         A phase that is on its way arrives first.
         """
         try:
-            self._command.call_off()
+            self._command.call_off(has_arrived=self.state not in ("sending", "sent"))
         except Exception as error:
             self._node.fault(error)
         self._sent = None

@@ -157,6 +157,7 @@ def _go_to_start(driver: DriverClient, phase: ProtocolPhase, progress: Progress)
 
 
 def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, progress: Progress) -> Generator[Progress]:
+    _require_claim(driver)
     driver.send(phase)
     # a device that plays from its memory is silent meanwhile
     longest_silence = PATIENCE + 2.0 * phase.duration

@@ -83,6 +83,19 @@ def test_what_is_called_off_while_it_is_packed_never_leaves(shared_lab, link):
     assert lab.states(statuses, "called_off") == []
 
 
+def test_a_phase_waits_for_no_confirmation_of_the_one_before_it(shared_lab, link, monkeypatch):
+    """It comes seconds later, or never where a reader has died; the node would renew no claim and record nothing."""
+    lab = shared_lab
+    waited = []
+    monkeypatch.setattr(link._command._publisher, "wait_for_all_acked", waited.append)
+    for name in ("one", "two"):
+        lab.do(lambda name=name: link.send(ProtocolPhase(name, np.zeros(500), PERIOD)))
+        lab.wait(lambda: link.state in ("done", "refused"), "the end of the phase")
+        assert link.state == "done", link.reason
+    lab.do(link.stop)
+    assert not waited, "the driver had answered"
+
+
 def test_only_the_driver_counts_a_recorder_plays_nothing(shared_lab, link):
     lab = shared_lab
     sender = CommandSender(lab.second_node("sender"))

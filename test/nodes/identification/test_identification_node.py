@@ -209,7 +209,8 @@ def test_every_early_end_leaves_the_stage_safe_and_the_recording_readable(lab):
     path = identification.begin()
     lab.wait(moving, "the first phase")
     number = samples.newest.phase[-1]
-    began = int(samples.index[samples.phase == number][0])
+    heard = samples.so_far()
+    began = int(heard.index[heard.phase == number][0])
     size = short(DriveLimits(sample_period=PERIOD)).phases[0].voltage.size
     lab.wait(lambda: samples.newest.index[-1] > began + 0.8 * size, "most of the first phase")
     assert samples.newest.phase[-1] == number
