@@ -1,17 +1,21 @@
 """Write a model as a program that runs without Python.
 
 The C files need a C99 compiler and nothing else: a header, a source, and a self-test that compares the source with the
-model. Every effect of the catalogue can be written. The program is right for the sample period of the model only.
+model. They hold the prediction and, where the model has one, the inverse with the limits of the drive inside. Every
+effect of the catalogue can be written. The program is right for the sample period of the model only.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
+from ..compensation import Band, Inverse, Limits
 from ..errors import ModelError
 from ..export import c_program
+from ..export.inversion import inversion
 from ..model import model_file
 from ..model.model import Model
 from .options.destination import add_force, require_new_folder
@@ -31,6 +35,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="begins the names of files, functions and types, so that one program can hold several models "
         "(default: piezo)",
     )
+    parser.add_argument("--no-inverse", action="store_true", help="write the prediction only")
+    parser.add_argument("--voltage-min", metavar="V", type=float, default=0.0, help="of the inverse (default: 0)")
+    parser.add_argument("--voltage-max", metavar="V", type=float, default=10.0, help="of the inverse (default: 10)")
+    parser.add_argument(
+        "--max-slew-rate", metavar="V/S", type=float, default=math.inf, help="of the inverse (default: no limit)"
+    )
+    parser.add_argument(
+        "--no-band",
+        action="store_true",
+        help="leave out the low-pass of the wanted displacement: less preview, but kinks ask for any voltage",
+    )
     add_force(parser)
     parser.set_defaults(run=run)
 
@@ -45,12 +60,32 @@ def run(args: argparse.Namespace) -> int:
     """
     require_new_folder("-o", args.output, args.force)
     model = _load(args.model)
-    _write(c_program(model, args.name), Path(args.output).expanduser())
+    inverse, why_not = _inverse(model, args)
+    _write(c_program(model, args.name, inverse), Path(args.output).expanduser())
     out = console()
     out.print(f"wrote {args.name}.h, {args.name}.c and {args.name}_test.c to {args.output}")
     out.print(f"sample period: {model.sample_period:g} s; call {args.name}_step once in every such period")
+    if inverse is not None:
+        ahead = f"{inverse.preview} samples ({inverse.preview_time:g} s)"
+        out.print(f"inverse: the wanted displacement must be known {ahead} ahead")
+    elif why_not:
+        out.print(f"no inverse was written: {why_not}")
     out.print(f"check: cc -std=c99 {args.name}_test.c {args.name}.c -lm -o {args.name}_test && ./{args.name}_test")
     return 0
+
+
+def _inverse(model: Model, args: argparse.Namespace) -> tuple[Inverse | None, str]:
+    """The inverse, or why there is none."""
+    if args.no_inverse:
+        return None, ""
+    limits = Limits(args.voltage_min, args.voltage_max, args.max_slew_rate).resolved
+    band = None if args.no_band else Band.of(model.sample_period)
+    try:
+        inverse = Inverse(model, limits, band=band)
+        inversion(inverse)
+    except ModelError as error:
+        return None, str(error).partition(";")[0]
+    return inverse, ""
 
 
 def _load(path: str) -> Model:

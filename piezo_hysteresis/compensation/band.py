@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.arx import arx_row, padded
+from ..blocks.arx import arx_row, difference_equation, padded
 from ..blocks.block import State
+from ..c_form import CForm
 from ..errors import ModelError
 from .turned_block import TurnedBlock
 
@@ -80,3 +81,7 @@ class BandFilter(TurnedBlock):
         x = np.empty_like(y)
         arx_row(y, x0, x0, self._taps, 0, np.zeros(0), z, x)
         return x, (x0, z)
+
+    def c_form(self, ahead: int) -> CForm:
+        rest = "s->x_rest = s->y_rest = x;\nreturn x;"
+        return difference_equation(self._taps, 0, np.zeros(0), rest)

@@ -128,3 +128,121 @@ def solve(kind, p, periods, poly, c, radii, h, last, plays, wanted, now, orienta
             following = 0.5 * (near + far) if closed else x + 4.0 * (x - last)
         x = following
     return best
+
+
+LOOP_END_IN_C = {
+    NO_LOOP: f"enum {{ NEWTON = {NEWTON} }};\n#define LOOP_END(p, h, dv) (h)\n",
+    PLAIN: f"enum {{ NEWTON = {NEWTON} }};\n#define LOOP_END(p, h, dv) plain_step(h, dv, p[0], p[1], p[2])\n",
+    GENERAL: "enum { NEWTON = 0 };\n#define LOOP_END(p, h, dv) general_step(h, dv, p, p[8], p[9])\n",
+    PUBLISHED: "enum { NEWTON = 0 };\n#define LOOP_END(p, h, dv) published_step(h, dv, p[0], p[1], p[2], p[3])\n",
+}
+"""C code of `loop_end` for every kind of loop; p holds its numbers and then both periods."""
+SOLVE_IN_C = (
+    f"""\
+static const double ROUNDING = {ROUNDING!r};
+enum {{ MOST = {MOST} }};
+
+"""
+    """\
+/* A hysteresis before a sample: loop, polynomial p1, p2, p_e, p_4, plays. */
+typedef struct {
+    const double *p, *poly, *c, *bend, *radius, *play;
+    int plays;
+    double h, v;
+} hysteresis_before;
+
+/* h after the loop has gone to v. */
+static double loop_end(const hysteresis_before *b, double v)
+{
+    return v == b->v ? b->h : LOOP_END(b->p, b->h, v - b->v);
+}
+
+/* w at v without the loop. */
+static double without_loop(const hysteresis_before *b, double v)
+{
+    const double *poly = b->poly, square = v * v;
+    double total = 0.0;
+    int j;
+    for (j = 0; j < b->plays; j++) {
+        const double p = fmax(v - b->radius[j], fmin(v + b->radius[j], b->play[j]));
+        total += b->c[j] * (p + b->bend[j] * p * p);
+    }
+    return FMA(FMA(poly[0], square, poly[1]), v, FMA(poly[3], square, poly[2]) * square) + total;
+}
+
+/* dw/dv where v moves on in the direction s and the loop is at h. */
+static double slope_at(const hysteresis_before *b, double h, double v, double s)
+{
+    const double *poly = b->poly, square = v * v;
+    double slope = FMA(3.0 * poly[0], square, poly[1]) + 2.0 * v * FMA(2.0 * poly[3], square, poly[2]);
+    int j;
+    slope += b->p[0] - (b->p[1] * s + b->p[2] * copysign(1.0, h)) * h;
+    for (j = 0; j < b->plays; j++) {
+        if (s * (v - b->play[j]) >= b->radius[j] * (1.0 - 1e-9)) {
+            slope += b->c[j] * (1.0 + 2.0 * b->bend[j] * (v - s * b->radius[j]));
+        }
+    }
+    return slope;
+}
+
+/* v in [low, high] at which the hysteresis gives `wanted`; the nearer end where there is none. `now` is w before. The
+   search is Newton's method where it stays inside, and a secant in a bracket else. */
+static double solve(
+    const hysteresis_before *b, double wanted, double now, double orientation, double low, double high)
+{
+    const double last = b->v, gap = wanted - now, enough = ROUNDING * (fabs(wanted) + fabs(now));
+    const double s = copysign(1.0, gap) * orientation, edge = s > 0.0 ? fmax(high, last) : fmin(low, last);
+    double slope, x, x0 = last, g, g0 = gap, near_ = last, far_ = edge, best = last, best_gap = fabs(gap);
+    int k, closed = 0;
+    if (fabs(gap) <= enough || edge == last) {
+        return last;
+    }
+    slope = slope_at(b, b->h, last, s);
+    if (slope * orientation < 0.02 * fabs(b->poly[1])) {
+        slope = orientation * fmax(fabs(b->poly[1]), 1e-3);
+    }
+    x = last + gap / slope;
+    for (k = 0; k < NEWTON && s * (x - last) > 0.0 && s * (edge - x) >= 0.0; k++) {
+        const double end = loop_end(b, x);
+        g = wanted - without_loop(b, x) - end;
+        if (fabs(g) <= enough) {
+            return x;
+        }
+        x += g / slope_at(b, end, x, s);
+    }
+    x = last + gap / slope;
+    for (k = 0; k < MOST; k++) {
+        double following;
+        if (s * (x - near_) <= 0.0 || s * (far_ - x) < 0.0 || (closed && x == far_)) {
+            x = closed ? 0.5 * (near_ + far_) : far_;
+        }
+        g = wanted - (without_loop(b, x) + loop_end(b, x));
+        if (fabs(g) < best_gap) {
+            best = x;
+            best_gap = fabs(g);
+        }
+        if (fabs(g) <= enough || (g * gap > 0.0 && x == edge)) {
+            return x;
+        }
+        if (g * gap > 0.0) {
+            near_ = x;
+        } else {
+            far_ = x;
+            closed = 1;
+        }
+        if (closed && fabs(far_ - near_) <= ROUNDING * (fabs(far_) + fabs(near_))) {
+            return best;
+        }
+        following = g0 != g ? x + g * (x - x0) / (g0 - g) : far_;
+        x0 = x;
+        g0 = g;
+        if (k % 6 == 5) {
+            following = closed ? 0.5 * (near_ + far_) : x + 4.0 * (x - last);
+        }
+        x = following;
+    }
+    return best;
+}
+"""
+)
+"""C functions of `solve` and what it calls."""

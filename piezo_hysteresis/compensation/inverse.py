@@ -17,6 +17,7 @@ from ..blocks.scaling import ChangeOfUnit
 from ..blocks.softening.mode_path import WholePath
 from ..blocks.softening.softened_arx import SoftenedArxBlock
 from ..blocks.time import TimeBlock
+from ..c_form import CForm
 from ..effects import Invertibility
 from ..effects.dynamics.extra_resonance import ModeBlock
 from ..effects.environment.mains_hum import MainsHumBlock
@@ -188,6 +189,18 @@ class Inverse:
         """
         path = samples(wanted, "displacement")
         return self.run(np.append(path, np.full(self.preview, path[-1])), state)
+
+    def c_forms(self) -> dict[str, tuple[int | None, CForm | str]]:
+        """C code of every stage in order, by name, with the number of the block of the chain that it turns round.
+
+        None is the band, which settles at the displacement; the last, of number 0, is all before the dynamics.
+        """
+        labels = self.chain.labels
+        found: dict[str, tuple[int | None, CForm | str]] = {
+            "band" if k is None else labels[k]: (k, stage.c_form(ahead))
+            for (k, stage), ahead in zip(self._stages, self._ahead, strict=True)
+        }
+        return found | {"drive": (0, self._nonlinear.c_form())}
 
 
 def _end_of_nonlinear_part(blocks: Sequence[Block], scale: int) -> int:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.arx import arx_row, padded
+from ..blocks.arx import arx_row, difference_equation, padded
 from ..blocks.linear import Section
+from ..c_form import CForm
 from ..errors import ModelError
 from .factors import factors, preview_taps, zero_phase_taps
 
@@ -77,6 +78,11 @@ class LinearInverse:
     def rest(self, x0: float) -> tuple[float, Array]:
         """State of a stage that has been at the input x0 for long."""
         return x0, self._zeros()
+
+    def c_form(self) -> CForm:
+        """The filter as C code: its ``rest`` takes x at rest and returns it."""
+        rest = "s->x_rest = gain * x;\ns->y_rest = x;\nreturn x;"
+        return difference_equation(self._taps, 0, self._feedback, rest, gain=float(self.gain))
 
     def run(self, y: Array, state: tuple[float, Array]) -> tuple[Array, tuple[float, Array]]:
         """Next samples: x (n,) for the y (n,) of `preview` samples before, and the state after them."""

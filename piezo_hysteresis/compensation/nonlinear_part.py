@@ -12,7 +12,8 @@ from ..blocks.block import Block, State, SumBlock
 from ..blocks.low_pass import LowPassBlock
 from ..blocks.relaxation import RelaxationBlock
 from ..blocks.scaling import ChangeOfUnit
-from ..effects.drive.amplifier_saturation import AmplifierSaturationBlock
+from ..c_form import CForm, Number
+from ..effects.drive.amplifier_saturation import RAMP, AmplifierSaturationBlock
 from ..effects.drive.amplifier_slew_limit import AmplifierSlewLimitBlock
 from ..effects.drive.backlash import BacklashBlock
 from ..effects.hysteresis.bouc_wen import BoucWenBlock
@@ -179,6 +180,49 @@ class NonlinearPart:
         hysteresis = self.kind, self.loop, self.periods, self.poly, self.weights, self.radii
         state[r.W] = solver.output(*hysteresis, state[r.H], state[r.LAST], plays, state[r.LAST])
         return state, plays, np.array(lasts), np.concatenate(banks)
+
+    def c_form(self) -> CForm | str:
+        """The recursion as C code: its ``rest`` takes the drive voltage, its ``step`` the wanted output."""
+        loop: CForm | str = CForm("")
+        numbers: dict[str, Number] = {"h0": 0.0, "virgin": 0.0, "PLAYS": self.radii.size}
+        settled = []
+        for block in self.blocks:
+            if isinstance(block, BoucWenBlock | PublishedBlock):
+                loop = block.c_form()
+                numbers["h0"] = block.static(0.0)
+            elif isinstance(block, HysteresisMemoryBlock | LevelDependentMemoryBlock):
+                numbers["virgin"] = block.virgin
+            elif isinstance(block, RelaxationBlock | CreepExponentialBlock):
+                settled.append(block.gain)
+        if isinstance(loop, str):
+            return loop
+        one_at_least = (0, max(0, 1 - self.radii.size))  # C has no empty arrays
+        plays = (("c", self.weights[0]), ("bend", self.weights[1]), ("radius", self.radii))
+        numbers |= {name: np.pad(values, one_at_least) for name, values in plays}
+        numbers |= {"loop": np.append(self.loop, self.periods), "poly": self.poly}
+        numbers |= dict(zip(r.NAMES_IN_C, self.drive.tolist(), strict=True))
+        state = ["double voltage, slewed, pole, held, pushed", "double h, v, w"]
+        state.append(f"double play[{max(1, self.radii.size)}]")
+        before: list[str] = []
+        rest, after = [r.REST_IN_C], []
+        starts, direct, *rows, gains = self.bank
+        for b, (gain, whole) in enumerate(zip(gains, settled, strict=True)):
+            fade, lead, weight = (row[starts[b] : starts[b + 1]] for row in rows)
+            bank: dict[str, Number] = {
+                "SIZE": fade.size,
+                "fade": fade,
+                "lead": lead,
+                "weight": weight,
+                "direct": float(direct[b]),
+            }
+            numbers |= {f"{name}_{b}": value for name, value in (bank | {"gain": gain, "settled": whole}).items()}
+            state += [f"double last_{b}, bank_{b}[{fade.size}]"]
+            before.insert(0, r.BEFORE_IN_C.replace("BANK", str(b)))
+            rest.append(r.SETTLED_IN_C.replace("BANK", str(b)))
+            after.append(r.AFTER_IN_C.replace("BANK", str(b)))
+        library = (*loop.library, RAMP, solver.LOOP_END_IN_C[self.kind], solver.SOLVE_IN_C, r.AMPLIFIER_IN_C)
+        step = "".join((*before, r.DRIVE_IN_C, *after, "return u;"))
+        return CForm(step, "".join((*rest, "return w;")), numbers, tuple(state), library)
 
     def run(self, targets: Array, state: RecursionState) -> tuple[Array, RecursionState]:
         """Drive (n,) [V] for wanted outputs of the material (n,), and the state after it."""

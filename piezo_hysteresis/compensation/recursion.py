@@ -16,6 +16,11 @@ PER_VOLT, LEFT, LEAD, BACK, PLAY, REACH, LOWER, UPPER, CORNER, LOWEST, HIGHEST, 
 )
 """Numbers of the drive: 1/voltage scale, pole, play, slew limit and saturation of the amplifier, limits of the drive
 [V], ends of the search [v], sign of the static slope, smallest change that turns a play round [V]."""
+NAMES_IN_C = (
+    "per_volt", "left", "lead", "back", "play", "reach", "lower", "upper", "corner", "lowest", "highest", "step", "low",
+    "high", "turn", "resolution",
+)  # fmt: skip
+"""Names of the same numbers in C code."""
 VOLTAGE, SLEWED, POLE, HELD, PUSHED, LAST, H, W = range(8)
 """States: drive, behind the slew limit, behind the pole, behind the play, before the play [V]; v, h and w."""
 SAME = 1e-13
@@ -129,3 +134,108 @@ def invert(targets, kind, p, periods, poly, c, radii, d, bank, state, plays, las
             now += total
         relax_to(now, starts, direct, lead, weights, lasts, banks, ahead)
     state[H], state[LAST], state[W] = h, last, now
+
+
+AMPLIFIER_IN_C = (
+    f"""\
+static const double SAME = {SAME!r}, TOUCHING = {TOUCHING!r};
+
+"""
+    """\
+/* The voltage that the saturation turns into v; where v is beyond the end, where the end is reached. */
+static double before_saturation(double v, double lower, double upper, double corner)
+{
+    if (v > upper - corner) {
+        return upper + corner - 2.0 * sqrt(corner * fmax(upper - v, 0.0));
+    }
+    if (v < lower + corner) {
+        return lower - corner + 2.0 * sqrt(corner * fmax(v - lower, 0.0));
+    }
+    return v;
+}
+"""
+)
+"""C function of `before_saturation`."""
+REST_IN_C = """\
+double w;
+int j;
+memset(s, 0, sizeof *s);
+s->voltage = x;
+s->slewed = s->pole = s->pushed = s->held = x - ramp(x - upper, corner) + ramp(lower - x, corner);
+s->h = h0;
+s->v = s->held * per_volt;
+for (j = 0; j < PLAYS; j++) {
+    s->play[j] = s->v - virgin * fmin(fmax(s->v, -radius[j]), radius[j]);
+}
+{
+    const hysteresis_before b = { loop, poly, c, bend, radius, s->play, PLAYS, s->h, s->v };
+    w = s->w = without_loop(&b, s->v) + s->h;
+}
+"""
+"""C code of the state at rest, without the banks."""
+DRIVE_IN_C = """\
+const hysteresis_before b = { loop, poly, c, bend, radius, s->play, PLAYS, s->h, s->v };
+double v = solve(&b, x, s->w, turn, low, high) / per_volt, u, w, before;
+int j;
+/* the drive voltage for a voltage v behind the play, inside the limits */
+u = v;
+if (play > 0.0) {
+    const double move = v - s->held, same = SAME * (fabs(v) + play), touching = play * (1.0 - TOUCHING);
+    const double side = s->pushed - s->held;
+    const double up = side >= touching ? same : fmax(same, resolution);
+    const double down = side <= -touching ? same : fmax(same, resolution);
+    u = move > up ? v + play : move < -down ? v - play : s->pushed;
+}
+if (left != 0.0) {
+    u = (u - left * s->pole - back * s->slewed) / lead;
+}
+u = fmin(fmax(u, s->slewed - reach), s->slewed + reach);
+u = before_saturation(u, lower, upper, corner);
+u = fmin(fmax(u, s->voltage - step), s->voltage + step);
+u = fmin(fmax(u, lowest), highest);
+/* what the stage makes of it: the states follow what the limits have let through */
+s->voltage = u;
+before = s->slewed;
+s->slewed = u - ramp(u - upper, corner) + ramp(lower - u, corner);
+s->slewed = fmin(fmax(s->slewed, before - reach), before + reach);
+s->pole = left * s->pole + lead * s->slewed + back * before;
+s->pushed = s->pole;
+s->held = fmax(s->pole - play, fmin(s->pole + play, s->held));
+v = s->held * per_volt;
+w = without_loop(&b, v);
+s->h = loop_end(&b, v);
+s->v = v;
+for (j = 0; j < PLAYS; j++) {
+    s->play[j] = fmax(v - radius[j], fmin(v + radius[j], s->play[j]));
+}
+w = s->w = w + s->h;
+"""
+"""C code of one sample, between `settle_before` and `relax_to`."""
+BEFORE_IN_C = """\
+double ahead_BANK[SIZE_BANK], rest_BANK = 0.0;
+for (int i = 0; i < SIZE_BANK; i++) {
+    ahead_BANK[i] = s->bank_BANK[i] + fade_BANK[i] * (s->last_BANK - s->bank_BANK[i]);
+    rest_BANK += weight_BANK[i] * (ahead_BANK[i] - lead_BANK[i] * s->last_BANK);
+}
+x = (x - rest_BANK) / gain_BANK;
+"""
+"""C code of `settle_before` for one bank."""
+AFTER_IN_C = """\
+for (int i = 0; i < SIZE_BANK; i++) {
+    s->bank_BANK[i] = ahead_BANK[i] + lead_BANK[i] * (w - s->last_BANK);
+}
+s->last_BANK = w;
+w += direct_BANK * w;
+for (int i = 0; i < SIZE_BANK; i++) {
+    w += weight_BANK[i] * s->bank_BANK[i];
+}
+"""
+"""C code of `relax_to` for one bank."""
+SETTLED_IN_C = """\
+s->last_BANK = w;
+for (int i = 0; i < SIZE_BANK; i++) {
+    s->bank_BANK[i] = w;
+}
+w += settled_BANK * w;
+"""
+"""C code of one bank at rest."""

@@ -12,7 +12,9 @@ from ..blocks.block import Block, State
 from ..blocks.kernel import kernel
 from ..blocks.linear import Section
 from ..blocks.softening.softened_arx import SoftenedArxBlock, force
+from ..blocks.softening.softened_arx_c import FORCE, FORCE_FOR, SETTLE
 from ..blocks.time import TimeBlock
+from ..c_form import CForm
 from ..effects.sensor.gain_drift import GainDriftBlock
 from ..effects.sensor.offset import OffsetBlock
 from ..effects.sensor.sensor_nonlinearity import SensorNonlinearityBlock
@@ -46,6 +48,10 @@ class TurnedBlock(ABC):
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
         """Causes x (n,) of the wanted y (n,), which happen at `time` (n,) [s], and the state after them."""
 
+    def c_form(self, ahead: int) -> CForm | str:
+        """`run` as C code from `ahead` samples after the start on; ``rest`` takes the input x of the block at rest."""
+        return "has no C form of its inverse"
+
 
 class TurnedFactor(TurnedBlock):
     """y = factor · x."""
@@ -55,6 +61,9 @@ class TurnedFactor(TurnedBlock):
 
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
         return y / self.factor, None
+
+    def c_form(self, ahead: int) -> CForm:
+        return CForm("return x / factor;", numbers={"factor": self.factor})
 
 
 class TurnedLinear(TurnedBlock):
@@ -82,6 +91,13 @@ class TurnedLinear(TurnedBlock):
             y, s = inverse.run(y, s)
             states.append(s)
         return y, tuple(states)
+
+    def c_form(self, ahead: int) -> CForm:
+        parts = {f"section_{k}": inverse.c_form() for k, inverse in enumerate(self.inverses)}
+        steps = [f"x = {part.call('step', name, 'x')};" for name, part in parts.items()]
+        rest = [f"{part.call('rest', n, 'x')};\nx = gain_{k} * x;" for k, (n, part) in enumerate(parts.items())][::-1]
+        gains = {f"gain_{k}": float(inverse.gain) for k, inverse in enumerate(self.inverses)}
+        return CForm("\n".join((*steps, "return x;")), "\n".join((*rest, "return x;")), gains, parts=parts)
 
 
 @kernel
@@ -113,6 +129,12 @@ class TurnedSoftening(TurnedBlock):
         force_for(x, path[0], self.block.loop, z, w)
         return w0 + w, (w0, path, z)
 
+    def c_form(self, ahead: int) -> CForm:
+        rest = "memset(s, 0, sizeof *s);\ns->w0 = x;\ns->x0 = ME_path_rest(&s->path, settle(x, k2, k3));\nreturn x;"
+        numbers = dict(zip(("m1", "m2", "k2", "k3"), self.block.loop.tolist(), strict=True))
+        state = ("double w0, x0", "double z[2]")
+        return CForm(FORCE_FOR, rest, numbers, state, (FORCE, SETTLE), {"path": self.path.c_form()})
+
 
 @kernel
 def cubic_root(y, s2, s3, x):
@@ -131,6 +153,31 @@ def cubic_root(y, s2, s3, x):
         x[i] = root
 
 
+CUBIC_ROOT = """\
+/* x with x + s2 x^2 + s3 x^3 = y, the one joined to zero; else the turning point. */
+static double cubic_root(double y, double s2, double s3)
+{
+    double root = y;
+    int k;
+    for (k = 0; k < 60; k++) {
+        const double slope = 1.0 + (2.0 * s2 + 3.0 * s3 * root) * root;
+        double change;
+        if (slope < 1e-3) {
+            root *= 0.9;
+            continue;
+        }
+        change = (y - root - (s2 + s3 * root) * root * root) / slope;
+        root += change;
+        if (fabs(change) <= 2e-16 * fabs(root)) {
+            break;
+        }
+    }
+    return root;
+}
+"""
+"""C function of `cubic_root`."""
+
+
 class TurnedCubic(TurnedBlock):
     """y = x + s2 x² + s3 x³."""
 
@@ -142,6 +189,19 @@ class TurnedCubic(TurnedBlock):
         cubic_root(y, self.block.s2, self.block.s3, x)
         return x, None
 
+    def c_form(self, ahead: int) -> CForm:
+        numbers = {"s2": self.block.s2, "s3": self.block.s3}
+        return CForm("return cubic_root(x, s2, s3);", "", numbers, (), (CUBIC_ROOT,))
+
+
+def at_time(step: str, block: TimeBlock, ahead: int) -> CForm | str:
+    """C form that calls the forward function of a block as part `forward`, `ahead` samples later."""
+    forward = block.c_form()
+    if isinstance(forward, str):
+        return forward
+    rest = "ME_forward_rest(&s->forward, x);\ns->forward.count = ahead;\nreturn x;"
+    return CForm(step, rest, {"ahead": float(ahead)}, parts={"forward": forward})
+
 
 class TurnedGainDrift(TurnedBlock):
     """y = x · g(t)."""
@@ -152,6 +212,9 @@ class TurnedGainDrift(TurnedBlock):
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
         return y / self.block.slope(y, time), None
 
+    def c_form(self, ahead: int) -> CForm | str:
+        return at_time("return x / ME_forward_step(&s->forward, 1.0);", self.block, ahead)
+
 
 class TurnedAddition(TurnedBlock):
     """y = x + d(t)."""
@@ -161,6 +224,9 @@ class TurnedAddition(TurnedBlock):
 
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
         return y - self.block.value(np.zeros_like(y), time), None
+
+    def c_form(self, ahead: int) -> CForm | str:
+        return at_time("return x - ME_forward_step(&s->forward, 0.0);", self.block, ahead)
 
 
 class TurnedOffset(TurnedBlock):
@@ -174,3 +240,8 @@ class TurnedOffset(TurnedBlock):
 
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
         return y - (self.block.y0 + self.block.settling * state), state
+
+    def c_form(self, ahead: int) -> CForm:
+        numbers = {"y0": self.block.y0, "settling": self.block.settling}
+        step, rest = "return x - (y0 + settling * s->x_rest);", "s->x_rest = x;\nreturn x;"
+        return CForm(step, rest, numbers, ("double x_rest",))

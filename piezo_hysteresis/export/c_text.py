@@ -37,7 +37,7 @@ def array(values: np.ndarray) -> str:
 def constants(numbers: Mapping[str, Number], body: str) -> Iterator[str]:
     """Declarations of the constants that a body uses."""
     for name, value in numbers.items():
-        if not re.search(rf"\b{name}\b", body):
+        if not re.search(rf"(?<![\w.>]){name}\b", body):
             continue
         if isinstance(value, np.ndarray):
             yield f"static const double {name}[{value.size}] = {array(value)};"
@@ -58,13 +58,18 @@ def structures(prefix: str, name: str, form: CForm) -> Iterator[str]:
     yield f"typedef struct {{\n{lines}}} {prefix}_{name};\n"
 
 
-def functions(prefix: str, name: str, form: CForm) -> Iterator[str]:
-    """The functions ``NAME_rest`` and ``NAME_step`` of a form, those of its parts before."""
+def functions(prefix: str, name: str, form: CForm, *, always_rest: bool = True) -> Iterator[str]:
+    """The functions ``NAME_rest`` and ``NAME_step`` of a form, those of its parts before.
+
+    Without `always_rest` a form without state has no ``rest``.
+    """
     for part, inner in form.parts.items():
-        yield from functions(prefix, f"{name}_{part}", inner)
+        yield from functions(prefix, f"{name}_{part}", inner, always_rest=always_rest)
     state = f"{prefix}_{name} *s, " if form.has_state else ""
     channel = f", double {form.channel}" if form.channel else ""
     for function, body in (("rest", form.rest or form.step), ("step", form.step)):
+        if function == "rest" and not (always_rest or form.has_state):
+            continue
         inputs = "double x" + (channel if function == "step" else "")
         text = body.replace("ME_", f"{name}_").rstrip()
         lines = [*constants(form.numbers, body), *text.splitlines()]

@@ -9,11 +9,13 @@ from functools import cache
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from .. import __version__
+from ..compensation import Inverse
 from ..errors import ModelError
 from ..model.chain import RUNAWAY
 from ..model.model import Model
 from ..model.model_parameters import PREFIX, to_parameters
 from . import c_text
+from .inversion import inversion
 from .prediction import prediction, rest_calls, step_calls, units
 from .vectors import vectors
 
@@ -32,7 +34,7 @@ def templates() -> Environment:
     return environment
 
 
-def c_program(model: Model, name: str = "piezo") -> Mapping[str, str]:
+def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None) -> Mapping[str, str]:
     """Files of a C program by their names: NAME.h, NAME.c and NAME_test.c.
 
     Parameters
@@ -41,6 +43,8 @@ def c_program(model: Model, name: str = "piezo") -> Mapping[str, str]:
         To be exported, at its own sample period.
     name : str
         Begins the names of all files, functions and types.
+    inverse : Inverse, optional
+        Of the same model, to be exported beside it.
 
     Raises
     ------
@@ -64,8 +68,24 @@ def c_program(model: Model, name: str = "piezo") -> Mapping[str, str]:
         "units": units(tuple(found.forms)),
         "rest_calls": rest_calls(found.forms, "state"),
         "step_calls": step_calls(found.forms, "state"),
-        "vectors": vectors(model),
+        "vectors": vectors(model, inverse),
+        "inverse": None,
     }
+    if inverse is not None:
+        turned = inversion(inverse)
+        values["inverse"] = {
+            "exact": inverse.is_exact,
+            "limits": inverse.limits,
+            "preview": turned.preview,
+            "structures": [s for n, form in turned.forms.items() for s in c_text.structures(name, n, form)],
+            "has_state": [n for n, form in turned.forms.items() if form.has_state],
+            "functions": {
+                n: "\n".join(c_text.functions(name, n, form, always_rest=False)) for n, form in turned.forms.items()
+            },
+            "rest_calls": list(turned.rest_calls(found.forms)),
+            "step_calls": turned.step_calls(),
+        }
+        values["library"] = c_text.library({**found.forms, **turned.forms})
     files = {f"{name}.h": "header.h.jinja", f"{name}.c": "source.c.jinja", f"{name}_test.c": "self_test.c.jinja"}
     return {file: templates().get_template(source).render(values) for file, source in files.items()}
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compensation import Inverse
 from ..model.model import Model
 
 Array = NDArray[np.float64]
@@ -30,12 +31,18 @@ class Vectors:
         Further measured inputs.
     displacement : (n,) ndarray
         What the model says [m].
+    inverse : (n,) ndarray or None
+        What the inverse says, if this displacement is wanted [V].
+    noise_gain : float
+        How much rounding may grow in the inverse.
     """
 
     start: float
     voltage: Array
     channels: Mapping[str, Array]
     displacement: Array
+    inverse: Array | None
+    noise_gain: float = 1.0
 
 
 def drive(low: float, high: float, size: int = SIZE) -> Array:
@@ -48,8 +55,10 @@ def drive(low: float, high: float, size: int = SIZE) -> Array:
     return np.asarray(middle + 0.9 * half * swing, dtype=np.float64)
 
 
-def vectors(model: Model) -> Vectors:
-    """What the exported model has to reproduce, inside the voltages that were identified where the model states them.
+def vectors(model: Model, inverse: Inverse | None = None) -> Vectors:
+    """What the exported model, and its inverse, have to reproduce.
+
+    The voltages are inside those that were identified, where the model states them.
 
     Raises
     ------
@@ -66,7 +75,10 @@ def vectors(model: Model) -> Vectors:
     channels = {name: courses[name] for name in sorted(chain.channels)}
     start = float(voltage[0])
     displacement, _ = chain.run(voltage, chain.rest(start), channels)
-    return Vectors(start, voltage, channels, displacement)
+    if inverse is None:
+        return Vectors(start, voltage, channels, displacement, None)
+    wanted, _ = inverse.run(displacement, inverse.rest(start))
+    return Vectors(start, voltage, channels, displacement, wanted, inverse.noise_gain)
 
 
 def _stated(model: Model, key: str, otherwise: float) -> float:

@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.effects import Arx, BoucWen, SofteningOfOneMode
 from piezo_hysteresis.model import axes_file, model_file
 from piezo_hysteresis.model.axes_model import AxesModel
 from piezo_hysteresis.model.model import Model
@@ -54,6 +54,23 @@ def test_models_that_cannot_be_exported_are_refused_in_one_line(piezo, tmp_path)
     assert not (tmp_path / "c").exists()
     refused = piezo("export", tmp_path / "none.yaml", "-o", tmp_path / "c")
     assert refused.status == 2 and "none.yaml" in refused.err
+
+
+def test_a_model_without_an_inverse_is_written_without_it_and_says_so(piezo, tmp_path):
+    model = model_file.save(MODEL.with_effect(SofteningOfOneMode(k3=0.02)), tmp_path / "soft.yaml")
+    done = piezo("export", model, "-o", tmp_path / "c")
+    assert done.status == 0 and "no inverse was written: softening_of_one_mode" in done.out
+    assert "inverse" not in (tmp_path / "c" / "piezo.h").read_text()
+
+
+def test_limits_and_band_of_the_inverse_are_those_that_were_asked_for(piezo, model, tmp_path):
+    words = ("export", model, "--voltage-min", "-2", "--voltage-max", "8", "--max-slew-rate", "5e4")
+    long, short = (piezo(*words, "-o", tmp_path / name, *more) for name, more in (("a", ()), ("b", ("--no-band",))))
+    assert "known 102 samples (0.00204 s) ahead" in long.out and "known 2 samples" in short.out
+    header = (tmp_path / "b" / "piezo.h").read_text()
+    assert "-2.0 V to 8.0 V and 50000.0 V/s" in header and "It is exact to rounding." in header
+    assert piezo("export", model, "-o", tmp_path / "d", "--no-inverse").status == 0
+    assert "inverse" not in (tmp_path / "d" / "piezo.h").read_text()
 
 
 def test_a_name_that_is_no_identifier_is_refused(piezo, model, tmp_path):

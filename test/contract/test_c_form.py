@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from piezo_hysteresis.effects import CHAIN, Effect
+from piezo_hysteresis.compensation import Band, Inverse, Limits
+from piezo_hysteresis.effects import CHAIN, Effect, Invertibility
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.export import c_program
 
 from .compiled import needs_compiler, run_c
 from .test_effect import channels, drive, model_with, run, typical
+from .test_inverse import drive as turned_drive
+from .test_inverse import model_with as turned_model_with
+from .test_inverse import typical as turned_typical
 
 WORST = 1e-12
 """Largest deviation, as a share of the largest displacement."""
@@ -33,3 +37,19 @@ def test_c_code_agrees_or_the_effect_says_why_there_is_none(kind: type[Effect], 
     y, expected = run_c(files, tmp_path, u[0], rows), run(model, u)
     assert y.size == u.size
     assert np.abs(y - expected).max() <= WORST * np.abs(expected).max()
+
+
+@needs_compiler
+@pytest.mark.parametrize("kind", CHAIN, ids=lambda kind: kind.name)
+def test_the_inverse_in_c_agrees_or_the_effect_has_none(kind: type[Effect], tmp_path) -> None:
+    model = turned_model_with(turned_typical(kind))
+    if kind.invertibility is Invertibility.IMPOSSIBLE:
+        with pytest.raises(ModelError, match=kind.name):
+            Inverse(model)
+        return
+    inverse = Inverse(model, Limits(0.0, 4.0, 1e5), band=Band.of(model.sample_period))
+    path, _ = model.run(turned_drive(), model.rest(0.0))
+    expected, _ = inverse.run(path, inverse.rest(0.0))
+    u = run_c(c_program(model, inverse=inverse), tmp_path, 0.0, [path], "inverse_")
+    assert u.size == path.size
+    assert np.abs(u - expected).max() <= WORST * max(inverse.noise_gain, 1.0) * np.abs(expected).max()

@@ -12,6 +12,7 @@ import pytest
 
 from piezo_hysteresis import __version__
 from piezo_hysteresis.blocks.block import Block
+from piezo_hysteresis.compensation import Inverse, Limits
 from piezo_hysteresis.effects import Arx, BoucWen, Creep, HysteresisMemory, Offset
 from piezo_hysteresis.effects.sensor.sensor_nonlinearity import SensorNonlinearity, SensorNonlinearityBlock
 from piezo_hysteresis.errors import ModelError
@@ -66,6 +67,22 @@ def test_every_bit_is_that_of_the_model_where_the_rounding_is(tmp_path):
     expected, _ = MODEL.run(drive(), MODEL.rest(drive()[0]))
     y = run_c(c_program(MODEL), tmp_path, drive()[0], [drive()], "", "-O2", "-mfma", "-ffp-contract=off")
     np.testing.assert_array_equal(y, expected)
+
+
+@needs_compiler
+def test_the_inverse_leads_the_exported_prediction_along_the_path(tmp_path):
+    inverse = Inverse(MODEL, Limits(0.0, 10.0))
+    files = c_program(MODEL, inverse=inverse)
+    assert subprocess.run([compiled(files, tmp_path)], check=False).returncode == 0
+    path = 2e-6 + 1e-6 * (1.0 - np.cos(300.0 * PERIOD * np.arange(4_000)))
+    start = float(MODEL.run([1.0], MODEL.rest(1.0))[0][0])
+    path = np.concatenate((np.full(200, start), start + path - path[0]))
+    u = run_c(files, tmp_path, 1.0, [path], "inverse_")
+    reached = run_c(files, tmp_path, 1.0, [u])
+    settled = slice(200, path.size - inverse.preview)
+    np.testing.assert_allclose(reached[inverse.preview :][settled], path[settled], rtol=0.0, atol=1e-9 * path.max())
+    assert u.min() >= 0.0 and u.max() <= 10.0
+    assert f"PIEZO_INVERSE_PREVIEW {inverse.preview} " in files["piezo.h"]
 
 
 @needs_compiler

@@ -1,4 +1,4 @@
-"""C code of `SoftenedArxBlock`, one sample of its kernels."""
+"""C code of `SoftenedArxBlock` and of its inverse, one sample of their kernels."""
 
 from __future__ import annotations
 
@@ -52,3 +52,12 @@ s->xi[0] = xi;
 return ME_linear_step(&s->linear, x) + (share * (s->x0 - s->w0) + ME_path_step(&s->path, xi));
 """
 """C code of one sample."""
+FORCE_FOR = """\
+const double gain = 1.0 + m1 + m2, moved = ME_path_step(&s->path, x) - s->x0;
+const double w = (moved + m1 * s->z[0] + m2 * s->z[1]) / gain
+    + (force(s->x0 + s->z[0], k2, k3) - force(s->x0, k2, k3));
+s->z[1] = s->z[0];
+s->z[0] = moved;
+return s->w0 + w;
+"""
+"""C code of the inverse of the mode: the force that moves it along a wanted way."""

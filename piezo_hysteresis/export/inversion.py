@@ -1,0 +1,60 @@
+"""The inverse of a model as C forms, from the wanted displacement to the drive voltage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ..c_form import CForm
+from ..compensation import Inverse
+from ..errors import ModelError
+from .prediction import step_calls
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CInverse:
+    """What turns a wanted displacement into a drive voltage.
+
+    Parameters
+    ----------
+    forms : dict of str to CForm
+        By name, in the order of the inverse; the first takes metres, the last returns volts.
+    stages : dict of str to (int or None)
+        Number of the block of the chain that each turns round; None settles at the displacement.
+    preview : int
+        Samples that must be known ahead.
+    """
+
+    forms: dict[str, CForm]
+    stages: dict[str, int | None]
+    preview: int
+
+    def rest_calls(self, chain: dict[str, CForm]) -> Iterator[str]:
+        """C calls that set every stage to rest, where those of the prediction pass x from block to block."""
+        waiting = {at: name for name, at in self.stages.items() if self.forms[name].has_state}
+        for k, (name, form) in enumerate(chain.items()):
+            if k in waiting:
+                yield f"{waiting[k]}_rest(&state->{waiting[k]}, x);"
+            yield f"x = {name}_rest({f'&stage.{name}, ' if form.has_state else ''}x);"
+        if None in waiting:
+            yield f"{waiting[None]}_rest(&state->{waiting[None]}, x);"
+
+    def step_calls(self) -> list[str]:
+        """C calls of one sample."""
+        return list(step_calls(self.forms, "state"))
+
+
+def inversion(inverse: Inverse) -> CInverse:
+    """The stages of an inverse as C forms.
+
+    Raises
+    ------
+    ModelError
+        If one has none; the message names it.
+    """
+    forms, stages = {}, {}
+    for label, (at, form) in inverse.c_forms().items():
+        if isinstance(form, str):
+            raise ModelError(f"{label}: {form}, so the inverse cannot be exported")
+        forms[f"inverse_{label}"], stages[f"inverse_{label}"] = form, at
+    return CInverse(forms, stages, inverse.preview)
