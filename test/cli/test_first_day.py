@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -13,15 +11,11 @@ from piezo_hysteresis import recording
 from piezo_hysteresis.cli import terminal
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
+from ..command_server import piezo
+
 TIME = np.arange(400) * 5e-3
 VOLTAGE = 1.8 - 1.8 * np.cos(2 * np.pi * TIME)
 MICRONS = 12.0 * VOLTAGE
-
-
-def piezo(*words):
-    """The command in a process of its own."""
-    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
 def refused(*words):

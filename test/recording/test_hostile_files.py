@@ -1,11 +1,8 @@
 """Files made to harm: each is refused in one line, or read up to the damage, in little time and memory."""
 
 import os
-import resource
 import sqlite3
 import struct
-import subprocess
-import sys
 import zipfile
 import zlib
 from contextlib import closing
@@ -23,29 +20,15 @@ from piezo_hysteresis.recording.bag.mcap_file import MAGIC
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
 from piezo_hysteresis.stage.opening import Opening
 
-SECONDS = 60
-"""A process that hangs is stopped after this; none of them needs a tenth of it."""
+from ..command_server import piezo
 
 MEMORY = 3 << 30
 """Address space of a process that reads a hostile file; importing the package takes half of it."""
 
 
-def piezo(*words, memory=MEMORY):
-    """The command as a user types it, in a process of its own with a limited memory."""
-    return subprocess.run(
-        [sys.executable, "-m", "piezo_hysteresis.cli.main", *map(str, words)],
-        capture_output=True,
-        text=True,
-        timeout=SECONDS,
-        check=False,
-        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (memory, memory)),
-    )
-
-
 def refused(*words):
-    """One line and status 2; returns the line."""
-    done = piezo(*words)
+    """One line and status 2, in a limited memory; returns the line."""
+    done = piezo(*words, memory=MEMORY)
     assert done.returncode == 2, done.stderr[-1000:]
     (line,) = done.stderr.splitlines()
     assert line.startswith("piezo: ")
@@ -216,7 +199,7 @@ def test_a_pipe_beside_the_files_of_a_bag_is_passed_over(tmp_path, inside):
     write(experiment(), tmp_path / "bag.mcap")
     (tmp_path / "bag" / inside).unlink(missing_ok=True)
     os.mkfifo(tmp_path / "bag" / inside)
-    done = piezo("import", tmp_path / "bag", "-o", tmp_path / "out")
+    done = piezo("import", tmp_path / "bag", "-o", tmp_path / "out", memory=MEMORY)
     assert done.returncode == 0, done.stderr
 
 

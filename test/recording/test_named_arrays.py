@@ -1,8 +1,5 @@
 """Files of other software that hold arrays under names: dSPACE, NumPy, LabVIEW, HDF5, as a user imports them."""
 
-import subprocess
-import sys
-
 import h5py
 import numpy as np
 import pytest
@@ -11,15 +8,11 @@ from scipy import io
 from piezo_hysteresis.errors import PiezoError, RecordingError
 from piezo_hysteresis.recording import read
 
+from ..command_server import piezo
+
 TIME = np.arange(400) * 5e-3
 VOLTAGE = 1.8 - 1.8 * np.cos(2 * np.pi * TIME)
 MICRONS = 12.0 * VOLTAGE
-
-
-def piezo(*words):
-    """The command in a process of its own."""
-    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
 def assert_is_the_recording(record):
