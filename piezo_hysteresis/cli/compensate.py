@@ -19,7 +19,7 @@ from ..model import model_file
 from ..recording.formats.wanted_path import read_path
 from ..report.json_file import write_json
 from ..report.tables.plan_table import answer, notes, plan_table
-from .options.destination import add_force, require_new_file, require_new_folder
+from .options.destination import add_results, require_new_results
 from .terminal import console, show
 
 
@@ -54,10 +54,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--allow-partial", action="store_true", help="write the voltage even if a part of the path cannot be reached"
     )
-    parser.add_argument("--figures", metavar="FOLDER", help="folder for the figure and its data")
-    parser.add_argument("--report", metavar="FILE", help="HTML page with the plan, the expected error and the figure")
-    parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
-    add_force(parser)
+    add_results(
+        parser,
+        figures="folder for the figure and its data",
+        report="HTML page with the plan, the expected error and the figure",
+        json="write the result as JSON",
+    )
     parser.set_defaults(run=run)
 
 
@@ -69,9 +71,7 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On a model or a path that cannot be read, or a chain that cannot be turned round.
     """
-    require_new_file("-o", args.output, args.force)
-    require_new_file("--json", args.json, args.force)
-    require_new_folder("--figures", args.figures, args.force)
+    require_new_results(args)
     model = model_file.load(args.model)
     wanted, period = read_path(args.path)
     resampled = period is not None and abs(period - model.sample_period) > 1e-6 * model.sample_period

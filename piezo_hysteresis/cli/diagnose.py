@@ -13,7 +13,7 @@ from ..report.page import page
 from ..report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
 from ..report.verdict import answer_verdict
 from .options import reading_options
-from .options.destination import add_force, require_new_file
+from .options.destination import add_results, require_new_results
 from .terminal import console, progress, show, show_notices
 
 USUAL_TIME = "5 s to 2 min"
@@ -26,8 +26,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     reading_options.add_arguments(parser)
     parser.add_argument("--model", metavar="FILE", help="model file to start from; default: identify a model first")
     parser.add_argument("-o", "--output", metavar="FILE", help="write the extended model to this file")
-    parser.add_argument("--report", metavar="FILE", help="write the HTML page, and its figures beside it")
-    parser.add_argument("--json", metavar="FILE", help="write the answer as JSON")
     parser.add_argument(
         "--time",
         type=float,
@@ -40,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         action="store_true",
         help="do not look for the explicit step of Eq. (7), which only simulated data can hold",
     )
-    add_force(parser)
+    add_results(parser, report="write the HTML page, and its figures beside it", json="write the answer as JSON")
     parser.set_defaults(run=run)
 
 
@@ -52,9 +50,7 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On bad input, or data that do not even determine a baseline.
     """
-    require_new_file("-o", args.output, args.force)
-    require_new_file("--report", args.report, args.force)
-    require_new_file("--json", args.json, args.force)
+    require_new_results(args)
     start = None if args.model is None else model_file.load(args.model)
     experiment = reading_options.read(args)
     with progress("diagnose", f"{experiment.size} samples; this usually takes {USUAL_TIME}") as report_progress:

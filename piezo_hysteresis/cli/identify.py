@@ -17,7 +17,7 @@ from ..report.tables.table import Table
 from ..report.words import error_sentence
 from . import several_axes
 from .options import reading_options
-from .options.destination import add_force, require_new_file
+from .options.destination import add_results, require_new_results
 from .terminal import console, progress, show, show_notices
 
 USUAL_TIME = "2 s to 1 min"
@@ -29,7 +29,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser("identify", description=__doc__)
     reading_options.add_arguments(parser)
     parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
-    parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
     parser.add_argument(
         "--orders", metavar=("NA", "NB"), nargs=2, type=int, help="orders of the ARX (default: 8 8, as published)"
     )
@@ -65,7 +64,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         action="append",
         help=f"phase that is not fitted and judges the model (default: {', '.join(HELD_OUT)})",
     )
-    add_force(parser)
+    add_results(parser, json="write the result as JSON")
     parser.set_defaults(run=run)
 
 
@@ -77,8 +76,7 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On bad input, or data that do not determine the model.
     """
-    require_new_file("-o", args.output, args.force)
-    require_new_file("--json", args.json, args.force)
+    require_new_results(args)
     experiment = reading_options.read(args)
     if has_several_drives(experiment):
         return several_axes.identify(experiment, args)

@@ -8,7 +8,7 @@ from ..discrepancy.changes.recalibration import recalibrate
 from ..model import model_file
 from ..report.json_file import write_json
 from .options import reading_options
-from .options.destination import add_force, require_new_file
+from .options.destination import add_results, require_new_results
 from .terminal import console, show_notices
 
 
@@ -18,8 +18,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("model", metavar="MODEL", help="model file of the same stage")
     reading_options.add_arguments(parser)
     parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
-    parser.add_argument("--json", metavar="FILE", help="result for machines")
-    add_force(parser)
+    add_results(parser, json="write the result as JSON")
     parser.set_defaults(run=run)
 
 
@@ -31,8 +30,7 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On bad input, or records in which nothing moves.
     """
-    require_new_file("-o", args.output, args.force)
-    require_new_file("--json", args.json, args.force)
+    require_new_results(args)
     model = model_file.load(args.model)
     experiment = reading_options.read(args)
     found = recalibrate(model, experiment)

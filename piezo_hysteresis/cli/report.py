@@ -11,7 +11,7 @@ from ..report.figures.comparison import compare
 from ..report.json_file import read_json
 from ..report.page import page
 from .options import reading_options
-from .options.destination import add_force, require_new_file
+from .options.destination import add_force, require_new_results
 from .terminal import console, progress
 
 
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On files that cannot be read or written.
     """
-    require_new_file("-o", args.output, args.force)
+    require_new_results(args)
     models = {}
     for text in args.model:
         label, equals, path = text.rpartition("=")

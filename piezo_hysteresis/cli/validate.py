@@ -21,7 +21,7 @@ from ..report.tables.table import Table
 from ..report.words import error_sentence
 from . import several_axes
 from .options import reading_options
-from .options.destination import add_force, require_new_file, require_new_folder
+from .options.destination import add_results, require_new_results
 from .terminal import console, show, show_notices
 
 
@@ -33,9 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--one-zero", action="store_true", help="one sensor zero for all phases instead of one for each"
     )
-    parser.add_argument("--figures", metavar="FOLDER", help="folder for the figures and their data")
-    parser.add_argument("--json", metavar="FILE", help="write the result as JSON")
-    add_force(parser)
+    add_results(parser, figures="folder for the figures and their data", json="write the result as JSON")
     parser.set_defaults(run=run)
 
 
@@ -47,8 +45,7 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On a model or an experiment that cannot be read, or that do not fit each other.
     """
-    require_new_file("--json", args.json, args.force)
-    require_new_folder("--figures", args.figures, args.force)
+    require_new_results(args)
     if Path(args.model).suffix == ".npz":
         return several_axes.validate(reading_options.read(args), args)
     model = model_file.load(args.model)

@@ -172,6 +172,7 @@ def test_results_never_replace_a_file_without_force(tmp_path, plain):
         (("diagnose", plain, "--report"), "--report"),
         (("report", plain, "-o"), "-o"),
         (("validate", tmp_path / "absent.yaml", plain, "--json"), "--json"),
+        (("compensate", tmp_path / "absent.yaml", plain, "--report"), "--report"),
     ):
         line = refused(*command, tmp_path / "model.yaml")
         assert f"{option}: {tmp_path}/model.yaml exists already" in line

@@ -11,9 +11,42 @@ from pathlib import Path
 from ...errors import RecordingError
 
 
+def add_results(parser: argparse.ArgumentParser, **contents: str) -> None:
+    """Declare options for output files, and ``--force``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Of the subcommand.
+    **contents : str
+        What is written, by the name of the option: ``figures``, ``report``, ``json``.
+    """
+    for name, content in contents.items():
+        parser.add_argument(f"--{name}", metavar="FOLDER" if name == "figures" else "FILE", help=content)
+    add_force(parser)
+
+
 def add_force(parser: argparse.ArgumentParser) -> None:
     """Declare ``--force``."""
     parser.add_argument("--force", action="store_true", help="replace files that exist")
+
+
+def require_new_results(args: argparse.Namespace) -> None:
+    """Refuse output files that exist, and a folder for figures that has something in it, unless ``--force`` is given.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        With ``output`` or any option that `add_results` has declared.
+
+    Raises
+    ------
+    RecordingError
+        As `require_new_file` and `require_new_folder`.
+    """
+    for option, name in (("-o", "output"), ("--report", "report"), ("--json", "json")):
+        require_new_file(option, getattr(args, name, None), args.force)
+    require_new_folder("--figures", getattr(args, "figures", None), args.force)
 
 
 def require_new_file(option: str, path: str | None, force: bool | None = None) -> None:
