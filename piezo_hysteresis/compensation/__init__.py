@@ -5,7 +5,7 @@ can be reached and the expected error. `learn` corrects a drive with the measure
 """
 
 from .band import Band
-from .expected_error import ExpectedError, ParameterCovariance
+from .expected_error import ExpectedError
 from .inverse import Inverse, InverseState
 from .learning import IterativeLearning, LearningRound, learn
 from .learning_filter import LearningFilter, ResponseCheck
@@ -24,7 +24,6 @@ __all__ = [
     "LearningRound",
     "Limits",
     "NearestPath",
-    "ParameterCovariance",
     "Plan",
     "Reachability",
     "ResponseCheck",

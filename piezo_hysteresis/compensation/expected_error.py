@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,22 +12,6 @@ from ..model.model import Model
 from ..record import Record
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterCovariance:
-    """Uncertainty of a model's numbers, as a joint fit states it.
-
-    Parameters
-    ----------
-    names : sequence of str
-        ``"bouc_wen.A"``, …
-    matrix : (q, q) ndarray
-        Covariance, in the units of the numbers.
-    """
-
-    names: Sequence[str]
-    matrix: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +25,8 @@ class ExpectedError:
     free_run : float or None
         Free-run error of the model on data that were not fitted; None where the model file does not state it.
     parameters : float or None
-        Spread by the uncertainty of the numbers; None without a covariance.
+        Spread by the uncertainty of the numbers; None where it does not state
+        their covariance.
     """
 
     planned: float
@@ -73,11 +58,17 @@ def free_run_error(model: Model) -> float | None:
     return value if np.isfinite(value) and value >= 0.0 else None
 
 
-def parameter_error(model: Model, voltage: Array, covariance: ParameterCovariance) -> float:
-    """Rms over the drive (n,) [V] of the standard error that the covariance gives the displacement [m]."""
-    record = Record(voltage, np.zeros_like(voltage), model.sample_period)
-    _, slopes = model.sensitivities(record, covariance.names)
-    at = [k for k, name in enumerate(covariance.names) if name in slopes]
-    rows = np.array([slopes[covariance.names[k]] for k in at])
-    variance = np.einsum("ki,kl,li->i", rows, covariance.matrix[np.ix_(at, at)], rows)
-    return float(np.sqrt(max(variance.mean(), 0.0)))
+def parameter_error(model: Model, voltage: Array) -> float | None:
+    """Rms over the drive (n,) [V] of the standard error that the model's covariance gives the displacement [m].
+
+    None where the model states no covariance of its numbers.
+    """
+    known = model.covariance
+    if known is None:
+        return None
+    record, total = Record(voltage, np.zeros_like(voltage), model.sample_period), 0.0
+    matrix, place = known.matrix, {name: k for k, name in enumerate(known.names)}
+    for _, _, _, names, slopes in model.linearise([record], known.names):
+        at = [place[name] for name in names]
+        total += float(np.einsum("ki,kl,li->", slopes, matrix[np.ix_(at, at)], slopes, optimize=True))
+    return float(np.sqrt(max(total, 0.0) / voltage.size))

@@ -12,7 +12,7 @@ from ..errors import ModelError
 from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
-from .learning_filter import LearningFilter
+from .learning_filter import LearningFilter, ResponseCheck
 from .limits import Limits
 from .plan import Plan, plan
 
@@ -44,6 +44,13 @@ class LearningRound:
     expected: float
 
 
+def default_filter(model: Model) -> LearningFilter:
+    """Up to 1.2 kHz at 50 kHz sampling, the same share at another rate; less where the response is not that sure."""
+    rate = 1.0 / model.sample_period
+    check = ResponseCheck.of(model, np.geomspace(1e-5 * rate, 0.06 * rate, 60))
+    return LearningFilter(model.sample_period, 0.024 * rate, 0.06 * rate, check=check)
+
+
 class IterativeLearning:
     """Corrects the reference of a path by the measured error, round by round.
 
@@ -59,7 +66,7 @@ class IterativeLearning:
     limits : Limits
         Of the drive.
     filter : LearningFilter, optional
-        Default: up to 1.2 kHz at 50 kHz sampling, the same share at another rate.
+        Default: `default_filter`.
     noise : float
         Rms of the sensor noise [m]. Rounds stop there.
     approximate : bool
@@ -78,8 +85,7 @@ class IterativeLearning:
     ) -> None:
         if not noise >= 0.0:
             raise ModelError(f"noise: got {noise!r} m, expected zero or more")
-        rate = 1.0 / model.sample_period
-        self.filter = filter or LearningFilter(model.sample_period, 0.024 * rate, 0.06 * rate)
+        self.filter = filter or default_filter(model)
         self.model, self.limits, self.noise, self.approximate = model, limits, noise, approximate
         self.wanted = first.wanted
         self.next: Plan | None = first

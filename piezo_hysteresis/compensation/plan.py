@@ -13,7 +13,7 @@ from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
 from .band import Band
-from .expected_error import ExpectedError, ParameterCovariance, free_run_error, parameter_error
+from .expected_error import ExpectedError, free_run_error, parameter_error
 from .inverse import Inverse
 from .limit_check import reachable
 from .limits import Limits
@@ -102,7 +102,6 @@ def plan(
     way_back: float = 0.0,
     band: Band | None = None,
     approximate: bool = False,
-    covariance: ParameterCovariance | None = None,
 ) -> Plan:
     """Drive for a path, by the model alone.
 
@@ -125,8 +124,6 @@ def plan(
         Low-pass of the path. Default `Band.of` the model's sample period.
     approximate : bool
         Leave out effects that cannot be turned round.
-    covariance : ParameterCovariance, optional
-        Uncertainty of the model's numbers.
 
     Raises
     ------
@@ -155,7 +152,7 @@ def plan(
     expected = ExpectedError(
         float(np.sqrt(np.mean(off**2))),
         free_run_error(model),
-        None if covariance is None else parameter_error(model, voltage, covariance),
+        parameter_error(model, voltage),
     )
     return Plan(
         y,

@@ -72,8 +72,8 @@ def concluded(
     return Diagnosis(
         verdict=verdict,
         reason=reason,
-        model=stating(final.model, gap.live, setup.span),
-        baseline=stating(first.model, gap.before, setup.span),
+        model=stating(final.stated_model, gap.live, setup.span),
+        baseline=stating(first.stated_model, gap.before, setup.span),
         selection=selection,
         fit=final,
         where=where,

@@ -201,7 +201,7 @@ def identify(
     origin = {**origin, **identified_range(records, roles.fitted)}
     if not roles.broadband:
         origin |= identified_periods(records[i].sample_period for i in roles.fitted)
-    return replace(found, model=replace(joint.model, provenance=origin))
+    return replace(found, model=replace(joint.stated_model, provenance=origin))
 
 
 def _delay(experiment: Experiment, roles: Roles, notices: list[Notice]) -> Delay | None:

@@ -19,6 +19,7 @@ from .chain import Chain, ChainState, Channels
 from .chain_order import in_chain_order
 from .free_run import free_run, linearised_run, simulated
 from .named_numbers import numbers_of, with_numbers
+from .parameter_covariance import ParameterCovariance
 from .sample_periods import require_not_shorter, stated_period
 from .samples import row
 
@@ -41,6 +42,8 @@ class Model:
         Displacement at normalised output 1 [m].
     provenance : mapping of str to str
         Where the values come from: date, data hash, free-run error, …
+    covariance : ParameterCovariance, optional
+        Of the numbers that were fitted; changes of numbers do not change it.
 
     Raises
     ------
@@ -62,6 +65,7 @@ class Model:
     voltage_scale: float = 10.0
     displacement_scale: float = 1.0
     provenance: Mapping[str, str] = field(default_factory=dict)
+    covariance: ParameterCovariance | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", in_chain_order(self.effects))
@@ -103,8 +107,7 @@ class Model:
         for effect in self.effects:
             if isinstance(effect, HysteresisOperator):
                 return effect
-        names = ", ".join(e.name for e in self.effects)
-        raise ModelError(f"got no hysteresis in the chain {names}, expected one, e.g. BoucWen()")
+        raise ModelError(f"got no hysteresis in {self!r}, expected one, e.g. BoucWen()")
 
     def with_hysteresis(self, operator: HysteresisOperator) -> Model:
         """With `operator` in the role of the hysteresis, instead of the one that has it."""

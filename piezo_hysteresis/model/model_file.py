@@ -12,7 +12,7 @@ import yaml
 
 from ..errors import ModelError
 from .model import Model
-from .model_parameters import PREFIX, SCALES, from_parameters, to_parameters
+from .model_parameters import COVARIANCE, PREFIX, SCALES, from_parameters, to_parameters
 from .parameter_file import LONGEST_TEXT, Entry, entry, parameters, quoted
 
 _HEADER = """\
@@ -55,7 +55,7 @@ def dumps(model: Model) -> str:
     for name, (unit, meaning) in SCALES.items():
         line(6, name, named[PREFIX + name], f"{unit}; {meaning}")
     line(6, "valid", named[PREFIX + "valid"], "false: start values, not identified")
-    line(6, "hash", named[PREFIX + "hash"], "of everything but valid and provenance")
+    line(6, "hash", named[PREFIX + "hash"], "of everything but valid, provenance and covariance")
     if model.provenance:
         lines.append("      provenance:")
         for key in model.provenance:
@@ -67,6 +67,10 @@ def dumps(model: Model) -> str:
             lines.append(f"      {effect.name}:  # {effect.equation}")
         for row in rows:
             line(8, row.name, named[f"{PREFIX}{effect.name}.{row.name}"], f"{row.unit}; {row.meaning}")
+    if PREFIX + COVARIANCE + "factor" in named:
+        lines.append("      covariance:  # of the numbers that were fitted: F Fᵀ")
+        line(8, "names", named[f"{PREFIX}{COVARIANCE}names"], "of the rows of F")
+        line(8, "factor", named[f"{PREFIX}{COVARIANCE}factor"], "F, row by row")
     return _HEADER + "\n".join(lines) + "\n"
 
 

@@ -14,10 +14,14 @@ from ..effects import Effect, effect_named
 from ..errors import ModelError, ParameterError
 from ..parameter import Parameter, Value
 from .model import Model
+from .parameter_covariance import ParameterCovariance
 from .parameter_file import Entry, entry
 
 PREFIX = "model."
 """Where a model lives among the parameters of a node."""
+
+COVARIANCE = "covariance."
+"""Where the covariance of the numbers lives below the prefix."""
 
 SCALES = {
     "sample_period": ("s", "period at which the discrete dynamics hold"),
@@ -55,6 +59,9 @@ def to_parameters(model: Model, valid: bool = True) -> dict[str, Entry]:
         if not re.fullmatch(r"[a-z][a-z0-9_]*", key):
             raise ModelError(f"provenance: got the key {key!r}, expected lower-case letters, digits and '_'")
         named[f"provenance.{key}"] = _number_or_text(text)
+    known = model.covariance
+    if known is not None and known.factor:
+        named |= {COVARIANCE + "names": list(known.names), COVARIANCE + "factor": list(known.factor)}
     return {PREFIX + name: value for name, value in named.items()}
 
 
@@ -82,15 +89,14 @@ def from_parameters(values: Mapping[str, object], source: str = "model") -> Mode
         raise ModelError(f"{source}: model.valid is not true: these are start values; identify the stage first")
     expected_hash = own.pop("hash", None)
     provenance = {k.removeprefix("provenance."): own.pop(k) for k in list(own) if k.startswith("provenance.")}
-    names = _take(own, "effects", source)
-    if not isinstance(names, Sequence) or isinstance(names, str) or not all(isinstance(n, str) for n in names):
-        raise ModelError(f"{source}: model.effects: got {names!r}, expected a list of effect names")
+    names = _texts(_take(own, "effects", source), "effects", "effect names", source)
+    covariance = _covariance(own, source)
     scales = {name: _float(_take(own, name, source), name, unit, source) for name, (unit, _) in SCALES.items()}
     effects = tuple(_effect(n, own, source) for n in names)
     if own:
         raise ModelError(f"{source}: got unknown 'model.{min(own)}', expected only values of {', '.join(names)}")
     try:
-        model = Model(effects, **scales, provenance={k: _text(v) for k, v in provenance.items()})
+        model = Model(effects, **scales, provenance={k: _text(v) for k, v in provenance.items()}, covariance=covariance)
     except ModelError as error:
         raise ModelError(f"{source}: {error}") from None
     if expected_hash is not None and expected_hash != model_hash(model):
@@ -102,7 +108,7 @@ def from_parameters(values: Mapping[str, object], source: str = "model") -> Mode
 
 
 def model_hash(model: Model) -> str:
-    """``sha256:`` and 16 digits of all that decides a prediction; provenance does not count."""
+    """``sha256:`` and 16 digits of all that decides a prediction; provenance and covariance do not count."""
     content = "\n".join(f"{name}: {entry(value)}" for name, value in sorted(_content(model).items()))
     return "sha256:" + hashlib.sha256(content.encode()).hexdigest()[:16]
 
@@ -138,6 +144,28 @@ def _effect(effect: str, own: dict[str, object], source: str) -> Effect:
         return kind(**values)
     except ParameterError as error:
         raise ParameterError(f"{source}: model.{error}") from None
+
+
+def _covariance(own: dict[str, object], source: str) -> ParameterCovariance | None:
+    if COVARIANCE + "names" not in own and COVARIANCE + "factor" not in own:
+        return None
+    key = COVARIANCE + "names"
+    names = _texts(_take(own, key, source), key, "names of numbers", source)
+    key = COVARIANCE + "factor"
+    values = _take(own, key, source)
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise ModelError(f"{source}: model.{key}: got {values!r}, expected a list of numbers")
+    factor = [_float(v, f"{key}[{i}]", "in the units of the numbers", source) for i, v in enumerate(values)]
+    try:
+        return ParameterCovariance(tuple(names), tuple(factor))
+    except ModelError as error:
+        raise ModelError(f"{source}: {error}") from None
+
+
+def _texts(values: object, name: str, expected: str, source: str) -> Sequence[str]:
+    if not isinstance(values, Sequence) or isinstance(values, str) or not all(isinstance(v, str) for v in values):
+        raise ModelError(f"{source}: model.{name}: got {values!r}, expected a list of {expected}")
+    return values
 
 
 def _take(own: dict[str, object], name: str, source: str) -> object:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from piezo_hysteresis.compensation import IterativeLearning, LearningFilter, Limits, ResponseCheck, learn, plan
-from piezo_hysteresis.effects import Creep, HysteresisMemory
+from piezo_hysteresis.compensation.learning import default_filter
+from piezo_hysteresis.effects import Arx, Creep, HysteresisMemory
 from piezo_hysteresis.errors import ModelError
+from piezo_hysteresis.model.parameter_covariance import ParameterCovariance
 
 from .published import PERIOD, stage, swing
 
@@ -92,6 +96,21 @@ def test_the_gain_is_zero_where_the_response_makes_convergence_unsure() -> None:
     unsure = ResponseCheck(frequency, np.ones(6, dtype=complex), np.full(6, 0.8))
     with pytest.raises(ModelError, match="sure at no frequency"):
         LearningFilter(PERIOD, check=unsure)
+
+
+def test_the_gain_is_zero_where_the_identified_response_is_not_sure() -> None:
+    """A first-order pole a: |∂ ln G/∂a| = 1/|1 + a z⁻¹|, largest where its own response is."""
+    a, spread = -0.98, 5e-3
+    pole = stage().with_effect(Arx(a=[a], b=[1.0 + a]))
+    known = replace(pole, covariance=ParameterCovariance.of(["arx.a[0]", "offset.y0"], np.diag([spread**2, 1e-18])))
+    frequency = np.array([1.0, 30.0, 100.0, 1000.0])
+    check = ResponseCheck.of(known, frequency)
+    assert check is not None and ResponseCheck.of(pole, frequency) is None
+    z = np.exp(-2j * np.pi * frequency * PERIOD)
+    np.testing.assert_allclose(check.deviation, spread / np.abs(1.0 + a * z), rtol=1e-6)
+    unsure = replace(known, covariance=ParameterCovariance.of(["arx.a[0]"], np.array([[0.02**2]])))
+    np.testing.assert_allclose(default_filter(known).at(frequency), 0.9)
+    np.testing.assert_allclose(default_filter(unsure).at(frequency), [0.0, 0.0, 0.0, 0.9])
 
 
 def test_the_gain_tapers_to_zero() -> None:

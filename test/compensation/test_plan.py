@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from piezo_hysteresis.compensation import Limits, ParameterCovariance, plan, reachable
+from piezo_hysteresis.compensation import Limits, plan, reachable
 from piezo_hysteresis.compensation.expected_error import free_run_error, parameter_error
 from piezo_hysteresis.effects import Creep
 from piezo_hysteresis.errors import ModelError
+from piezo_hysteresis.model.parameter_covariance import ParameterCovariance
 
 from .published import PERIOD, stage, swing, triangle
 
@@ -77,21 +80,18 @@ def test_the_way_back_ends_at_the_first_voltage_inside_the_slew_limit() -> None:
 
 
 def test_the_error_to_expect_holds_the_covariance() -> None:
-    model = stage()
-    u = 3.0 * (1.0 - np.cos(np.arange(2000) / 100.0))
+    u = 3.0 * (1.0 - np.cos(np.arange(20_000) / 100.0))
     spread = 0.01
-    covariance = ParameterCovariance(["bouc_wen.p2"], np.array([[spread**2]]))
-    rms = parameter_error(model, u, covariance)
+    model = replace(stage(), covariance=ParameterCovariance.of(["bouc_wen.p2"], np.array([[spread**2]])))
+    rms = parameter_error(model, u)
     moved = model.with_values({"bouc_wen.p2": model.values()["bouc_wen.p2"] + spread})
     change = moved.run(u, moved.rest(0.0))[0] - model.run(u, model.rest(0.0))[0]
     assert rms == pytest.approx(np.sqrt(np.mean(change**2)), rel=1e-3)
-    found = plan(model, triangle(50.0, 2e-6, 6e-6, 2), UNIPOLAR, covariance=covariance)
+    found = plan(model, triangle(50.0, 2e-6, 6e-6, 2), UNIPOLAR)
     assert found.expected.parameters is not None and found.expected.parameters > 0.0
 
 
 def test_a_model_without_a_stated_error_says_so() -> None:
-    from dataclasses import replace
-
     assert free_run_error(replace(stage(), provenance={})) is None
     assert free_run_error(replace(stage(), provenance={"free_run_error": "good"})) is None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from piezo_hysteresis.errors import ModelError, ParameterError, PiezoError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_file import dumps, load, loads, save
 from piezo_hysteresis.model.model_parameters import from_parameters, hash_number, model_hash, to_parameters
+from piezo_hysteresis.model.parameter_covariance import ParameterCovariance
 from piezo_hysteresis.model.parameter_file import parameters
 from piezo_hysteresis.parameter import Parameter
 
@@ -113,6 +115,27 @@ def test_hash_distinguishes_models_and_ignores_their_provenance() -> None:
     next_up = MODEL.with_values({"arx.b[0]": float(np.nextafter(1e-05, 1.0))})
     assert model_hash(next_up) != model_hash(MODEL)
     assert model_hash(MODEL).startswith(f"sha256:{hash_number(MODEL):08x}")
+
+
+def test_the_covariance_of_the_numbers_is_kept() -> None:
+    rng = np.random.default_rng(1)
+    names = ("bouc_wen.A", "arx.b[0]", "offset.y0")
+    root = np.diag([1e-2, 1e-6, 1e-10]) @ rng.normal(size=(3, 2))  # one direction is exactly known
+    stated = replace(MODEL, covariance=ParameterCovariance.of(names, root @ root.T))
+    again = loads(dumps(stated))
+    assert again.covariance is not None and tuple(again.covariance.names) == names
+    np.testing.assert_allclose(again.covariance.matrix, root @ root.T, rtol=1e-7, atol=0.0)
+    assert model_hash(stated) == model_hash(MODEL) == model_hash(again)
+    assert dumps(again) == dumps(stated)
+    assert loads(dumps(MODEL)).covariance is None
+    for old, new, message in (
+        ('["bouc_wen.A", ', '["bouc_wen.A", "x", ', "same number"),
+        ('["bouc_wen.A", ', "[3.0, ", "covariance.names"),
+        ("        factor:", "        factors:", "covariance.factor' is missing"),
+        ("        factor: [", '        factor: ["a", ', "expected a number"),
+    ):
+        with pytest.raises(ModelError, match=message):
+            loads(dumps(stated).replace(old, new))
 
 
 def test_a_lost_empty_array_is_noticed() -> None:

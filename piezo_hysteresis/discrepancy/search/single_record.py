@@ -178,10 +178,10 @@ def _delivered(
         start = _Delivered(found.model, found.fit, free)
     else:
         start = _Delivered(given or now.model, None, free)
-    contenders = [] if found is not None else [_Delivered(now.model, now, free)]
+    contenders = [] if found is not None else [_Delivered(now.stated_model, now, free)]
     if more.accepted:
         last = more.accepted[-1].best
-        contenders.append(_Delivered(last.fit.model, last.fit, last.training_data.nuisance))
+        contenders.append(_Delivered(last.fit.stated_model, last.fit, last.training_data.nuisance))
     best, extended = start, False
     if contenders:
         reached = score_left_out(start.model, records, least, fitted, adjusts=found is not None)

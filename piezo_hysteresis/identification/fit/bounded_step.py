@@ -43,3 +43,13 @@ def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Ar
         root[:, None] * vectors.T, (vectors.T @ (slope * scale)) / root, box, method="bvls"
     )
     return np.asarray(scale * found.x)
+
+
+def room(limits: Array, theta: Array, directions: Array, open_end: float) -> Array:
+    """How far every direction may go; without end where it moves several numbers."""
+    far = np.full(directions.shape[1], open_end)
+    for j, column in enumerate(directions.T):
+        (moved,) = np.nonzero(column)
+        if moved.size == 1:
+            far[j] = limits[moved[0]] - theta[moved[0]]
+    return far

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ...effects import Arx
 from ...errors import DivergenceError, IdentificationError, ParameterError
 from ...model.model import Model
+from ...model.parameter_covariance import ParameterCovariance
 from ...record import Record
-from .bounded_step import bounded_step
+from .bounded_step import bounded_step, room
 from .covariance import covariance
 from .normal_equations import Gram, Nuisance, grams, residuals
 
@@ -60,6 +61,13 @@ class Fit:
     at_bounds: tuple[str, ...]
     converged: bool
     iterations: int
+
+    @property
+    def stated_model(self) -> Model:
+        """`model` with the covariance of its numbers, where there are any and it is finite."""
+        if not self.names or not np.isfinite(self.covariance).all():
+            return self.model
+        return replace(self.model, covariance=ParameterCovariance.of(self.names, self.covariance))
 
     @property
     def values(self) -> dict[str, float]:
@@ -178,7 +186,7 @@ def fit(
         idle = np.diag(hessian) <= np.finfo(float).tiny
         hessian[idle, :] = hessian[:, idle] = 0.0
         diagonal = np.where(idle, 1.0, np.diag(hessian))
-        low, high = _box(lower, theta, directions, -np.inf), _box(upper, theta, directions, np.inf)
+        low, high = room(lower, theta, directions, -np.inf), room(upper, theta, directions, np.inf)
         while True:
             step = directions @ bounded_step(hessian + np.diag(damping * diagonal), slope, low, high)
             trial = _bounded(free, np.clip(theta + step, lower, upper))
@@ -214,16 +222,6 @@ def fit(
         converged=converged,
         iterations=iterations,
     )
-
-
-def _box(limits: Array, theta: Array, directions: Array, open_end: float) -> Array:
-    """How far every direction may go; without end where it moves several numbers."""
-    room = np.full(directions.shape[1], open_end)
-    for j, column in enumerate(directions.T):
-        (moved,) = np.nonzero(column)
-        if moved.size == 1:
-            room[j] = limits[moved[0]] - theta[moved[0]]
-    return room
 
 
 def _bounded(names: Sequence[str], theta: Array) -> Array:

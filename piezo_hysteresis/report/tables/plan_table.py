@@ -29,6 +29,7 @@ def plan_table(found: Plan) -> Table:
         ("preview", f"{found.preview} samples, {1e3 * found.preview * found.sample_period:.3g} ms"),
         ("error left by the plan", error(expected.planned)),
         ("free-run error of the model", error(expected.free_run)),
+        ("uncertainty of the model's numbers", error(expected.parameters)),
         ("expected error, rms", error(expected.total)),
     )
     return Table("Plan", ("quantity", "value"), rows)

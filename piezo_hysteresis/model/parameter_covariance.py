@@ -1,0 +1,70 @@
+"""`ParameterCovariance`: how uncertain the numbers of a model are together, and how a model file holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ModelError
+
+Array = NDArray[np.float64]
+
+NEGLIGIBLE = 1e-12
+"""Share of the largest variance, in units of the standard errors, below which a direction counts as exactly known."""
+DIGITS = 9
+"""Significant digits of a factor: the coefficients of dynamics nearly cancel, and their errors with them."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterCovariance:
+    """Covariance of a model's numbers, as the fit states it.
+
+    It is held by a factor F, so that a file gives back what was written, bit for bit.
+
+    Parameters
+    ----------
+    names : tuple of str
+        ``"bouc_wen.A"``, …
+    factor : tuple of float
+        F with F Fᵀ the covariance, row by row, as many columns as there are uncertain directions.
+
+    Raises
+    ------
+    ModelError
+        If the factor has not the same number of finite values for each of the names.
+
+    Examples
+    --------
+    >>> known = ParameterCovariance.of(["creep.gamma", "offset.y0"], np.diag([1e-6, 4e-18]))
+    >>> bool(np.allclose(known.matrix, np.diag([1e-6, 4e-18]), rtol=1e-8, atol=0.0))
+    True
+    """
+
+    names: tuple[str, ...]
+    factor: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not self.names or len(self.factor) % len(self.names) or not np.isfinite(self.factor).all():
+            raise ModelError(
+                f"covariance: got a factor of {len(self.factor)} values for {len(self.names)} numbers, expected the same "
+                "number of finite values for each"
+            )
+
+    @classmethod
+    def of(cls, names: Sequence[str], matrix: Array) -> ParameterCovariance:
+        """From the covariance (q, q) in the units of the numbers."""
+        errors = np.sqrt(np.clip(np.diag(matrix), 0.0, None))
+        scale = np.where(errors > 0.0, errors, 1.0)
+        variances, directions = np.linalg.eigh(matrix / np.outer(scale, scale))
+        uncertain = variances > NEGLIGIBLE * max(variances.max(), 0.0)
+        rows = scale[:, None] * directions[:, uncertain] * np.sqrt(variances[uncertain])
+        return cls(tuple(names), tuple(float(f"{value:.{DIGITS}g}") for value in rows.ravel()))
+
+    @property
+    def matrix(self) -> Array:
+        """Covariance (q, q) in the units of the numbers."""
+        rows = np.array(self.factor).reshape(len(self.names), -1)
+        return np.asarray(rows @ rows.T)
