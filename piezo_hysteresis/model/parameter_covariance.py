@@ -49,8 +49,8 @@ class ParameterCovariance:
     def __post_init__(self) -> None:
         if not self.names or len(self.factor) % len(self.names) or not np.isfinite(self.factor).all():
             raise ModelError(
-                f"covariance: got a factor of {len(self.factor)} values for {len(self.names)} numbers, expected the same "
-                "number of finite values for each"
+                f"covariance: got a factor of {len(self.factor)} values for {len(self.names)} numbers, expected the "
+                "same number of finite values for each"
             )
 
     @classmethod
