@@ -34,7 +34,7 @@ from ...identification.fit.normal_equations import grams
 from ...model.model import Model
 from ...record import Experiment, Notice, Record
 from ..search.candidates import directions, free_numbers
-from ..search.cross_validation import held_out
+from ..search.cross_validation import cross_validate
 from ..search.refit import FAILURES, joint
 from ..search.training_data import TrainingData
 from .sampling import at_period, less
@@ -166,7 +166,7 @@ def _share(model: Model, training_data: TrainingData, changes: list[Array]) -> f
     names = free_numbers(model, training_data)
     rows = [c[None, :] for c in changes]
     products = grams(model, training_data.records, names, training_data.nuisance, rows)
-    return float(held_out(products, training_data.floors, directions(model, names, 1)).step[-1])
+    return float(cross_validate(products, training_data.floors, directions(model, names, 1)).step[-1])
 
 
 def without_steps(experiment: Experiment, model: Model) -> Experiment:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...effects import MainsHum
 from ...errors import RecordError
 from ...identification.fit.normal_equations import Nuisance
-from ...identification.records.roles import CARRYING
+from ...identification.records.roles import CONDITIONING
 from ...model.model import Model
 from ...record import Experiment, Record
 from .noise_floor import stroke
@@ -194,7 +194,7 @@ def _with_nuisance(record: Record, y: Array, nuisance: Nuisance) -> Array:
 
 
 def _has_known_start(record: Record) -> bool:
-    return record.phase not in CARRYING and not record.truncated
+    return record.phase not in CONDITIONING and not record.truncated
 
 
 def _row(index: int, record: Record, residual: Array, span: float) -> Error:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from ...effects import HYSTERESIS, Arx, Offset
 from ...errors import IdentificationError
 from ...identification.identify import identify
-from ...identification.records.roles import CARRYING, Roles, roles_of
+from ...identification.records.roles import CONDITIONING, Roles, roles_of
 from ...identification.steps.delay import identify_delay
 from ...identification.steps.dynamics import delay_of
 from ...identification.steps.hysteresis import fit_hysteresis
@@ -106,7 +106,7 @@ def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int
 def _fitted_only(experiment: Experiment, fitted: Collection[int]) -> Experiment:
     """The records up to the last that is fitted; the others among them only carry the state of the stage."""
     records = enumerate(experiment.records[: max(fitted) + 1])
-    return Experiment(tuple(r if i in fitted else replace(r, phase=CARRYING[0]) for i, r in records))
+    return Experiment(tuple(r if i in fitted else replace(r, phase=CONDITIONING[0]) for i, r in records))
 
 
 def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:

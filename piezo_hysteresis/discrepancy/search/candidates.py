@@ -18,7 +18,7 @@ from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.fit.fit import Fit, gauge
 from ...identification.fit.normal_equations import Gram, grams
 from ...model.model import Model
-from .cross_validation import Score, held_out, indispensable
+from .cross_validation import Score, cross_validate, indispensable
 from .training_data import TrainingData
 
 Array = NDArray[np.float64]
@@ -62,9 +62,9 @@ class FittedCandidate(Candidate):
 
 
 def free_numbers(model: Model, training_data: TrainingData) -> list[str]:
-    """Numbers of a model that a joint fit adjusts: all but the chosen ones, the delay and what is free per record.
+    """Parameters of a model that a joint fit adjusts: all except chosen ones, the delay, and those free per record.
 
-    Settling where no two records begin at different levels is no number of the evidence.
+    `settling` of the offset is not adjusted if all records start at one level, because the data do not determine it.
     """
     names = []
     for name in model.values():
@@ -86,7 +86,7 @@ def loop_is_off(model: Model) -> bool:
 
 
 def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
-    """Columns for `held_out`: free numbers with the gauge held, then `extra` rows, and nothing for the residual."""
+    """Columns for `cross_validate`: free parameters with the gauge held, then `extra` rows; the residual has none."""
     free = gauge(model, names)
     columns = np.zeros((len(names) + extra + 1, free.shape[1] + extra))
     columns[: len(names), : free.shape[1]] = free
@@ -96,14 +96,14 @@ def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
 
 def score_model(model: Model, training_data: TrainingData) -> Score:
     """Score of a fitted model on records left out."""
-    return held_out(*_products(model, training_data), training_data.alone)
+    return cross_validate(*_products(model, training_data), training_data.alone)
 
 
 def score_baseline(model: Model, training_data: TrainingData) -> tuple[TrainingData, Score]:
     """The training data and the score. A record that alone determines a parameter of the model is never left out."""
     products = _products(model, training_data)
     alone = indispensable(*products)
-    return replace(training_data, alone=alone), held_out(*products, alone)
+    return replace(training_data, alone=alone), cross_validate(*products, alone)
 
 
 def _products(model: Model, training_data: TrainingData) -> tuple[list[Gram], Array, Array]:
@@ -167,7 +167,7 @@ def _screen_off(model: Model, training_data: TrainingData, base: list[str], memb
         wanted = [kept + names.index(n) - len(base) for n in own[effect.name]]
         part = columns[:, [*range(kept), *wanted]]
         found.append(
-            Candidate(effect, training_data, held_out(products, training_data.floors, part, training_data.alone))
+            Candidate(effect, training_data, cross_validate(products, training_data.floors, part, training_data.alone))
         )
     return found
 
@@ -190,7 +190,9 @@ def _screen_moves(model: Model, training_data: TrainingData, base: list[str], mo
     kept = columns.shape[1] - len(usable)
     found = []
     for k, effect in enumerate(usable):
-        score = held_out(products, training_data.floors, columns[:, [*range(kept), kept + k]], training_data.alone)
+        score = cross_validate(
+            products, training_data.floors, columns[:, [*range(kept), kept + k]], training_data.alone
+        )
         if score.step[-1] > 0.0:  # else its opposite would help
             found.append(Candidate(effect, training_data, score))
     return found

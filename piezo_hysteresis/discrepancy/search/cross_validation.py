@@ -64,7 +64,7 @@ class Score:
         return float(gain.mean()), float(gain.std(ddof=1) / np.sqrt(gain.size)) if gain.size > 1 else np.inf
 
 
-def held_out(
+def cross_validate(
     grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array, alone: Collection[int] = ()
 ) -> Score:
     """Score of a model extended by `columns`, every record judged with parameters from the others.
@@ -104,7 +104,7 @@ def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, column
     Parameters
     ----------
     grams, floors, columns
-        As for `held_out`.
+        As for `cross_validate`.
     """
     counted, products = _counted(grams, floors)
     hessians = [columns.T @ product @ columns for product in products]

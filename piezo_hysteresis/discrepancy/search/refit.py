@@ -46,7 +46,7 @@ class Fitted:
 
 
 def joint(model: Model, training_data: TrainingData, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
-    """All free numbers of a model fitted to the evidence at once.
+    """All free numbers of a model fitted to the training data at once.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def refit(model: Model, candidate: Candidate, max_iterations: int) -> FittedCand
 
 
 def proceed(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
-    """The refit carried on from where it stopped; itself where it had converged."""
+    """Continue a refit from where it stopped; a refit that has converged is returned as it is."""
     if candidate.fit.converged:
         return candidate
     return _refitted(candidate.fit.model, candidate, max_iterations) or candidate

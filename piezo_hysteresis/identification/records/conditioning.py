@@ -1,4 +1,4 @@
-"""`carried`: a selection of records together with those that bring the stage into its state."""
+"""`with_conditioning`: selected records, together with the records before them that determine the initial state."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from ...record import Record
 
 
-def carried(records: Sequence[Record], wanted: Collection[int]) -> list[int]:
-    """Indices of the records `wanted`, and of those before them that they continue, in order."""
+def with_conditioning(records: Sequence[Record], wanted: Collection[int]) -> list[int]:
+    """Indices of the records `wanted`, and of the records before them that they continue; in order."""
     needed: set[int] = set()
     for index in wanted:
         needed.add(index)
@@ -23,16 +23,18 @@ def carried(records: Sequence[Record], wanted: Collection[int]) -> list[int]:
 def select(
     records: Sequence[Record], floors: Sequence[float], wanted: Collection[int]
 ) -> tuple[list[Record], list[float]]:
-    """Records for a fit to some of them, and their floors: infinite, hence without weight, where one only carries.
+    """Records for a fit, and their noise floors.
+
+    A record that only determines the state of the next one has an infinite floor, hence no weight.
 
     Parameters
     ----------
     records : sequence of Record
-        The experiment, in order.
+        All records of the experiment, in order.
     floors : sequence of float
-        Floor of the residual of every record [m].
+        Noise floor of every record [m].
     wanted : collection of int
         Indices of the records to fit.
     """
-    kept = carried(records, wanted)
+    kept = with_conditioning(records, wanted)
     return [records[i] for i in kept], [floors[i] if i in wanted else np.inf for i in kept]

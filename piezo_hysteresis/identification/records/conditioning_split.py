@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...record import Experiment, Notice, Record
-from .roles import CARRYING
+from .roles import CONDITIONING
 
 AT_THE_END = 0.02
 """Distance from an end of the range of the drive, as share of the range, that counts as having been there."""
@@ -49,9 +49,9 @@ def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice,
     records: list[Record] = []
     notices: list[Notice] = []
     for record in experiment:
-        samples = conditioning_length(record) if record.truncated and record.phase not in CARRYING else 0
+        samples = conditioning_length(record) if record.truncated and record.phase not in CONDITIONING else 0
         if samples:
-            records.append(replace(record[:samples], phase=CARRYING[0]))
+            records.append(replace(record[:samples], phase=CONDITIONING[0]))
             record = replace(record[samples:], truncated=False, initial_voltage=None)
             message = f"the initial state is unknown; the first {samples} samples, up to a full loop, are not fitted"
             notices.append(Notice("conditioning_length", message, record.phase))

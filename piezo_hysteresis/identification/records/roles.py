@@ -1,4 +1,4 @@
-"""`Roles`: which record of an experiment serves which purpose, by its phase name or else by what its drive excites."""
+"""`Roles`: the purpose of every record of an experiment, found from its phase name or from its drive."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ...record import Experiment
 from .excitation_content import ExcitationContent, excitation_content
 
 HELD_OUT = ("validation",)
-"""Phases that are not fitted, unless stated otherwise."""
-CARRYING = ("conditioning",)
-"""Phases that bring the stage into a known state; what happened before them is not known."""
+"""Phases that are not fitted by default."""
+CONDITIONING = ("conditioning",)
+"""Phases that bring the stage into a known state; the history before them is unknown."""
 LARGE = 0.5
-"""Share of the largest drive range from which a slow record counts as loops."""
+"""Drive range of a slow record, as a share of the largest one, from which the record counts as loops."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -23,14 +23,14 @@ class Roles:
 
     Parameters
     ----------
-    contents : tuple of Content
-        Of every record.
+    contents : tuple of ExcitationContent
+        What the drive of every record excites.
     fitted : tuple of int
-        Records of the joint fit.
+        Records that the joint fit uses.
     held_out : tuple of int
-        Records that only judge it.
+        Records that are not fitted; the model is tested on them.
     loops : tuple of int
-        Slow records with large loops: they show the hysteresis behind a gain and a lag.
+        Slow records with large loops. On them the dynamics are only a gain and a lag, so they show the hysteresis.
     broadband : tuple of int
         Records at the fastest sample period whose drive determines linear dynamics.
     """
@@ -43,26 +43,26 @@ class Roles:
 
 
 def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Roles:
-    """Sort the records of an experiment.
+    """Purpose of every record of an experiment.
 
     Parameters
     ----------
     experiment : Experiment
-        Records of any kind.
+        All its records.
     held_out : collection of str
         Names of phases that are not fitted.
 
     Raises
     ------
     RecordError
-        If one of `held_out`, other than those of `HELD_OUT`, is no phase of the experiment, or nothing else is left.
+        If a phase of `held_out` is missing in the experiment (except `HELD_OUT`), or no record is left to fit.
     """
     names = ", ".join(dict.fromkeys(r.phase for r in experiment))
     for phase in held_out:
         if phase not in HELD_OUT and not experiment.named(phase):
             raise RecordError(f"held_out: got phase '{phase}', expected some of {names}")
     contents = tuple(excitation_content(r) for r in experiment)
-    named = {phase: experiment.named(phase) for phase in (*held_out, *CARRYING)}
+    named = {phase: experiment.named(phase) for phase in (*held_out, *CONDITIONING)}
 
     def is_one_of(index: int, phases: Collection[str]) -> bool:
         return any(experiment[index] is record for phase in phases for record in named[phase])
@@ -74,7 +74,7 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
             raise RecordError(f"held_out: got every phase ({names}), expected at least one that is fitted")
         out = ()
     left = [i for i in indices if i not in out]
-    fitted = tuple(i for i in left if not is_one_of(i, CARRYING) and not experiment[i].truncated) or tuple(left)
+    fitted = tuple(i for i in left if not is_one_of(i, CONDITIONING) and not experiment[i].truncated) or tuple(left)
     largest = max((contents[i].span for i in fitted), default=0.0)
     slow = [i for i in fitted if contents[i].is_slow and contents[i].span >= LARGE * largest > 0.0]
     triangles = [i for i in slow if experiment[i].phase.split("_")[0] == "triangle"]

@@ -14,7 +14,7 @@ from ...effects import Arx, ChainPosition
 from ...errors import IdentificationError
 from ...model.model import Model
 from ...record import Record
-from ..records.conditioning import carried
+from ..records.conditioning import with_conditioning
 from .dynamics import Dynamics, identify_arx
 from .regressors import Signals
 
@@ -28,7 +28,7 @@ def hysteresis_signals(model: Model, records: Sequence[Record], wanted: Collecti
     """(w, y) of the records `wanted`: hysteresis output of the model, and normalised displacement."""
     before = tuple(e for e in model.effects if e.place < ChainPosition.DYNAMICS)
     alone = Model(before, model.sample_period, model.voltage_scale)
-    kept = carried(records, wanted)
+    kept = with_conditioning(records, wanted)
     outputs = dict(zip(kept, alone.free_run([records[i] for i in kept]), strict=True))
     return [(outputs[i], np.array(records[i].displacement / model.displacement_scale)) for i in sorted(wanted)]
 

@@ -128,6 +128,6 @@ def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[flo
 
 
 def _behind_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
-    counted = [p for p in pieces if p.kind is not Kind.CARRYING]
+    counted = [p for p in pieces if p.kind is not Kind.CONDITIONING]
     steps = [s for s, p in zip(fit.squares.tolist(), counted, strict=True) if p.kind is Kind.STEP]
     return float(np.mean(steps)) if steps else np.inf

@@ -22,15 +22,15 @@ AMPLITUDES = 3
 FEWEST = 32
 """Samples of a piece at least."""
 MOST = 24
-"""Pieces of a record from which its drive has no rates of its own, and equal pieces are cut."""
+"""Number of pieces from which a record is cut into equal pieces instead, because its drive has no single rates."""
 EQUAL = 5
-"""Equal pieces."""
+"""Number of equal pieces into which such a record is cut."""
 JUMP = 0.02
-"""Share of the range of the drive that a first sample must be off its settled level, to be a step."""
+"""A record starts with a step if its first voltage is off the settled level by this share of the drive range."""
 STILL = 1e-3
-"""Share of the range within which a drive holds."""
+"""The drive counts as held while it stays within this share of its range."""
 RINGS = 0.05
-"""Longest time that counts as the first moments behind a step [s], and at most a quarter of its hold."""
+"""Longest ringing after a step [s]; at most a quarter of the hold that follows."""
 
 
 class Kind(StrEnum):
@@ -39,11 +39,11 @@ class Kind(StrEnum):
     STEP = "step"
     HOLD = "hold"
     LOOP = "loop"
-    CARRYING = "carrying"
+    CONDITIONING = "conditioning"
 
 
-WEIGHTS = {Kind.STEP: 0.1, Kind.HOLD: 0.5, Kind.LOOP: 1.0, Kind.CARRYING: 0.0}
-"""Weight in a fit: a mode that rings must not drown the creep behind it, nor one level the loops."""
+WEIGHTS = {Kind.STEP: 0.1, Kind.HOLD: 0.5, Kind.LOOP: 1.0, Kind.CONDITIONING: 0.0}
+"""Weight in a fit, so that a ringing mode does not outweigh the creep after it, nor one level all loops."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -87,7 +87,7 @@ def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[Record
         if index in fitted:
             found += _cut(record, index, largest)
         else:
-            found.append(RecordPiece(record, index, Kind.CARRYING))
+            found.append(RecordPiece(record, index, Kind.CONDITIONING))
     return found
 
 

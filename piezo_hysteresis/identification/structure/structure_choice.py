@@ -26,7 +26,7 @@ from ...errors import PiezoError
 from ...model.model import Model
 from ...record import Notice, Record
 from ..fit.fit import Fit, Progress
-from ..records.conditioning import carried
+from ..records.conditioning import with_conditioning
 from .linear_part import fit_linear_part, fit_structure, held_by
 from .piece_fit import PieceFit
 from .pieces import RecordPiece, pieces_of
@@ -91,7 +91,7 @@ def choose_structure(
     progress : callable
         Called with the name of the step and the fraction done.
     """
-    kept = carried(records, fitted)
+    kept = with_conditioning(records, fitted)
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)

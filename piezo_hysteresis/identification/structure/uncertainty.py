@@ -40,7 +40,7 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
     """In the form of every other fit; the variance of the residual is added to `spread`."""
     numbers = len(found.names)
     total = found.total
-    counted = [p for p in pieces if p.kind is not Kind.CARRYING]
+    counted = [p for p in pieces if p.kind is not Kind.CONDITIONING]
     inverse = _inverse(found)
     # the residual is structure, not noise: a piece of n samples counts as √n of them
     meat = np.zeros_like(total[:-1, :-1])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.search.cross_validation import Score, held_out, indispensable
+from piezo_hysteresis.discrepancy.search.cross_validation import Score, cross_validate, indispensable
 from piezo_hysteresis.identification.fit.normal_equations import Gram
 
 RANDOM = np.random.default_rng(5)
@@ -30,7 +30,7 @@ COLUMNS = np.vstack((np.eye(3), np.zeros((1, 3))))
 
 def test_equals_fitting_without_the_record_that_is_judged(problem):
     designs, measured = problem
-    score = held_out(products(designs, measured), FLOORS, COLUMNS)
+    score = cross_validate(products(designs, measured), FLOORS, COLUMNS)
     for left_out in range(len(SIZES)):
         others = [i for i in range(len(SIZES)) if i != left_out]
         weight = [1 / (FLOORS[i] * np.sqrt(SIZES[i])) for i in others]
@@ -42,7 +42,7 @@ def test_equals_fitting_without_the_record_that_is_judged(problem):
 
 
 def test_the_true_model_lies_at_the_floor(problem):
-    score = held_out(products(*problem), FLOORS, COLUMNS)
+    score = cross_validate(products(*problem), FLOORS, COLUMNS)
     assert score.excess == pytest.approx(1.0, abs=0.2)
     np.testing.assert_allclose(score.step, [1.0, -2.0, 0.5], atol=0.05)
 
@@ -51,8 +51,8 @@ def test_a_direction_that_the_other_records_do_not_see_stays_where_it_is(problem
     designs, measured = problem
     only_here = [np.column_stack((x, np.full(len(x), float(i == 0)))) for i, x in enumerate(designs)]
     columns = np.vstack((np.eye(4), np.zeros((1, 4))))
-    with_it = held_out(products(only_here, measured), FLOORS, columns)
-    without = held_out(products(designs, measured), FLOORS, COLUMNS)
+    with_it = cross_validate(products(only_here, measured), FLOORS, columns)
+    without = cross_validate(products(designs, measured), FLOORS, COLUMNS)
     assert with_it.ratios[0] == pytest.approx(without.ratios[0], rel=1e-9)
 
 
@@ -67,7 +67,7 @@ def test_the_one_record_that_gives_a_number_is_indispensable(problem):
 
 
 def test_records_that_only_carry_the_state_do_not_count(problem):
-    score = held_out(products(*problem), np.array([0.1, np.inf, 0.2, 0.1]), COLUMNS)
+    score = cross_validate(products(*problem), np.array([0.1, np.inf, 0.2, 0.1]), COLUMNS)
     assert score.ratios.size == 3
 
 
