@@ -19,7 +19,7 @@ PACKAGE = ROOT / "piezo_hysteresis"
 """The Python package."""
 MOST_MODULES = 15
 """Modules in a folder of the package at most, `__init__.py` aside."""
-FULLER = {"piezo_hysteresis/cli": 18}
+FULLER = {"piezo_hysteresis/cli": 19}
 """Folders that hold more, and how many: every subcommand of `piezo` is a module of its own."""
 MOST_LINES = 250
 """Lines of a module of the package at most."""
@@ -28,7 +28,7 @@ LONGER = {
     "piezo_hysteresis/discrepancy/search/single_record.py": 260,
     "piezo_hysteresis/model/model.py": 280,
     "piezo_hysteresis/record.py": 270,
-    "piezo_hysteresis/online/predictor.py": 275,
+    "piezo_hysteresis/online/predictor.py": 280,
 }
 """Modules that are longer, and how long they may be."""
 LONGEST_SUBJECT = 72

@@ -21,6 +21,7 @@ COMMANDS = {
     "calibrate": "measure the delay of a card without a stage",
     "identify": "identify a model from an experiment",
     "recalibrate": "fit gain, offset, loop height and lag of an old model to new records",
+    "history": "show what was recalibrated on a stage, over time",
     "validate": "compare a model with an experiment in free-run simulation",
     "diagnose": "find where a model is wrong and which effect is missing",
     "compensate": "compute the drive voltage for a wanted displacement",

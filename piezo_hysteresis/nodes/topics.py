@@ -125,6 +125,10 @@ TOPICS: dict[str, Topic] = {
         Topic("residual_rms", Float64, COMMAND, "m", "`live_rate`", "model"),
         Topic("predicted_live", JointState, COMMAND, "V, m", "`live_rate`", "model"),
         Topic("change", DiagnosticStatus, COMMAND, "", "1 Hz, and at every alarm", "model"),
+        Topic("recalibrations", String, LATCHED, "", "at every recalibration", "model"),
+        Topic(
+            "recalibrated_model", String, COMMAND, "", "at every recalibration", "model", readers=("identification",)
+        ),
         Topic("model", String, LATCHED, "", "at every new model", "identification", readers=("model", "compensation")),
         Topic("status", DiagnosticStatus, STATUS, "", "at every step", "identification", senders=("compensation",)),
         Topic("trajectory", PointCloud2, COMMAND, "m, s", "", ANYONE, readers=("compensation",)),

@@ -13,7 +13,7 @@ from .prediction import Prediction
 from .running_rms import RunningRms
 from .sensor_offset import SensorOffset
 from .sequence_check import LONGEST_SILENCE, SequenceCheck
-from .voltage_history import FULL_SAMPLES, VoltageHistory, is_held
+from .voltage_history import FULL_SAMPLES, DriveHistory, VoltageHistory, is_held
 from .warmup import Warmup, chain_at
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ class Predictor:
         self.model: Model | None = None
         self.chain: Chain | None = None
         self._warmup: Warmup | None = None
-        self._waiting: Model | None = None
+        self._waiting: tuple[Model, float | None] | None = None
         self._unseen: float | None = None  # travel [V] at which the drive was last unknown
         self._joined_unseen = False
         self._window = max(ZERO_SAMPLES, round(ZERO_TIME / sample_period))
@@ -119,8 +119,13 @@ class Predictor:
         """Rms of the residual over the last `rms_time` [m]; None before there is one."""
         return self._rms.value
 
-    def swap(self, model: Model) -> None:
-        """Let another model take over as soon as it has been run over the history.
+    @property
+    def drive(self) -> DriveHistory:
+        """What was driven so far, as far as it is kept."""
+        return self._history.copy()
+
+    def swap(self, model: Model, offset: float | None = None) -> None:
+        """Let another model take over once it has been run over the history, with its offset [m] if that is known.
 
         While one is on its way, the newest of the others waits until that one has taken over: models that come faster
         than they can be run over the history hold up none.
@@ -136,9 +141,9 @@ class Predictor:
         if self._history.count == 0:
             self.chain, self.model = chain, model
         elif self._warmup is not None:
-            self._waiting = model
+            self._waiting = model, offset
         else:
-            self._warmup = Warmup(model, self._history, self._zero)
+            self._warmup = Warmup(model, self._history, self._zero, offset)
             self._warm(PIECE)
 
     def zero(self) -> None:
@@ -205,7 +210,8 @@ class Predictor:
         return answer
 
     def _begin(self) -> None:
-        newest = self._waiting or (self._warmup.model if self._warmup is not None else self.model)
+        newest = self._warmup.model if self._warmup is not None else self.model
+        newest = newest if self._waiting is None else self._waiting[0]
         self._waiting = None
         self._history = VoltageHistory(self.sample_period)
         self.state: ChainState | None = None
@@ -255,7 +261,7 @@ class Predictor:
     def _warm(self, values: int) -> None:
         if self._warmup is None and self._waiting is not None:
             waiting, self._waiting = self._waiting, None
-            self._warmup = Warmup(waiting, self._history, self._zero)
+            self._warmup = Warmup(waiting[0], self._history, self._zero, waiting[1])
         if self._warmup is None:
             return
         warmup, self._warmup = self._warmup, None
@@ -263,7 +269,10 @@ class Predictor:
             self._warmup = warmup
             return
         self.model, self.chain, self.state = warmup.model, warmup.chain, warmup.state
-        if warmup.zero is self._zero and warmup.mean is not None:
+        if warmup.offset is not None:
+            self._zero = SensorOffset.known(self._history.count, warmup.offset)
+            self._rms.clear()
+        elif warmup.zero is self._zero and warmup.mean is not None:
             self._zero.remodel(warmup.mean)
             self._rms.clear()
         else:

@@ -30,12 +30,19 @@ class SensorOffset:
         self.start, self.stop = start, start
         self.at_rest, self.until = at_rest, 0.0
         self._end = start + wanted
-        self._measured = self._modelled = 0.0
+        self._measured = self._modelled = self._known = 0.0
+
+    @classmethod
+    def known(cls, start: int, offset: float) -> SensorOffset:
+        """An offset [m] that needs no samples, from sample `start` on."""
+        zero = cls(start, 0)
+        zero._known = offset
+        return zero
 
     @property
     def offset(self) -> float:
         """Sensor minus model [m]; 0 before the first sample."""
-        return (self._measured - self._modelled) / (self.stop - self.start) if self.stop > self.start else 0.0
+        return (self._measured - self._modelled) / (self.stop - self.start) if self.stop > self.start else self._known
 
     def add(self, measured: Array, modelled: Array | None, travel: float) -> None:
         """Take the next samples, as far as they are wanted.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,32 @@ FULL_SAMPLES = 3_000_000
 
 REST_TOLERANCE = 5e-3
 """Voltages that stay within this distance [V] count as held: the noise of a measured drive."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DriveHistory:
+    """The drive voltage since the stage rested, as a value.
+
+    Parameters
+    ----------
+    rest_voltage : float
+        Voltage [V] at which the stage rested before.
+    start_time : float
+        Time of the first value since the beginning of the stream [s].
+    slow_period, sample_period : float
+        Time that a value of `slow`, and of `full`, covers [s].
+    slow : (m,) ndarray
+        Averages [V].
+    full : (n,) ndarray
+        Every sample after them [V].
+    """
+
+    rest_voltage: float
+    start_time: float
+    slow_period: float
+    sample_period: float
+    slow: Array
+    full: Array
 
 
 class VoltageHistory:
@@ -115,6 +143,14 @@ class VoltageHistory:
         first = position - self._full_start
         whole = -(-values // self.factor) * self.factor
         return 1, self._full[first : min(first + whole, self._kept)].copy()
+
+    def copy(self) -> DriveHistory:
+        """All that is kept, at present."""
+        period = self.sample_period
+        full = self._full[: self._kept].copy()
+        return DriveHistory(
+            self.rest_voltage, self.start * period, self.factor * period, period, self._slow.copy(), full
+        )
 
     @property
     def _full_start(self) -> int:

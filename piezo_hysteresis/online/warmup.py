@@ -40,6 +40,8 @@ class Warmup:
         May grow meanwhile.
     zero : SensorOffset
         Samples of the stream whose mean prediction is wanted.
+    offset : float, optional
+        Sensor minus model [m], where it is known.
 
     Attributes
     ----------
@@ -52,9 +54,9 @@ class Warmup:
         If the stream is faster than the model.
     """
 
-    def __init__(self, model: Model, history: VoltageHistory, zero: SensorOffset) -> None:
+    def __init__(self, model: Model, history: VoltageHistory, zero: SensorOffset, offset: float | None = None) -> None:
         self.model, self.chain = model, chain_at(model, history.sample_period)
-        self.zero, self._history = zero, history
+        self.zero, self.offset, self._history = zero, offset, history
         self._slow = model.at(history.factor * history.sample_period) if history.factor > 1 else self.chain
         self._position = history.start
         self._running = self._slow

@@ -10,7 +10,6 @@ from uuid import uuid4
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from ...acquisition.stage_lock import StageLock
@@ -22,14 +21,14 @@ from ...model.model import Model
 from ...model.model_file import dumps, loads, save
 from ...model.model_parameters import PREFIX
 from ...recording.segmentation.decimation import save_decimation
+from ..runtime.fit_process import FitProcess, Job
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
-from ..runtime.sending import send
-from ..topics import QOS_OVERRIDES, advertise
+from ..topics import QOS_OVERRIDES
 from .driver_client import DriverClient
 from .experiment_folder import ExperimentFolder
-from .fit_process import FitProcess, Job, diagnosis, identification
+from .fit_jobs import diagnosis, identification
 from .job_actions import JobActions
 from .protocol_runner import Progress, run_protocol
 from .served_model import ServedModel
@@ -54,7 +53,6 @@ class IdentificationNode(GuardedNode):
         self._lock = StageLock([f"the identification of {driver} in domain {self.context.get_domain_id()}"])
         self._status = IdentificationStatus(self)
         self._driver = DriverClient(self, self._value("driver"))
-        self._models = advertise(self, "model")
         self._job: Generator[Progress] | None = None
         self._moves = False
         self._folder = ExperimentFolder(self._value("experiment_root"), self.get_namespace())
@@ -63,8 +61,6 @@ class IdentificationNode(GuardedNode):
             self._served.resume({name: p.value for name, p in self._parameter_overrides.items()})
         except PiezoError as error:
             self._status.failed(f"no model from the parameters: {error}")
-        if self._served.model is not None:
-            send(self._models, String(data=dumps(self._served.model)))
         self.add_on_set_parameters_callback(self._check)
         for name, callback in (
             ("plan", self._on_plan),
@@ -200,7 +196,6 @@ class IdentificationNode(GuardedNode):
             process.close()
         found = loads(outcome.model)
         self._served.serve(found)
-        send(self._models, String(data=outcome.model))
         save(found, (path if path.is_dir() else path.parent) / f"{job.__name__}.yaml")
         for line in outcome.summary.splitlines():
             self.get_logger().info(line)

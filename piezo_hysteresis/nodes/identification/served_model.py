@@ -1,4 +1,4 @@
-"""`ServedModel`: the identified model as parameters of a node, readable by anyone, written by the node alone."""
+"""`ServedModel`: the identified model as parameters of a node and on the topic `model`, written by the node alone."""
 
 from __future__ import annotations
 
@@ -7,15 +7,21 @@ from collections.abc import Mapping
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from std_msgs.msg import String
 
-from ...errors import ModelError
+from ...errors import ModelError, PiezoError
 from ...model.model import Model
+from ...model.model_file import dumps, loads
 from ...model.model_parameters import PREFIX, SCALES, from_parameters, to_parameters
 from ..runtime.parameters import describe
+from ..runtime.sending import send
+from ..topics import advertise, subscribe
 
 
 class ServedModel:
-    """Parameters under ``model.``, all declared with values; a fit is set atomically.
+    """Parameters under ``model.``, all declared with values; a fit is set atomically and published.
+
+    A model that the model node has recalibrated is taken over, so that everybody follows it, late joiners too.
 
     Parameters
     ----------
@@ -33,9 +39,11 @@ class ServedModel:
     def __init__(self, node: Node, start: Model) -> None:
         self._node = node
         self._is_ours = False
+        self._models = advertise(node, "model")
         self.model: Model | None = None
         self._set(start)
         node.add_on_set_parameters_callback(self._refuse)
+        subscribe(node, "recalibrated_model", self._on_recalibrated)
 
     def resume(self, given: Mapping[str, object]) -> None:
         """Serve the model given at start, if there is one.
@@ -55,7 +63,7 @@ class ServedModel:
             self.serve(from_parameters(own, "parameters given at start"))
 
     def serve(self, model: Model) -> None:
-        """Replace the whole model in one go.
+        """Replace the whole model in one go, and publish it.
 
         Raises
         ------
@@ -64,6 +72,13 @@ class ServedModel:
         """
         self.model = model
         self._set(model)
+        send(self._models, String(data=dumps(model)))
+
+    def _on_recalibrated(self, message: String) -> None:
+        try:
+            self.serve(loads(message.data, "topic 'recalibrated_model'"))
+        except PiezoError as error:
+            self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
 
     def _set(self, model: Model) -> None:
         named = to_parameters(model, valid=self.model is not None)

@@ -40,7 +40,11 @@ CHANGE: tuple[Row, ...] = (
         _SOURCE,
     ),
     Parameter("baseline_time", "T_bl", "s", 60.0, 10.0, 1e5, "time over which ~/baseline is taken", _SOURCE),
-    Setting("baseline_folder", "", "folder of the baselines; empty: ~/.ros/piezo_hysteresis/<namespace>"),
+    Setting(
+        "baseline_folder",
+        "",
+        "folder of baselines, recalibrated models and their history; empty: ~/.ros/piezo_hysteresis/<namespace>",
+    ),
 )
 """Parameters of the change watch."""
 
@@ -57,16 +61,28 @@ class ChangeReporter:
         The model node.
     values : mapping
         Of the rows of `CHANGE`, by name.
+
+    Attributes
+    ----------
+    watch : ChangeWatch
+        The watch of the model in use.
+    interval : float
+        Wanted mean time between false alarms [s].
+    folder : Path
+        Of what is kept.
+    status : DiagnosticStatus
+        What was published last.
     """
 
     def __init__(self, node: Node, values: Mapping[str, Any]) -> None:
-        self._node, self._interval = node, float(values["false_alarm_interval"])
+        self._node, self.interval = node, float(values["false_alarm_interval"])
         self._duration = float(values["baseline_time"])
         given = values["baseline_folder"] or Path("~/.ros/piezo_hysteresis") / node.get_namespace().strip("/")
-        self._folder = Path(given).expanduser()
-        self._watch = ChangeWatch(self._interval)
+        self.folder = Path(given).expanduser()
+        self.watch = ChangeWatch(self.interval)
         self._model: Model | None = None
-        self._frame = self._problem = ""
+        self._adopted: tuple[Model, Baseline] | None = None
+        self._frame = self._problem = self._recalibration = ""
         self._alarms = 0
         self._publisher = advertise(node, "change")
         self.status = DiagnosticStatus(level=DiagnosticStatus.STALE)
@@ -80,37 +96,49 @@ class ChangeReporter:
         self._frame = block.frame
         stamp = block.stamp + round(float(block.time[-1]) * 1e9)
         try:
-            completed = self._watch.add(np.ascontiguousarray(block.voltage), answer, predictor, stamp)
+            completed = self.watch.add(np.ascontiguousarray(block.voltage), answer, predictor, stamp)
         except PiezoError as error:
             self._report_problem(f"the change watch has stopped: {error}")
             return
         if completed:
             self._save()
-        if self._watch.alarms > self._alarms:
-            self._alarms = self._watch.alarms
+        if self.watch.alarms > self._alarms:
+            self._alarms = self.watch.alarms
             self._publish()
+
+    def adopt(self, model: Model, baseline: Baseline) -> None:
+        """Watch a recalibrated model with the baseline of the one before, once it has taken over."""
+        self._adopted = (model, baseline)
+
+    def report_recalibration(self, message: str) -> None:
+        """Say in every status from now on what became of the last recalibration."""
+        self._recalibration = message
+        self._publish()
 
     def restart(self) -> None:
         """Learn the offset of the sensor anew."""
-        self._watch.restart()
+        self.watch.restart()
 
     def _follow(self, model: Model) -> None:
         self._model, self._problem = model, ""
-        path = baseline_path(self._folder, model)
+        if self._adopted is not None and self._adopted[0] is model:
+            self.watch, self._alarms = ChangeWatch(self.interval, self._adopted[1]), 0
+            return
+        path = baseline_path(self.folder, model)
         baseline = None
         try:
             baseline = Baseline.load(path) if path.is_file() else None
         except PiezoError as error:
             self._report_problem(str(error))
-        self._watch, self._alarms = ChangeWatch(self._interval, baseline), 0
+        self.watch, self._alarms = ChangeWatch(self.interval, baseline), 0
 
     def _save(self) -> None:
-        assert self._watch.baseline is not None
+        assert self.watch.baseline is not None
         assert self._model is not None
-        path = baseline_path(self._folder, self._model)
+        path = baseline_path(self.folder, self._model)
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            self._watch.baseline.save(path)
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self.watch.baseline.save(path)
         except OSError as error:
             self._report_problem(
                 f"{path}: the baseline cannot be written ({error.strerror}); it holds until the node ends"
@@ -126,7 +154,7 @@ class ChangeReporter:
     def _on_baseline(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success = self._model is not None
         if response.success:
-            self._watch.take_baseline(self._duration)
+            self.watch.take_baseline(self._duration)
             response.message = (
                 f"taking the baseline over the next {self._duration:g} s; drive the stage as in normal use"
             )
@@ -135,7 +163,7 @@ class ChangeReporter:
         return response
 
     def _publish(self) -> None:
-        watch, change = self._watch, self._watch.change
+        watch, change = self.watch, self.watch.change
         values: dict[str, object] = {"alarms": watch.alarms, "statistic": change.statistic}
         level, message = DiagnosticStatus.STALE, "no baseline; call ~/baseline while the stage is known to be good"
         if self._problem:
@@ -159,6 +187,8 @@ class ChangeReporter:
                 "change_high": change.estimate + reach,
                 "unit": unit,
             }
+        if self._recalibration:
+            values["recalibration"] = self._recalibration
         if watch.since:
             values["onset"] = f"{watch.since // 10**9}.{watch.since % 10**9:09d}"
         name = f"{self._node.get_fully_qualified_name().lstrip('/')}: change"

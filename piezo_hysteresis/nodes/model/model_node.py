@@ -16,6 +16,7 @@ from ...acquisition.sample_block import SampleBlock
 from ...errors import ModelError, PiezoError, RecordError
 from ...model.model import Model
 from ...model.model_file import load, loads
+from ...model.model_parameters import model_hash
 from ...online.predictor import Predictor
 from ...online.warmup import compile_kernels
 from ...parameter import Parameter, Row, Setting
@@ -29,6 +30,7 @@ from ..topics import subscribe
 from .change_reporter import CHANGE, ChangeReporter
 from .diagnostics import ModelDiagnostics
 from .publishers import ModelTopics
+from .recalibrator import Recalibrator
 from .residual_alarm import ALARM, ResidualAlarm
 
 _COLD = 3.0
@@ -65,6 +67,7 @@ class ModelNode(GuardedNode):
         self._topics = ModelTopics(self)
         self._changes = ChangeReporter(self, self._values)
         self._diagnostics = ModelDiagnostics(self, ResidualAlarm(self._values), self._changes)
+        self._recalibrator = Recalibrator(self, self._changes, self._recalibrated)
         if self._values["model_file"]:
             self._load(self._values["model_file"])
         self.add_on_set_parameters_callback(self._check)
@@ -95,6 +98,7 @@ class ModelNode(GuardedNode):
             counted = block.after(answer.first)
             self._topics.publish(counted, answer, predictor)
             self._changes.add(counted, answer, predictor)
+            self._recalibrator.add(counted, answer, predictor)
 
     def _predictor_for(self, block: SampleBlock) -> Predictor | None:
         """The predictor of the stream, made anew for another sample period; None before that is known."""
@@ -116,9 +120,28 @@ class ModelNode(GuardedNode):
 
     def _on_model(self, message: String) -> None:
         try:
-            self._follow(loads(message.data, "topic 'model'"))
+            model = loads(message.data, "topic 'model'")
+            if not self._is_followed(model):
+                self._follow(model)
         except PiezoError as error:
             self._diagnostics.refused(str(error))
+
+    def _is_followed(self, model: Model) -> bool:
+        """True of the model that predicts already or soon, e.g. one that this node has recalibrated itself."""
+        predictor = self._predictor
+        if predictor is None or self._model is None or model_hash(model) != model_hash(self._model):
+            return False
+        return predictor.is_swapping or predictor.model is self._model
+
+    def _recalibrated(self, model: Model, offset: float | None) -> None:
+        assert self._predictor is not None
+        self._predictor.swap(model, offset)
+        self._model = model
+        self._diagnostics.model(model)
+
+    def end(self) -> None:
+        """Give up a fit that is under way."""
+        self._recalibrator.end()
 
     def _load(self, path: str) -> None:
         try:
@@ -171,7 +194,7 @@ def _read(path: str) -> Model:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a model node; its exit code is 2 where its parameters make no sense."""
-    return run(ModelNode, arguments)
+    return run(ModelNode, arguments, end=ModelNode.end)
 
 
 if __name__ == "__main__":

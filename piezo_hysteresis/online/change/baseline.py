@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ModelError
+from .scatter import Scatter
 from .score import GROUPS, ChangeScore
 
 Array = NDArray[np.float64]
@@ -23,12 +24,6 @@ FEWEST_SCORES = 60
 CLASS_RATIO = 4.0
 """Drives whose span or speed differs by less than this factor are of one class."""
 
-DISTINCT = 1e-6
-"""Smallest part of a row of sensitivities, after the offset is taken out, that counts as excited."""
-
-SLOWEST_DECAY = 0.98
-"""Factor from score to score with which a correlation falls at least: 5 s."""
-
 DriveClass = tuple[int, int]
 
 
@@ -37,72 +32,6 @@ def drive_class(score: ChangeScore) -> DriveClass:
     if score.span == 0.0 or score.speed == 0.0:
         return 0, 0
     return tuple(1000 + round(math.log(x, CLASS_RATIO)) for x in (score.span, score.speed))  # type: ignore[return-value]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Scatter:
-    """Scores of one class of drive.
-
-    Parameters
-    ----------
-    count : int
-        Number of scores.
-    mean : (5,) ndarray
-        Mean score: structured misfit of the model under this drive. It does not count as change.
-    whitening : (5, 5) ndarray
-        Inverse of the covariance of the scores; rows and columns of groups that are not excited are zero.
-    slope : (5, 5) ndarray
-        Mean of `ChangeScore.slope`.
-    memory : (2, 5) ndarray
-        Correlation of what successive scores say of each group, and the factor by which it falls with every further
-        score.
-    """
-
-    count: int
-    mean: Array
-    whitening: Array
-    slope: Array
-    memory: Array
-
-    @property
-    def excited(self) -> NDArray[np.bool_]:
-        """Groups that the drive excites, shape (5,)."""
-        return np.diag(self.whitening) > 0.0
-
-    def inflation(self, longest: int) -> Array:
-        """Variance of the sum of 1, 2, … `longest` scores over that of as many independent ones, shape (longest, 5)."""
-        lag = np.arange(1, longest)[:, None]
-        correlation = self.memory[0] * self.memory[1] ** (lag - 1)
-        total, first = (np.vstack((np.zeros((1, 5)), np.cumsum(c, axis=0))) for c in (correlation, lag * correlation))
-        return 1.0 + 2.0 * (total - first / np.arange(1, longest + 1)[:, None])
-
-    @classmethod
-    def of(cls, scores: Sequence[ChangeScore]) -> Scatter:
-        """Scatter of the scores of one class."""
-        values = np.array([s.value for s in scores])
-        slope = np.mean([s.slope for s in scores], axis=0)
-        size = np.sqrt(np.diag(slope))
-        offset = GROUPS.index("offset")
-        apart = np.diag(slope) - slope[:, offset] ** 2 / slope[offset, offset]
-        kept = np.flatnonzero((apart > DISTINCT**2 * np.diag(slope)) | (np.arange(len(GROUPS)) == offset))
-        scale = 1.0 / np.where(size > 0.0, size, 1.0)
-        scaled = (values * scale)[:, kept]
-        covariance = np.atleast_2d(np.cov(scaled, rowvar=False))
-        inverse = np.zeros_like(slope)
-        biased = (len(scores) - kept.size - 2) / (len(scores) - 1)  # mean of the inverse of a Wishart matrix
-        inverse[np.ix_(kept, kept)] = biased * np.linalg.pinv(covariance, rcond=1e-10, hermitian=True)
-        mean, whitening = values.mean(axis=0), scale[:, None] * inverse * scale
-        said = (values - mean) @ whitening @ slope
-        return cls(len(scores), mean, whitening, slope, _memory(said))
-
-
-def _memory(said: Array) -> Array:
-    """`Scatter.memory` of a series (n, 5); correlations within two standard errors of zero are none."""
-    power = np.maximum((said**2).mean(axis=0), np.finfo(np.float64).tiny)
-    one, two = ((said[lag:] * said[:-lag]).mean(axis=0) / power for lag in (1, 2))
-    first = np.where(one > 2.0 / np.sqrt(len(said)), np.minimum(one, 1.0), 0.0)
-    decay = np.clip(two / np.where(first > 0.0, first, 1.0), 0.0, SLOWEST_DECAY)
-    return np.vstack((first, np.where(first > 0.0, decay, 0.0)))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -141,6 +70,10 @@ class Baseline:
             )
         return cls(known, model)
 
+    def of_model(self, model: str) -> Baseline:
+        """The same scatter for another model, given by its hash: one that differs in a few calibrated numbers."""
+        return Baseline(self.scatter, model)
+
     def save(self, path: Path) -> None:
         """Write as .npz, whole or not at all."""
         arrays: dict[str, Any] = {"model": np.array(self.model)}
@@ -148,10 +81,12 @@ class Baseline:
             key = f"{span},{speed}"
             arrays |= {
                 f"{key},count": np.array(s.count),
-                f"{key},mean": s.mean,
-                f"{key},whitening": s.whitening,
+                f"{key},misfit": s.misfit,
+                f"{key},precision": s.precision,
                 f"{key},slope": s.slope,
                 f"{key},memory": s.memory,
+                f"{key},wander": s.wander,
+                f"{key},power": np.array(s.power),
             }
         partial = path.with_suffix(".partial")
         with partial.open("wb") as file:
@@ -168,7 +103,10 @@ class Baseline:
             If the file is no baseline.
         """
         size = len(GROUPS)
-        shapes = {"count": (), "mean": (size,), "whitening": (size, size), "slope": (size, size), "memory": (2, size)}
+        square = (size, size)
+        shapes: dict[str, tuple[int, ...]]
+        shapes = {"misfit": (size,), "precision": square, "slope": square, "memory": (2, size), "wander": (size,)}
+        shapes |= {"count": (), "power": ()}
         try:
             with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
                 held: dict[DriveClass, dict[str, Array]] = {}
@@ -181,7 +119,15 @@ class Baseline:
                         raise ValueError(name)
                     held.setdefault((int(span), int(speed)), {})[field] = values
                 scatter = {
-                    k: Scatter(int(s["count"]), s["mean"], s["whitening"], s["slope"], s["memory"])
+                    k: Scatter(
+                        int(s["count"]),
+                        s["misfit"],
+                        s["precision"],
+                        s["slope"],
+                        s["memory"],
+                        s["wander"],
+                        float(s["power"]),
+                    )
                     for k, s in held.items()
                 }
                 return cls(scatter, str(file["model"]))

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .baseline import Baseline, DriveClass, Scatter, drive_class
+from .baseline import Baseline, DriveClass, drive_class
 from .false_alarm_threshold import WINDOW, false_alarm_threshold
+from .scatter import Scatter
 from .score import BLOCK_TIME, GROUPS, ChangeScore
 
 Array = NDArray[np.float64]
@@ -84,23 +85,22 @@ class ChangeDetector:
         scatter = self._baseline.scatter.get(key)
         if scatter is None or not scatter.excited.any():
             return Change()
-        whitened = score.slope @ scatter.whitening
-        pull = whitened @ (score.value - scatter.mean)
+        pull, weight = scatter.pull(score)
         if self._unlearnt:
             self._unlearnt -= 1
             self._offset += pull[_OFFSET]
-            self._offset_weight += whitened[_OFFSET] @ score.slope[:, _OFFSET]
+            self._offset_weight += weight[_OFFSET, _OFFSET]
             return Change(watched=True)
         if self._offset_weight:
-            pull = pull - whitened @ score.slope[:, _OFFSET] * (self._offset / self._offset_weight)
-        self._window.append((pull, np.einsum("ij,ji->i", whitened, score.slope), score.stamp, scatter.count))
+            pull = pull - weight[:, _OFFSET] * (self._offset / self._offset_weight)
+        self._window.append((pull, np.diag(weight), score.stamp, scatter.count))
         del self._window[:-WINDOW]
         pulls, weights = (np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1))
         length = np.arange(1, len(pulls) + 1)[:, None]
         certain = 1.0 + length / min(row[3] for row in self._window)  # the mean of the baseline is itself uncertain
         if not self._same_offset:
             certain = certain + _like_offset(scatter) * length / RECENTRED
-        known = certain * scatter.inflation(len(pulls))
+        known = certain * scatter.inflation(len(pulls)) + scatter.wander * weights
         seen = scatter.excited & (weights > 0.0)
         statistic = np.where(seen, pulls**2 / np.where(seen, weights, 1.0) / known, 0.0)
         at, group = np.unravel_index(int(statistic.argmax()), statistic.shape)
@@ -115,27 +115,29 @@ class ChangeDetector:
 
     def _threshold(self, key: DriveClass, scatter: Scatter) -> float:
         if key not in self._thresholds:
-            self._thresholds[key] = false_alarm_threshold(_directions(scatter), self._interval)
+            self._thresholds[key] = false_alarm_threshold(directions(scatter), self._interval)
         return self._thresholds[key]
 
     def _alike(self, group: int, scatter: Scatter) -> tuple[str, ...]:
-        directions = _directions(scatter)
-        size = np.linalg.norm(directions, axis=1)
-        cosine = np.abs(directions @ directions[group]) / np.where(size > 0, size, np.inf) / size[group]
+        direction = directions(scatter)
+        size = np.linalg.norm(direction, axis=1)
+        cosine = np.abs(direction @ direction[group]) / np.where(size > 0, size, np.inf) / size[group]
         others = [k for k in np.argsort(-cosine) if k != group and cosine[k] > ALIKE]
         return (GROUPS[group], *(GROUPS[k] for k in others))
 
 
 def _like_offset(scatter: Scatter) -> Array:
     """Squared cosine between the direction of every group and that of the offset, shape (5,)."""
-    directions = _directions(scatter)
-    size = np.linalg.norm(directions, axis=1)
-    cosine = directions @ directions[_OFFSET] / np.where(size > 0.0, size, 1.0) / size[_OFFSET]
+    direction = directions(scatter)
+    size = np.linalg.norm(direction, axis=1)
+    cosine = direction @ direction[_OFFSET] / np.where(size > 0.0, size, 1.0) / size[_OFFSET]
     return cosine**2
 
 
-def _directions(scatter: Scatter) -> Array:
+def directions(scatter: Scatter) -> Array:
     """Direction in which a whitened score moves for a change of each group, shape (5, 5)."""
-    values, vectors = np.linalg.eigh(scatter.whitening)
-    root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
-    return np.where(scatter.excited[:, None], scatter.slope @ root, 0.0)
+    _, weight = scatter.pull(ChangeScore(np.zeros(len(GROUPS)), scatter.slope, 0.0, 0.0, 0, 0.0))
+    size = np.sqrt(np.diag(weight))
+    alike = weight / np.where(size > 0.0, size, 1.0)[:, None] / np.where(size > 0.0, size, 1.0)
+    values, vectors = np.linalg.eigh(alike)
+    return size[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

@@ -7,13 +7,15 @@ approach: Benveniste, Basseville, Moustakides, IEEE Trans. Autom. Control 32 (19
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ...model.chain import Chain, ChainState
+from ...model.chain import Chain, ChainState, ChainTangent
+from ...model.model import Model
 
 Array = NDArray[np.float64]
 
@@ -36,6 +38,9 @@ FEWEST_SAMPLES = 16
 SLOW_TIME = 3.0
 """Time constant of the slow group [s]."""
 
+_OFFSET = GROUPS.index("offset")
+"""Row of the offset."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ChangeScore:
@@ -51,6 +56,8 @@ class ChangeScore:
         Peak-to-peak of the drive voltage [V], and rms of its rate of change [V/s].
     stamp : int
         Time of the last sample [ns].
+    power : float
+        Mean square of the residual [m²].
     """
 
     value: Array
@@ -58,6 +65,26 @@ class ChangeScore:
     span: float
     speed: float
     stamp: int
+    power: float
+
+    @property
+    def offset(self) -> float:
+        """Mean residual of the block [m]."""
+        return float(self.value[_OFFSET] / self.slope[_OFFSET, _OFFSET])
+
+
+def loop_heights(model: Model) -> dict[str, float]:
+    """Numbers of a model that scale the height of its hysteresis loop, with their values; none without a loop."""
+    if not model.has_hysteresis:
+        return {}
+    loop, values = model.hysteresis, model.values()
+    linear = loop.linear_numbers()
+    return {f"{loop.name}.{n}": values[f"{loop.name}.{n}"] for n in loop.gain_numbers() if n not in linear}
+
+
+def block_size(sample_period: float) -> int:
+    """Samples that one score covers."""
+    return max(FEWEST_SAMPLES, round(BLOCK_TIME / sample_period))
 
 
 class Scores:
@@ -69,22 +96,17 @@ class Scores:
         Of the running model, at the period of the stream.
     state : ChainState
         Its state before the next sample.
-    loop : tuple of str
-        Numbers of the model that scale the height of its hysteresis loop, e.g. ``("bouc_wen.A",)``; empty for none.
-    weights : tuple of float
-        Their values.
-    rest : float
-        Voltage at which the sensitivities begin [V].
+    loop : mapping of str to float
+        `loop_heights` of the model.
+    tangent : ChainTangent
+        Sensitivities to them before the next sample; `Chain.rest_tangent` where nothing is known.
     """
 
-    def __init__(
-        self, chain: Chain, state: ChainState, loop: tuple[str, ...], weights: tuple[float, ...], rest: float
-    ) -> None:
-        self._chain, self._state, self._loop = chain, state, loop
-        self._weights = np.array(weights)
-        self._tangent = chain.rest_tangent(rest, loop)
+    def __init__(self, chain: Chain, state: ChainState, loop: Mapping[str, float], tangent: ChainTangent) -> None:
+        self._chain, self._state, self._tangent = chain, state, tangent
+        self._loop, self._weights = tuple(loop), np.array([*loop.values()])
         self._period = chain.setting.sample_period
-        self.block_size = max(FEWEST_SAMPLES, round(BLOCK_TIME / self._period))
+        self.block_size = block_size(self._period)
         self._decay = float(np.exp(-self._period / SLOW_TIME))
         self._rows: list[Array] = []
         self._held = 0
@@ -126,4 +148,5 @@ class Scores:
 def _score(rows: Array, stamp: int) -> ChangeScore:
     s, e, voltage, speed = rows[:5], rows[5], rows[6], rows[7]
     root = np.sqrt(s.shape[1])
-    return ChangeScore(s @ e / root, s @ s.T / root, float(np.ptp(voltage)), float(np.sqrt(np.mean(speed**2))), stamp)
+    fast = float(np.sqrt(np.mean(speed**2)))
+    return ChangeScore(s @ e / root, s @ s.T / root, float(np.ptp(voltage)), fast, stamp, float(np.mean(e**2)))

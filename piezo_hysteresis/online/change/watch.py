@@ -13,7 +13,7 @@ from ..prediction import Prediction
 from ..predictor import Predictor
 from .baseline import Baseline
 from .detector import Change, ChangeDetector
-from .score import BLOCK_TIME, ChangeScore, Scores
+from .score import BLOCK_TIME, ChangeScore, Scores, loop_heights
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,8 @@ class ChangeWatch:
         What the newest score says.
     since : int
         Stamp at which the change began that is still seen [ns]; 0 while there is none.
+    groups : tuple of str
+        Groups that explain that change best, of all that was said since.
     alarms : int
         Times at which a change was first seen.
 
@@ -51,6 +53,8 @@ class ChangeWatch:
         self._interval = false_alarm_interval
         self.baseline = baseline
         self.change, self.since, self.alarms = Change(), 0, 0
+        self.groups: tuple[str, ...] = ()
+        self._strongest = 0.0
         self._model: Model | None = None
         self._scores: Scores | None = None
         self._detector: ChangeDetector | None = None
@@ -108,13 +112,8 @@ class ChangeWatch:
         if self._model is not None and model is not self._model:
             self.since, self._wanted = 0, 0
         self._model = model
-        values = model.values()
-        names: tuple[str, ...] = ()
-        if model.has_hysteresis:
-            loop = model.hysteresis
-            heights = [n for n in loop.gain_numbers() if n not in loop.linear_numbers()]
-            names = tuple(f"{loop.name}.{n}" for n in heights)
-        self._scores = Scores(chain, state, names, tuple(values[n] for n in names), voltage)
+        loop = loop_heights(model)
+        self._scores = Scores(chain, state, loop, chain.rest_tangent(voltage, loop))
         self._watch(self.baseline, same_offset=False)
 
     def _watch(self, baseline: Baseline | None, *, same_offset: bool) -> None:
@@ -137,8 +136,11 @@ class ChangeWatch:
             self.change = self._detector.add(score)
             if self.change.statistic > 1.0 and not self.since:
                 self.since, self.alarms = self.change.onset, self.alarms + 1
+                self._strongest = 0.0
             elif self.change.watched and self.change.statistic < 0.5:
                 self.since = 0
+            if self.since and self.change.statistic > self._strongest:
+                self._strongest, self.groups = self.change.statistic, self.change.groups
         return False
 
 

@@ -6,8 +6,9 @@ import pytest
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.model import Model
-from piezo_hysteresis.online.change.baseline import Baseline, Scatter
+from piezo_hysteresis.online.change.baseline import Baseline
 from piezo_hysteresis.online.change.false_alarm_threshold import false_alarm_threshold
+from piezo_hysteresis.online.change.scatter import Scatter
 from piezo_hysteresis.online.change.score import GROUPS
 from piezo_hysteresis.online.change.watch import ChangeWatch, baseline_path
 from piezo_hysteresis.online.predictor import Predictor
@@ -66,6 +67,14 @@ def with_change(drive, group):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_an_unchanged_stage_raises_no_alarm(drive, seed):
     watch, largest = follow(drive, run(MODEL, drive), seed)
+    assert watch.alarms == 0
+    assert 0.05 < largest < 1.0
+
+
+@pytest.mark.parametrize("frequency", [0.3, 1.0, 3.0])
+def test_a_slow_scan_whose_blocks_differ_raises_no_alarm(frequency):
+    slow = sine(TRAINED + WATCHED + 4.0, frequency)
+    watch, largest = follow(slow, run(MODEL, slow))
     assert watch.alarms == 0
     assert 0.05 < largest < 1.0
 
@@ -134,7 +143,7 @@ def test_too_short_a_baseline_is_refused():
 
 def test_sums_of_correlated_scores_vary_as_an_autoregressive_series_does():
     phi = 0.7
-    scatter = Scatter(100, np.zeros(5), np.eye(5), np.eye(5), np.array([[phi] * 5, [phi] * 5]))
+    scatter = Scatter(100, np.zeros(5), np.eye(5), np.eye(5), np.array([[phi] * 5, [phi] * 5]), np.zeros(5), 1.0)
     k = 40
     correlation = phi ** np.abs(np.subtract.outer(np.arange(k), np.arange(k)))
     assert scatter.inflation(k)[-1, 0] == pytest.approx(correlation.sum() / k)

@@ -11,12 +11,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from ...discrepancy.diagnose import diagnose
 from ...errors import IdentificationError, PiezoError
-from ...identification.identify import identify
-from ...model.model_file import dumps, loads
-from ...recording import read
-from ...report.json_file import write_json
 
 Report = Callable[[str, float], None]
 
@@ -41,25 +36,7 @@ class Outcome:
 
 
 Job = Callable[[Path, str, Report], Outcome]
-"""Takes the experiment, the text of the model so far, and what takes progress."""
-
-
-def identification(path: Path, model: str, report: Report) -> Outcome:
-    """Identify the model of a recorded experiment; the model so far does not count."""
-    found = identify(read(path), progress=report)
-    verdict = f"free-run error {found.free_run_percent:.3g} % of range ({found.free_run_error * 1e9:.3g} nm)"
-    return Outcome(dumps(found.model), str(found), verdict)
-
-
-def diagnosis(path: Path, model: str, report: Report) -> Outcome:
-    """Diagnose the present model, or a new one if there is none, and extend it; writes ``answer.json``."""
-    found = diagnose(read(path), loads(model) if model else None, progress=report)
-    folder = path if path.is_dir() else path.parent
-    model_file = "" if found.model is None else str(folder / "diagnosis.yaml")
-    write_json(str(folder / "answer.json"), found.answer(model_file))
-    if found.model is None:
-        raise IdentificationError(found.reason)
-    return Outcome(dumps(found.model), found.summary(), f"{found.verdict}: {found.reason}")
+"""Takes the path of the data, the text of the model so far, and what takes progress."""
 
 
 class FitProcess:
@@ -70,7 +47,7 @@ class FitProcess:
     job : callable
         A function of a module, so that the other process finds it.
     path : Path
-        Experiment.
+        Of the data.
     model : str
         Text of a model file, or empty.
     """

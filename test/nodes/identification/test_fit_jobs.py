@@ -14,7 +14,8 @@ from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_file import loads
 from piezo_hysteresis.model.model_parameters import to_parameters
-from piezo_hysteresis.nodes.identification.fit_process import FitProcess, identification
+from piezo_hysteresis.nodes.identification.fit_jobs import identification
+from piezo_hysteresis.nodes.runtime.fit_process import FitProcess
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import read, write
 

@@ -1,0 +1,60 @@
+"""Show what the model node has recalibrated on a stage: every number over time, with its interval."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.table import Table
+
+from ..discrepancy.changes.recalibration_history import FILE, read_numbers
+from ..errors import RecordingError
+from .options.destination import add_force, require_new_results
+from .terminal import console
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("history", description=__doc__)
+    parser.add_argument("file", type=Path, metavar="FILE", help=f"{FILE}, or the folder of it")
+    parser.add_argument("-o", "--output", metavar="PICTURE", help="figure to write: .png, .svg or .pdf")
+    add_force(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the table and draw the figure; returns 0.
+
+    Raises
+    ------
+    RecordingError
+        If there is no history, or the figure cannot be written.
+    """
+    require_new_results(args)
+    path = args.file.expanduser()
+    path = path / FILE if path.is_dir() else path
+    try:
+        numbers = read_numbers(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{path}: cannot be read ({error}), expected {FILE} of a model node") from None
+    table = Table("time", "group", "parameter", "old", "new", "95 % interval", "unit", "residual, nm")
+    for n in numbers:
+        table.add_row(
+            n.time,
+            n.group,
+            n.parameter,
+            f"{n.old:.6g}",
+            f"{n.new:.6g}",
+            f"{n.low:.6g} to {n.high:.6g}",
+            n.unit,
+            f"{1e9 * n.residual_before:.3g} → {1e9 * n.residual_after:.3g}",
+        )
+    out = console()
+    out.print(table)
+    if args.output is not None:
+        from ..report.recalibrations import recalibrations
+
+        picture = Path(args.output).expanduser()
+        recalibrations(numbers).save_picture(picture)
+        out.print(f"wrote {picture}")
+    return 0

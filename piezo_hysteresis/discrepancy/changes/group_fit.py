@@ -1,0 +1,247 @@
+"""`fit_groups`: the few numbers of the groups that moved, fitted to the last minute of a stream.
+
+The scores of the change watch are normal equations of the residual in the numbers of every group, with the scatter of
+an unchanged stage as weights. They are summed up from where the change most probably began, the model is changed, and
+is run over the minute again, until the numbers stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import IdentificationError, PiezoError
+from ...model.model import Model
+from ...online.change.baseline import Baseline, drive_class
+from ...online.change.detector import directions
+from ...online.change.false_alarm_threshold import WINDOW, false_alarm_threshold
+from ...online.change.scatter import Scatter, residual_power
+from ...online.change.score import BLOCK_TIME, GROUPS, ChangeScore
+from .minute import Minute
+from .moved_group import FULL, changed_by
+
+Array = NDArray[np.float64]
+
+FEWEST_SCORES = 20
+"""Scores after the onset from which a fit begins."""
+TURNS = 6
+"""Linearisations at most."""
+SETTLED = 0.1
+"""Last step of a fit that has settled, in standard deviations."""
+TRANSIENT = 0.1
+"""Share of the time since a change within which a loop takes its new shape; not fitted."""
+EXCESS = 1.3
+"""RMS residual after the fit, over that of the baseline, from which the model is no longer good enough."""
+APART = 0.05
+"""Share of a group's weight that must remain beside the fitted groups, so that it can be told from them."""
+SURE = 1.96
+"""Half a 95 % interval, in standard deviations."""
+
+_OFFSET = GROUPS.index("offset")
+"""Row of the offset."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GroupFit:
+    """A model with newly fitted numbers.
+
+    Parameters
+    ----------
+    model : Model
+        The new one.
+    offset : float
+        Sensor minus new model [m].
+    groups : tuple of str
+        What was fitted, the offset besides.
+    change, deviation : (5,) ndarray
+        Change of every group and its standard deviation, in the order and units of the watch; 0 where not fitted.
+    before, after, floor : float
+        RMS residual about its mean: with the old model, with the new one, and in the baseline [m].
+    duration : float
+        Time of the samples that were fitted [s].
+    """
+
+    model: Model
+    offset: float
+    groups: tuple[str, ...]
+    change: Array
+    deviation: Array
+    before: float
+    after: float
+    floor: float
+    duration: float
+
+
+def fit_groups(model: Model, minute: Minute, baseline: Baseline, group: str, interval: float) -> GroupFit:
+    """Fit the numbers of a group, and of another one that still differs then.
+
+    Parameters
+    ----------
+    model : Model
+        The running one.
+    minute : Minute
+        What was driven and measured.
+    baseline : Baseline
+        Of the running model.
+    group : str
+        The group that moved: `group_to_fit`.
+    interval : float
+        Wanted mean time between false alarms of the watch [s].
+
+    Returns
+    -------
+    GroupFit
+        Its residual is back at that of the baseline.
+
+    Raises
+    ------
+    IdentificationError
+        If a few numbers do not explain the change, with what will do instead.
+    """
+    fit = _Fit(model, minute, baseline, group, interval)
+    groups: tuple[str, ...] = (group,)
+    try:
+        found = fit.of(groups)
+        if found.remaining in ("gain", "loop", "dynamics", "offset") and found.remaining not in groups:
+            groups = (group, found.remaining)
+            found = fit.of(groups)
+    except IdentificationError:
+        raise
+    except PiezoError as error:
+        raise IdentificationError(f"the model cannot follow the change ({error}); {FULL}") from None
+    return fit.checked(groups, found)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Fitted:
+    model: Model
+    change: Array
+    deviation: Array
+    scores: list[ChangeScore]
+    remaining: str
+
+
+class _Fit:
+    """Scores of the minute under any model, and least squares of them."""
+
+    def __init__(self, model: Model, minute: Minute, baseline: Baseline, group: str, interval: float) -> None:
+        self._model, self._minute, self._baseline = model, minute, baseline
+        self._begun = 0
+        every = self._scores(model, minute.offset)
+        onset = self._onset(every, group)
+        self._begun = onset + round(TRANSIENT * (len(every) - onset)) if onset else 0
+        self._before = every[self._begun :]
+        if len(self._before) < FEWEST_SCORES:
+            raise IdentificationError(
+                f"got {BLOCK_TIME * len(self._before):.1f} s since the change under a drive of the baseline, "
+                f"expected at least {BLOCK_TIME * FEWEST_SCORES:g} s; try again later"
+            )
+        classes = [drive_class(score) for score in self._before]
+        self._main = baseline.scatter[max(set(classes), key=classes.count)]
+        self._threshold = false_alarm_threshold(directions(self._main), interval / BLOCK_TIME)
+        count = len(self._before)
+        self._known = self._main.inflation(count)[-1] * (
+            1.0 + count / min(self._scatter(s).count for s in self._before)
+        )
+
+    def of(self, groups: Sequence[str]) -> _Fitted:
+        """The model with the numbers of some groups at their best."""
+        free = sorted({GROUPS.index(g) for g in groups} | {_OFFSET})
+        hidden = [GROUPS[k] for k in free if not self._main.excited[k]]
+        if hidden:
+            raise IdentificationError(f"the present drive does not excite {' and '.join(hidden)}; {FULL}")
+        change, model, scores = np.zeros(len(GROUPS)), self._model, self._before
+        deviation = np.zeros(len(GROUPS))
+        for _ in range(TURNS):
+            gram, pull = self._equations(scores)
+            inverse = np.linalg.pinv(_scaled(gram, free), hermitian=True)
+            size = np.sqrt(np.diag(gram)[free])
+            step = inverse @ (pull[free] / size) / size
+            variance = np.diag(inverse) * self._known[free] / size**2
+            deviation[free] = np.sqrt(variance + self._main.wander[free])
+            change[free] += step
+            model = changed_by(self._model, change)
+            scores = self._scores(model, self._minute.offset + change[_OFFSET])
+            if (np.abs(step) < SETTLED * deviation[free]).all():
+                break
+        return _Fitted(model, change, deviation, scores, self._remaining(scores, free))
+
+    def checked(self, groups: tuple[str, ...], found: _Fitted) -> GroupFit:
+        """A fit whose residual is that of the baseline, and whose numbers differ from the old ones."""
+        before, after = (float(np.sqrt(residual_power(s))) for s in (self._before, found.scores))
+        floor = float(np.sqrt(np.mean([self._scatter(s).power for s in self._before])))
+        names = " and ".join(groups)
+        if found.remaining or after > EXCESS * floor:
+            left = f", and {found.remaining} still differs" if found.remaining else ""
+            raise IdentificationError(
+                f"after a fit of {names} the residual is {1e9 * after:.3g} nm, expected {1e9 * floor:.3g} nm as in the "
+                f"baseline{left}; {FULL}"
+            )
+        moved = [GROUPS.index(g) for g in groups]
+        if (np.abs(found.change[moved]) < SURE * found.deviation[moved]).all():
+            raise IdentificationError(
+                f"the change of {names} is smaller than its uncertainty in {BLOCK_TIME * len(self._before):.0f} s; "
+                "try again later"
+            )
+        offset = self._minute.offset + float(found.change[_OFFSET])
+        duration = BLOCK_TIME * len(self._before)
+        return GroupFit(found.model, offset, groups, found.change, found.deviation, before, after, floor, duration)
+
+    def _scatter(self, score: ChangeScore) -> Scatter:
+        return self._baseline.scatter[drive_class(score)]
+
+    def _equations(self, scores: Sequence[ChangeScore]) -> tuple[Array, Array]:
+        gram, pull = np.zeros((len(GROUPS), len(GROUPS))), np.zeros(len(GROUPS))
+        for score in scores:
+            own, weight = self._scatter(score).pull(score)
+            gram += weight
+            pull += own
+        return gram, pull
+
+    def _remaining(self, scores: Sequence[ChangeScore], fitted: Sequence[int]) -> str:
+        """The group that the watch would report after the fit; empty for none."""
+        gram, pull = self._equations(scores)
+        worst, name = 1.0, ""
+        inner = np.linalg.pinv(gram[np.ix_(fitted, fitted)], hermitian=True)
+        for k, group in enumerate(GROUPS):
+            if k in fitted or not self._main.excited[k]:
+                continue
+            beside = gram[fitted, k]
+            weight = gram[k, k] - beside @ inner @ beside
+            if weight < APART * gram[k, k]:
+                continue
+            own = pull[k] - beside @ inner @ pull[fitted]
+            window = min(1.0, WINDOW / len(scores))
+            known = self._known[k] + window * weight * self._main.wander[k]
+            statistic = window * own**2 / weight / known / self._threshold
+            if statistic > worst:
+                worst, name = statistic, group
+        return name
+
+    def _scores(self, model: Model, offset: float) -> list[ChangeScore]:
+        """Scores since the change, of the classes of drive that the baseline knows."""
+        every = self._minute.scores(model, offset)
+        return [s for s in every if drive_class(s) in self._baseline.scatter][self._begun :]
+
+    def _onset(self, scores: Sequence[ChangeScore], group: str) -> int:
+        """The score with which a step of a group, and of the offset, most probably began."""
+        free = sorted({GROUPS.index(group), _OFFSET})
+        gram, pull = np.zeros((len(GROUPS), len(GROUPS))), np.zeros(len(GROUPS))
+        best, begun = -np.inf, len(scores)
+        for k in reversed(range(len(scores))):
+            own, weight = self._scatter(scores[k]).pull(scores[k])
+            gram, pull = gram + weight, pull + own
+            size = np.sqrt(np.maximum(np.diag(gram)[free], np.finfo(np.float64).tiny))
+            scaled = pull[free] / size
+            gain = float(scaled @ np.linalg.pinv(_scaled(gram, free), hermitian=True) @ scaled)
+            if gain > best:
+                best, begun = gain, k
+        return begun
+
+
+def _scaled(gram: Array, free: Sequence[int]) -> Array:
+    size = np.sqrt(np.maximum(np.diag(gram)[free], np.finfo(np.float64).tiny))
+    return gram[np.ix_(free, free)] / size[:, None] / size

@@ -1,0 +1,67 @@
+"""`Minute`: the last samples of a stream, and the scores of any model on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.chain import Chain, ChainState, ChainTangent
+from ...model.model import Model
+from ...online.change.score import ChangeScore, Scores, loop_heights
+from ...online.voltage_history import DriveHistory
+from ...online.warmup import chain_at
+
+Array = NDArray[np.float64]
+
+_PIECE = 8192
+"""Samples that are dealt with together."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Minute:
+    """The last samples of a stream, and what was driven before.
+
+    Parameters
+    ----------
+    drive : DriveHistory
+        Up to the newest sample.
+    displacement : (k,) ndarray
+        Measured in the last k samples of the drive [m].
+    offset : float
+        Sensor minus model at present [m].
+    """
+
+    drive: DriveHistory
+    displacement: Array
+    offset: float
+
+    def scores(self, model: Model, offset: float) -> list[ChangeScore]:
+        """Scores of the samples under a model that is `offset` [m] away from the sensor."""
+        drive, loop = self.drive, loop_heights(model)
+        first = drive.full.size - self.displacement.size
+        chain, state, tangent = _brought_up(model, drive, first, loop)
+        scores, counted = Scores(chain, state, loop, tangent), list[ChangeScore]()
+        for start in range(0, self.displacement.size, _PIECE):
+            voltage = np.ascontiguousarray(drive.full[first + start : first + start + _PIECE])
+            y, state = chain.run(voltage, state)
+            counted += scores.add(voltage, self.displacement[start : start + _PIECE] - y - offset, 0)
+        return counted
+
+
+def _brought_up(
+    model: Model, drive: DriveHistory, first: int, loop: dict[str, float]
+) -> tuple[Chain, ChainState, ChainTangent]:
+    """Chain, state and sensitivities of a model before sample `first` of the full part of a drive."""
+    fast = chain_at(model, drive.sample_period)
+    chain = model.at(drive.slow_period) if drive.slow.size else fast
+    state = chain.rest(drive.rest_voltage, drive.start_time)
+    tangent = chain.rest_tangent(drive.rest_voltage, loop)
+    for running, voltage in ((chain, drive.slow), (fast, drive.full[:first])):
+        if running is not chain:
+            state, tangent, chain = running.resume(state), running.resume_tangent(state, tangent), running
+        for start in range(0, voltage.size, _PIECE):
+            part = np.ascontiguousarray(voltage[start : start + _PIECE])
+            _, _, _, state, tangent = running.linearise(part, state, tangent, loop)
+    return fast, state, tangent

@@ -1,0 +1,69 @@
+"""Groups of the change watch as numbers of a model: which one a recalibration begins with, and the changed model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import IdentificationError
+from ...model.model import Model
+from ...online.change.score import loop_heights
+from .signatures import shaped_model
+
+Array = NDArray[np.float64]
+
+FULL = "only a full identification will do"
+"""Said where a few numbers will not do."""
+
+
+def group_to_fit(groups: Sequence[str]) -> str:
+    """The group that a recalibration begins with.
+
+    Parameters
+    ----------
+    groups : sequence of str
+        Groups that the watch reports: the best one, and those that the drive cannot distinguish from it.
+
+    Raises
+    ------
+    IdentificationError
+        If there is none, or it is not known which one.
+    """
+    if not groups:
+        raise IdentificationError("no group of parameters is known to have changed; nothing to recalibrate")
+    if set(groups) == {"slow", "offset"}:
+        return "offset"  # should it go on, the watch reports it again
+    if len(groups) > 1:
+        raise IdentificationError(
+            f"the present drive cannot distinguish {' and '.join(groups)}; drive the stage at another frequency too, "
+            f"or {FULL}"
+        )
+    if groups[0] == "slow":
+        raise IdentificationError(f"a slow change has no number of its own in the model; {FULL}")
+    return groups[0]
+
+
+def changed_by(model: Model, change: Array) -> Model:
+    """A model after a change of its groups: relative gain and loop height, and lag [s].
+
+    Parameters
+    ----------
+    model : Model
+        Before the change.
+    change : (5,) ndarray
+        In the order of the groups of the watch; slow and offset are no numbers of a model.
+
+    Raises
+    ------
+    ParameterError
+        If a number leaves its bounds.
+    """
+    gain, loop, lag, *_ = change.tolist()
+    if loop:
+        model = model.with_values({n: (1.0 + loop) * v for n, v in loop_heights(model).items()})
+    if lag:
+        model = shaped_model(model, "delay", lag)
+    return replace(model, displacement_scale=(1.0 + gain) * model.displacement_scale) if gain else model

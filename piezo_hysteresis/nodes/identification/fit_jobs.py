@@ -1,0 +1,31 @@
+"""What the identification node has fitted in another process: a model, or what is missing in one. No ROS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...discrepancy.diagnose import diagnose
+from ...errors import IdentificationError
+from ...identification.identify import identify
+from ...model.model_file import dumps, loads
+from ...recording import read
+from ...report.json_file import write_json
+from ..runtime.fit_process import Outcome, Report
+
+
+def identification(path: Path, model: str, report: Report) -> Outcome:
+    """Identify the model of a recorded experiment; the model so far does not count."""
+    found = identify(read(path), progress=report)
+    verdict = f"free-run error {found.free_run_percent:.3g} % of range ({found.free_run_error * 1e9:.3g} nm)"
+    return Outcome(dumps(found.model), str(found), verdict)
+
+
+def diagnosis(path: Path, model: str, report: Report) -> Outcome:
+    """Diagnose the present model, or a new one if there is none, and extend it; writes ``answer.json``."""
+    found = diagnose(read(path), loads(model) if model else None, progress=report)
+    folder = path if path.is_dir() else path.parent
+    model_file = "" if found.model is None else str(folder / "diagnosis.yaml")
+    write_json(str(folder / "answer.json"), found.answer(model_file))
+    if found.model is None:
+        raise IdentificationError(found.reason)
+    return Outcome(dumps(found.model), found.summary(), f"{found.verdict}: {found.reason}")

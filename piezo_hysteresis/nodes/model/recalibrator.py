@@ -1,0 +1,218 @@
+"""`Recalibrator`: `~/recalibrate` of a model node: fits the group that moved to the last minute, swaps the model."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from ...acquisition.sample_block import SampleBlock
+from ...discrepancy.changes.minute import Minute
+from ...discrepancy.changes.moved_group import group_to_fit
+from ...discrepancy.changes.recalibration_history import Recalibrations, write_numbers
+from ...errors import IdentificationError, PiezoError, RecordingError
+from ...model.model import Model
+from ...model.model_file import dumps, loads, save
+from ...model.model_parameters import model_hash
+from ...online.change.watch import baseline_path
+from ...online.prediction import Prediction
+from ...online.predictor import Predictor
+from ...online.recent_displacement import RecentDisplacement
+from ..runtime.fit_process import FitProcess
+from ..runtime.sending import send
+from ..topics import advertise
+from .change_reporter import ChangeReporter
+from .recalibration_job import RecalibrationOutcome, recalibration, write_task
+
+_TICK = 0.1
+"""Time between two looks at the fit [s]."""
+
+_SHOWN = 100
+"""Newest lines of the history that are published."""
+
+Swap = Callable[[Model, float | None], None]
+"""Takes the new model and its offset [m], None where that has to be averaged anew."""
+
+
+class Recalibrator:
+    """Keeps the last minute of displacement, and the history of what was recalibrated.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        The model node.
+    changes : ChangeReporter
+        Its change watch.
+    swap : callable
+        Lets a model take over.
+    """
+
+    def __init__(self, node: Node, changes: ChangeReporter, swap: Swap) -> None:
+        self._node, self._changes, self._swap = node, changes, swap
+        self._recent: RecentDisplacement | None = None
+        self._predictor: Predictor | None = None
+        self._fit: _Fit | None = None
+        self._history: Recalibrations | None = None
+        self._table = advertise(node, "recalibrations")
+        self._models = advertise(node, "recalibrated_model")
+        try:
+            self._history = Recalibrations(changes.folder)
+        except RecordingError as error:
+            node.get_logger().warning(f"no history of recalibrations: {error}")
+        self._publish()
+        node.create_service(Trigger, "~/plan_recalibration", self._on_plan)
+        node.create_service(Trigger, "~/recalibrate", self._on_recalibrate)
+        node.create_timer(_TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def end(self) -> None:
+        """Give up a fit that is under way."""
+        if self._fit is not None:
+            self._fit.close()
+            self._fit = None
+
+    def add(self, block: SampleBlock, answer: Prediction, predictor: Predictor) -> None:
+        """Keep the displacement of a block that `answer` predicts, while there is a baseline to fit it to."""
+        if predictor is not self._predictor or self._recent is None:
+            self._predictor, self._recent = predictor, RecentDisplacement(predictor.sample_period)
+        if answer.warming_up or self._changes.watch.baseline is None:
+            self._recent.clear()
+        else:
+            self._recent.add(int(block.index[0]), np.asarray(block.displacement))
+
+    def _group(self) -> str:
+        """The group to fit; IdentificationError with what stands against a recalibration."""
+        watch = self._changes.watch
+        if self._fit is not None:
+            raise IdentificationError("a recalibration is under way; wait")
+        if watch.baseline is None:
+            raise IdentificationError("no baseline; call ~/baseline while the stage is known to be good")
+        if not watch.since:
+            raise IdentificationError("no change since the baseline; nothing to recalibrate")
+        return group_to_fit(watch.groups)
+
+    def _on_plan(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            group = self._group()
+        except PiezoError as error:
+            response.message = str(error)
+            return response
+        response.success = True
+        response.message = (
+            f"{group} has changed: fits it, and the zero of the sensor, to the last minute of samples, and replaces "
+            "the model if the residual is back at that of the baseline. The stage does not move."
+        )
+        return response
+
+    def _on_recalibrate(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            group = self._group()
+        except PiezoError as error:
+            response.message = str(error)
+            return response
+        watch, predictor, recent = self._changes.watch, self._predictor, self._recent
+        model = None if predictor is None else predictor.model
+        if predictor is None or recent is None or model is None or watch.baseline is None:
+            response.message = "no prediction yet: start the driver and give a model first"
+            return response
+        minute = Minute(predictor.drive, recent.copy(), predictor.offset)
+        statistic = watch.change.statistic
+
+        def write(folder: Path) -> None:
+            assert watch.baseline is not None
+            write_task(folder, minute, watch.baseline, group, self._changes.interval, statistic)
+
+        self._fit = _Fit(write, model, predictor, predictor.offset)
+        self._changes.report_recalibration(f"fitting {group}")
+        response.success = True
+        response.message = f"fitting {group} to the last {minute.displacement.size * predictor.sample_period:.0f} s"
+        return response
+
+    def _tick(self) -> None:
+        fit = self._fit
+        if fit is None:
+            return
+        try:
+            outcome = fit.poll()
+            if outcome is None:
+                return
+            self.end()
+            self._apply(fit, outcome)
+        except PiezoError as error:
+            self.end()
+            self._node.get_logger().warning(f"recalibration: {error}")
+            self._changes.report_recalibration(f"refused: {error}")
+
+    def _apply(self, fit: _Fit, outcome: RecalibrationOutcome) -> None:
+        if self._predictor is not fit.predictor or fit.predictor.model is not fit.model:
+            raise IdentificationError("another model or another stream has taken over meanwhile; nothing was changed")
+        model, baseline = loads(outcome.model), self._changes.watch.baseline
+        if baseline is None:
+            raise IdentificationError("the baseline has gone meanwhile; nothing was changed")
+        is_new = model_hash(model) != model_hash(fit.model)
+        folder, problem = self._changes.folder, ""
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            baseline.of_model(model_hash(model)).save(baseline_path(folder, model))
+            if is_new:
+                save(model, folder / f"recalibrated_{model_hash(model).partition(':')[2]}.yaml")
+            if self._history is not None:
+                self._history.add(outcome.numbers)
+        except (OSError, PiezoError) as error:
+            problem = f"; not kept: {error}"
+        self._changes.adopt(model, baseline.of_model(model_hash(model)))
+        self._swap(model, outcome.offset if fit.predictor.offset == fit.offset else None)
+        if is_new:
+            send(self._models, String(data=dumps(model)))
+        self._publish()
+        for line in (outcome.verdict, *outcome.summary.splitlines()):
+            self._node.get_logger().info(line)
+        self._changes.report_recalibration(f"{outcome.verdict}; {'; '.join(outcome.summary.splitlines())}{problem}")
+
+    def _publish(self) -> None:
+        if self._history is not None:
+            send(self._table, String(data=write_numbers(self._history.numbers[-_SHOWN:])))
+
+
+class _Fit:
+    """A fit: its data are written by a thread, so that the stream is not held up, then its process runs."""
+
+    def __init__(self, write: Callable[[Path], None], model: Model, predictor: Predictor, offset: float) -> None:
+        self.model, self.predictor, self.offset = model, predictor, offset
+        self._folder = tempfile.TemporaryDirectory(prefix="piezo_recalibration_", ignore_cleanup_errors=True)
+        self._process: FitProcess | None = None
+        self._failure: OSError | None = None
+
+        def prepare() -> None:
+            try:
+                write(Path(self._folder.name))
+            except OSError as error:
+                self._failure = error
+
+        self._thread = threading.Thread(target=prepare, name="recalibration", daemon=True)
+        self._thread.start()
+
+    def poll(self) -> RecalibrationOutcome | None:
+        """The outcome, or None while the fit goes on; IdentificationError with the reason why there is none."""
+        if self._thread.is_alive():
+            return None
+        if self._failure is not None:
+            raise IdentificationError(f"the samples cannot be written ({self._failure.strerror}); is the disk full?")
+        if self._process is None:
+            self._process = FitProcess(recalibration, Path(self._folder.name), dumps(self.model))
+        outcome = self._process.poll()
+        assert outcome is None or isinstance(outcome, RecalibrationOutcome)
+        return outcome
+
+    def close(self) -> None:
+        """End the fit, finished or not."""
+        self._thread.join()
+        if self._process is not None:
+            self._process.close()
+        self._folder.cleanup()

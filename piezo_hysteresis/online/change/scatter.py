@@ -1,0 +1,158 @@
+"""`Scatter`: how the scores of an unchanged stage vary under one class of drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .false_alarm_threshold import WINDOW
+from .score import GROUPS, ChangeScore
+
+Array = NDArray[np.float64]
+
+DISTINCT = 1e-6
+"""Smallest part of a row of sensitivities, after the offset is taken out, that counts as excited."""
+
+SLOWEST_DECAY = 0.98
+"""Factor from score to score with which a correlation falls at least: 5 s."""
+
+FEWEST_WINDOWS = 4
+"""Windows of one class from which it is known whether the misfit drifts."""
+
+SMALLEST_ROOT = 1e-5
+"""Directions of a slope whose root is smaller than this, over the largest one, say nothing."""
+
+_TINY = float(np.finfo(np.float64).tiny)
+"""Smallest number that is divided by."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Scatter:
+    """Scores of one class of drive.
+
+    The scores of a slow drive differ from block to block, because their slopes M do. Divided by the root of M, they
+    have the same scatter in every block where the residual is white, and nearly so where it is not.
+
+    Parameters
+    ----------
+    count : int
+        Number of scores.
+    misfit : (5,) ndarray
+        Change of the groups that explains the mean score: structured misfit of the model under this drive. It does not
+        count as change.
+    precision : (5, 5) ndarray
+        Inverse of the covariance of the scores over the roots of their slopes, in units of `scale`; rows and columns
+        of groups that are not excited are zero.
+    slope : (5, 5) ndarray
+        Mean of `ChangeScore.slope`.
+    memory : (2, 5) ndarray
+        Correlation of what successive scores say of each group, and the factor by which it falls with every further
+        score.
+    wander : (5,) ndarray
+        Variance of every group's change from one window of the watch to the next, beyond what the scatter explains:
+        structured misfit that drifts.
+    power : float
+        Mean square of the residual about its mean [m²].
+    """
+
+    count: int
+    misfit: Array
+    precision: Array
+    slope: Array
+    memory: Array
+    wander: Array
+    power: float
+
+    @property
+    def excited(self) -> NDArray[np.bool_]:
+        """Groups that the drive excites, shape (5,)."""
+        return np.diag(self.precision) > 0.0
+
+    @property
+    def scale(self) -> Array:
+        """Root of the mean slope of every group, shape (5,); 1 where it is zero."""
+        return _scale(self.slope)
+
+    def pull(self, score: ChangeScore) -> tuple[Array, Array]:
+        """What a score says of the groups: the gradient of its log likelihood (5,), and the information in it (5, 5).
+
+        The gradient is zero on average while nothing changes, and information times θ after a change θ.
+        """
+        root, inverse = _roots(score.slope, self.scale, np.flatnonzero(self.excited))
+        weighting = root @ self.precision @ inverse
+        return weighting @ (score.value - score.slope @ self.misfit), weighting @ score.slope
+
+    def inflation(self, longest: int) -> Array:
+        """Variance of the sum of 1, 2, … `longest` scores over that of as many independent ones, shape (longest, 5)."""
+        lag = np.arange(1, longest)[:, None]
+        correlation = self.memory[0] * self.memory[1] ** (lag - 1)
+        total, first = (np.vstack((np.zeros((1, 5)), np.cumsum(c, axis=0))) for c in (correlation, lag * correlation))
+        return 1.0 + 2.0 * (total - first / np.arange(1, longest + 1)[:, None])
+
+    @classmethod
+    def of(cls, scores: Sequence[ChangeScore]) -> Scatter:
+        """Scatter of the scores of one class."""
+        slope = np.mean([s.slope for s in scores], axis=0)
+        scale, offset = _scale(slope), GROUPS.index("offset")
+        apart = np.diag(slope) - slope[:, offset] ** 2 / slope[offset, offset]
+        kept = np.flatnonzero((apart > DISTINCT**2 * np.diag(slope)) | (np.arange(len(GROUPS)) == offset))
+        misfit = np.zeros(len(GROUPS))
+        inner = np.linalg.pinv((slope / scale[:, None] / scale)[np.ix_(kept, kept)], rcond=1e-10, hermitian=True)
+        misfit[kept] = inner @ (np.mean([s.value for s in scores], axis=0) / scale)[kept] / scale[kept]
+        even = [_roots(s.slope, scale, kept)[1] @ (s.value - s.slope @ misfit) for s in scores]
+        covariance = np.atleast_2d(np.cov(np.array(even)[:, kept], rowvar=False))
+        precision = np.zeros_like(slope)
+        biased = (len(scores) - kept.size - 2) / (len(scores) - 1)  # mean of the inverse of a Wishart matrix
+        precision[np.ix_(kept, kept)] = biased * np.linalg.pinv(covariance, rcond=1e-10, hermitian=True)
+        none = np.zeros((2, len(GROUPS)))
+        bare = cls(len(scores), misfit, precision, slope, none, none[0], residual_power(scores))
+        said = [bare.pull(score) for score in scores]
+        pulls, weights = np.array([p for p, _ in said]), np.array([np.diag(w) for _, w in said])
+        known = replace(bare, memory=_memory(pulls / np.sqrt(np.maximum(weights, _TINY))))
+        return replace(known, wander=_wander(pulls, weights, known.inflation(WINDOW)[-1]))
+
+
+def residual_power(scores: Sequence[ChangeScore]) -> float:
+    """Mean square of the residual of several blocks about its mean [m²]."""
+    return float(np.mean([s.power for s in scores]) - np.mean([s.offset for s in scores]) ** 2)
+
+
+def _scale(slope: Array) -> Array:
+    size = np.sqrt(np.diag(slope))
+    return np.where(size > 0.0, size, 1.0)
+
+
+def _roots(slope: Array, scale: Array, kept: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Root of a slope, times the scale, and its inverse; both (5, 5), zero outside the rows that are kept."""
+    values, vectors = np.linalg.eigh((slope / scale[:, None] / scale)[np.ix_(kept, kept)])
+    size = np.sqrt(np.maximum(values, 0.0))
+    there = size > SMALLEST_ROOT * size.max(initial=_TINY)
+    root, inverse = np.zeros_like(slope), np.zeros_like(slope)
+    inner = np.ix_(kept, kept)
+    root[inner] = scale[kept][:, None] * ((vectors * np.where(there, size, 0.0)) @ vectors.T)
+    inverse[inner] = ((vectors * np.where(there, 1.0 / np.where(there, size, 1.0), 0.0)) @ vectors.T) / scale[kept]
+    return root, inverse
+
+
+def _memory(said: Array) -> Array:
+    """`Scatter.memory` of a series (n, 5); correlations within two standard errors of zero are none."""
+    power = np.maximum((said**2).mean(axis=0), _TINY)
+    one, two = ((said[lag:] * said[:-lag]).mean(axis=0) / power for lag in (1, 2))
+    first = np.where(one > 2.0 / np.sqrt(len(said)), np.minimum(one, 1.0), 0.0)
+    decay = np.clip(two / np.where(first > 0.0, first, 1.0), 0.0, SLOWEST_DECAY)
+    return np.vstack((first, np.where(first > 0.0, decay, 0.0)))
+
+
+def _wander(pulls: Array, weights: Array, inflation: Array) -> Array:
+    """`Scatter.wander` of what every score says (n, 5), and the information in it; 0 where it is within the scatter."""
+    windows = len(pulls) // WINDOW
+    if windows < FEWEST_WINDOWS:
+        return np.zeros(len(GROUPS))
+    pull, weight = (x[: windows * WINDOW].reshape(windows, WINDOW, -1).sum(axis=1) for x in (pulls, weights))
+    seen = (weight > 0.0).all(axis=0)
+    weight = np.where(seen, weight, 1.0)
+    expected = (inflation / weight).mean(axis=0) * (1.0 + 2.0 * np.sqrt(2.0 / (windows - 1)))
+    return np.where(seen, np.maximum(0.0, np.var(pull / weight, axis=0, ddof=1) - expected), 0.0)

@@ -1,0 +1,52 @@
+"""`RecentDisplacement`: the measured displacement of the last minute, for fitting a model to it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .voltage_history import FULL_SAMPLES
+
+Array = NDArray[np.float64]
+
+DURATION = 60.0
+"""Time that is kept [s]; less where this is more than `FULL_SAMPLES`."""
+
+
+class RecentDisplacement:
+    """A ring of samples that follow one another without a gap.
+
+    Parameters
+    ----------
+    sample_period : float
+        Time between samples [s].
+    """
+
+    def __init__(self, sample_period: float) -> None:
+        self.sample_period = sample_period
+        self._ring = np.empty(max(1, min(round(DURATION / sample_period), FULL_SAMPLES)))
+        self._next: int | None = None
+        self._end = self._filled = 0
+
+    def add(self, index: int, displacement: Array) -> None:
+        """Add a block of samples [m], the first of which has a running number modulo 2^32; after a gap, begin anew."""
+        if index != self._next:
+            self.clear()
+        self._next = (index + displacement.size) % 2**32
+        newest = displacement[-self._ring.size :]
+        ahead = min(newest.size, self._ring.size - self._end)
+        self._ring[self._end : self._end + ahead] = newest[:ahead]
+        self._ring[: newest.size - ahead] = newest[ahead:]
+        self._end = (self._end + newest.size) % self._ring.size
+        self._filled = min(self._filled + newest.size, self._ring.size)
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._next, self._end, self._filled = None, 0, 0
+
+    def copy(self) -> Array:
+        """All samples that are kept, the oldest first [m]."""
+        start = self._end - self._filled
+        if start < 0:
+            return np.concatenate((self._ring[start:], self._ring[: self._end]))
+        return self._ring[start : self._end].copy()

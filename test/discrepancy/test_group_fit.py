@@ -1,0 +1,146 @@
+"""Recalibration of a group on the last minute: closed changes come back, and others are refused with what will do."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.discrepancy.changes.group_fit import fit_groups
+from piezo_hysteresis.discrepancy.changes.minute import Minute
+from piezo_hysteresis.discrepancy.changes.moved_group import changed_by, group_to_fit
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.errors import IdentificationError
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.online.change.score import GROUPS
+from piezo_hysteresis.online.change.watch import ChangeWatch
+from piezo_hysteresis.online.predictor import Predictor
+from piezo_hysteresis.online.recent_displacement import RecentDisplacement
+
+PERIOD, BLOCK, NOISE = 2e-3, 50, 2e-9
+MODEL = Model((BoucWen(), Arx(a=(-0.6,), b=(0.2,), delay=2.0)), PERIOD, displacement_scale=1e-5)
+SECONDS, CHANGED = 104.0, 74.0
+INTERVAL = 3600.0
+
+
+def drive():
+    time = PERIOD * np.arange(round(SECONDS / PERIOD))
+    return (
+        3.5 + 2.5 * np.sin(2 * np.pi * 11.0 * time) * (time > 0.2) + 0.5 * np.sin(2 * np.pi * 0.7 * time) * (time > 0.2)
+    )
+
+
+def run(model):
+    u = drive()
+    return model.run(u, model.rest(u[0]))[0]
+
+
+def stream(changed, noise=NOISE, seed=0, changed_at=CHANGED):
+    """Watch, predictor and recent samples after a stream that becomes `changed` after some time."""
+    u = drive()
+    y = np.where(PERIOD * np.arange(u.size) < changed_at, run(MODEL), changed)
+    y = y + noise * np.random.default_rng(seed).standard_normal(u.size)
+    predictor, watch, recent = Predictor(PERIOD, MODEL), ChangeWatch(INTERVAL), RecentDisplacement(PERIOD)
+    for first in range(0, u.size, BLOCK):
+        part = slice(first, first + BLOCK)
+        if first * PERIOD == 2.0:
+            watch.take_baseline(60.0)
+        answer = predictor.predict(first, round(first * PERIOD * 1e9), u[part], y[part])
+        watch.add(u[part], answer, predictor, round((first + BLOCK) * PERIOD * 1e9))
+        recent.add(first, y[part])
+    return watch, predictor, recent
+
+
+def fit(changed, **options):
+    watch, predictor, recent = stream(changed, **options)
+    assert watch.since
+    minute = Minute(predictor.drive, recent.copy(), predictor.offset)
+    return fit_groups(MODEL, minute, watch.baseline, group_to_fit(watch.change.groups), INTERVAL), predictor
+
+
+@pytest.mark.parametrize(
+    ("group", "size"), [("gain", 0.004), ("gain", -0.05), ("loop", 0.03), ("dynamics", 2e-5), ("dynamics", 1.5e-3)]
+)
+def test_a_change_comes_back_within_its_interval_and_the_residual_with_it(group, size):
+    true = np.zeros(5)
+    true[GROUPS.index(group)] = size
+    found, _ = fit(run(changed_by(MODEL, true)))
+    k = GROUPS.index(group)
+    assert found.groups == (group,)
+    assert abs(found.change[k] - size) < 4 * found.deviation[k]
+    assert found.deviation[k] < 0.2 * abs(size)
+    assert found.after < 1.1 * found.floor < found.before
+
+
+def test_the_new_model_takes_over_with_the_offset_that_was_fitted_beside_it():
+    """A gain also moves the stage where it rested: the zero that was taken there does not fit the new model."""
+    changed = 1.01 * run(MODEL)
+    found, predictor = fit(changed)
+    predictor.swap(found.model, found.offset)
+    u, first = drive()[:BLOCK], round(SECONDS / PERIOD)
+    for k in range(20):
+        answer = predictor.predict(first + k * BLOCK, round((first + k * BLOCK) * PERIOD * 1e9), u, np.zeros(BLOCK))
+    assert answer.model is found.model
+    assert predictor.offset == found.offset == pytest.approx(0.0, abs=3e-10)
+    assert 0.01 * run(MODEL)[0] > 1e-8
+
+
+def test_an_offset_that_moved_beside_a_gain_is_found():
+    found, _ = fit(1.01 * run(MODEL) + 5e-8)
+    assert set(found.groups) == {"offset", "gain"}
+    assert found.change[0] == pytest.approx(0.01, rel=0.02)
+    assert found.offset == pytest.approx(5e-8, rel=0.02)
+
+
+def test_of_two_groups_that_moved_both_are_fitted():
+    true = np.zeros(5)
+    true[GROUPS.index("gain")], true[GROUPS.index("dynamics")] = 0.01, 2e-4
+    found, _ = fit(run(changed_by(MODEL, true)))
+    assert set(found.groups) == {"gain", "dynamics"}
+    for group in found.groups:
+        k = GROUPS.index(group)
+        assert abs(found.change[k] - true[k]) < 4 * found.deviation[k]
+
+
+def test_intervals_cover_as_often_as_they_say():
+    true = np.zeros(5)
+    true[GROUPS.index("gain")] = 0.004
+    changed, errors = run(changed_by(MODEL, true)), []
+    for seed in range(6):
+        found, _ = fit(changed, seed=seed)
+        errors.append((found.change[0] - 0.004) / found.deviation[0])
+    assert np.count_nonzero(np.abs(errors) < 1.96) >= 4
+    assert 0.3 < np.sqrt(np.mean(np.square(errors))) < 2.0
+
+
+def test_another_shape_needs_a_full_identification():
+    other = MODEL.with_values({"arx.a[0]": -0.9, "arx.b[0]": 0.05})
+    with pytest.raises(IdentificationError, match="full identification"):
+        fit(run(other))
+
+
+@pytest.mark.parametrize(
+    ("groups", "reason"),
+    [
+        (("slow",), "slow.*full identification"),
+        (("gain", "slow"), "cannot distinguish gain and slow"),
+        ((), "nothing to recalibrate"),
+    ],
+)
+def test_what_no_number_of_the_model_stands_for_is_refused(groups, reason):
+    with pytest.raises(IdentificationError, match=reason):
+        group_to_fit(groups)
+
+
+def test_right_after_the_change_there_are_too_few_samples():
+    watch, predictor, recent = stream(1.01 * run(MODEL), changed_at=SECONDS - 0.5)
+    minute = Minute(predictor.drive, recent.copy(), predictor.offset)
+    with pytest.raises(IdentificationError, match="try again later"):
+        fit_groups(MODEL, minute, watch.baseline, "gain", INTERVAL)
+
+
+def test_the_ring_holds_the_newest_samples_in_order_and_begins_anew_after_a_gap():
+    recent = RecentDisplacement(1.0)
+    values = np.arange(200.0)
+    for first in range(0, 200, 7):
+        recent.add(first, values[first : first + 7])
+    np.testing.assert_array_equal(recent.copy(), values[-60:])
+    recent.add(250, values[:5])
+    np.testing.assert_array_equal(recent.copy(), values[:5])

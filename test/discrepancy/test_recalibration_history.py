@@ -1,0 +1,55 @@
+"""The history of recalibrations: what is written comes back, grows, and is drawn; what is no history is refused."""
+
+from dataclasses import replace
+
+import pytest
+
+from piezo_hysteresis.cli.main import main
+from piezo_hysteresis.discrepancy.changes.recalibration_history import (
+    FILE,
+    RecalibratedNumber,
+    Recalibrations,
+    read_numbers,
+    write_numbers,
+)
+from piezo_hysteresis.errors import RecordingError
+from piezo_hysteresis.report.recalibrations import recalibrations
+
+GAIN = RecalibratedNumber(
+    "2026-11-20T10:00:00Z", "gain", "displacement_scale", "m", 1e-5, 1.02e-5, 1.019e-5, 1.021e-5, 7.5,
+    2e-8, 2e-9, 1.9e-9, 30.0, "sha256:1", "sha256:2",
+)  # fmt: skip
+LAG = replace(
+    GAIN, time="2026-11-21T10:00:00Z", group="dynamics", parameter="arx.delay", unit="samples", old=1.0, new=1.5
+)
+
+
+def test_the_table_grows_in_its_file_and_is_read_back(tmp_path):
+    Recalibrations(tmp_path / "axis").add([GAIN])
+    history = Recalibrations(tmp_path / "axis")
+    history.add([LAG])
+    assert Recalibrations(tmp_path / "axis").numbers == (GAIN, LAG)
+    assert len((tmp_path / "axis" / FILE).read_text().splitlines()) == 3
+
+
+@pytest.mark.parametrize("text", ["", "time,group\n", write_numbers([GAIN]).replace("1.02e-05", "nan"), "\x00"])
+def test_a_file_that_is_no_history_is_refused_in_one_line(text):
+    with pytest.raises(RecordingError, match="expected") as refused:
+        read_numbers(text, "a file")
+    assert "\n" not in str(refused.value)
+
+
+def test_every_number_has_a_panel_that_begins_with_its_old_value():
+    drawing = recalibrations([GAIN, LAG])
+    labels = [axis.get_ylabel() for axis in drawing.figure.axes]
+    assert labels[:2] == ["displacement_scale [m]", "arx.delay [samples]"]
+    assert drawing.figure.axes[0].lines[0].get_ydata().tolist() == [1e-5, 1.02e-5]
+    assert "arx.delay from 1 to 1.5" in drawing.alternative
+
+
+def test_the_command_prints_the_table_and_draws_it(tmp_path, capsys):
+    Recalibrations(tmp_path).add([GAIN, LAG])
+    assert main(["history", str(tmp_path), "-o", str(tmp_path / "history.png")]) == 0
+    assert "displacement_scale" in capsys.readouterr().out
+    assert (tmp_path / "history.png").stat().st_size > 10_000
+    assert main(["history", str(tmp_path / "none")]) == 2
