@@ -1,7 +1,7 @@
 """A measured piezo that was driven through another inverse: what ours would have commanded, and the error it predicts.
 
 The record Test of picma-p885 holds, in rows 11152 to 12151, a path that was driven through the authors' inverse. Our
-model is identified from the record Model, runs over Test up to that row, and is turned round from the state it is then
+model is identified from the record Model, runs over Test up to that row, and is inverted from the state it is then
 in. No stage is at hand: the error of ours is a prediction, that of theirs a measurement.
 """
 

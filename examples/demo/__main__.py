@@ -78,7 +78,7 @@ class Demo:
         processes.start("identification_node", protocol=protocol, experiment_root=self.folder / "experiments")
         processes.start(
             "compensation_node",
-            approximate=True,  # whatever is hidden: what cannot be turned round is in the expected error
+            approximate=True,  # whatever is hidden: what cannot be inverted is in the expected error
             approach=scan.APPROACH,
             way_back=scan.APPROACH,
             learning_rounds=scan.ROUNDS,

@@ -1,4 +1,4 @@
-"""The end of the demo: the same scan with a linear gain, with each model turned round, and after learning.
+"""The end of the demo: the same scan with a linear gain, with the inverse of each model, and after learning.
 
 The compensation node plans and plays; this side only sends the path in metres and reads what the sensor says.
 """

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     PiezoError
-        On a model or a path that cannot be read, or a chain that cannot be turned round.
+        On a model or a path that cannot be read, or a chain that cannot be inverted.
     """
     require_new_results(args)
     model = model_file.load(args.model)

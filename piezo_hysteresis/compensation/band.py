@@ -11,21 +11,21 @@ from ..blocks.arx import arx_row, difference_equation, padded
 from ..blocks.block import State
 from ..c_form import CForm
 from ..errors import ModelError
-from .turned_block import TurnedBlock
+from .inverted_block import InvertedBlock
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Low-pass of linear phase: 1 up to `passed`, a raised cosine down to 0 at `stopped`.
+    """Low-pass filter of linear phase: its gain is 1 up to `passed` and falls to 0 at `stopped`, as a raised cosine.
 
     Parameters
     ----------
     passed, stopped : float
         Frequencies [Hz].
     length : float
-        Duration of its impulse response, half of which is preview [s].
+        Duration of its impulse response [s]; the filter looks ahead by half of it.
 
     Raises
     ------
@@ -43,7 +43,7 @@ class Band:
 
     @classmethod
     def of(cls, sample_period: float) -> Band:
-        """The usual band for a sample period [s]: 2 to 5 kHz at 50 kHz, the same shares at another rate."""
+        """Default band for a sample period [s]: 2 kHz to 5 kHz at 50 kHz sampling, in proportion at other rates."""
         rate = 1.0 / sample_period
         return cls(0.04 * rate, 0.1 * rate, 200.0 * sample_period)
 
@@ -65,8 +65,8 @@ class Band:
         return BandFilter(self.taps(sample_period))
 
 
-class BandFilter(TurnedBlock):
-    """A symmetric filter that looks half its length ahead."""
+class BandFilter(InvertedBlock):
+    """A symmetric filter; its output needs the input up to half its length ahead."""
 
     def __init__(self, taps: Array) -> None:
         self.preview, self.is_exact = taps.size // 2, False

@@ -21,12 +21,12 @@ class ExpectedError:
     Parameters
     ----------
     planned : float
-        What the plan itself leaves: band, limits, effects that were left out or are approximate.
+        Error that the plan itself leaves, because of the band, the limits, and effects left out or inverted
+        approximately [m].
     free_run : float or None
-        Free-run error of the model on data that were not fitted; None where the model file does not state it.
+        Free-run error of the model on data that were not fitted [m]; None where the model file does not state it.
     parameters : float or None
-        Spread by the uncertainty of the numbers; None where it does not state
-        their covariance.
+        Error from the uncertainty of the parameters [m]; None where the model file states no covariance.
     """
 
     planned: float
@@ -35,12 +35,12 @@ class ExpectedError:
 
     @property
     def total(self) -> float:
-        """Root of the sum of squares [m]. The free-run error holds the parameters' part already."""
+        """Root of the sum of squares [m]. The free-run error already includes the error from the parameters."""
         model = self.free_run if self.free_run is not None else self.parameters or 0.0
         return float(np.hypot(self.planned, model))
 
     def as_dict(self) -> Mapping[str, float | None]:
-        """For machines, in metres."""
+        """The numbers by name for JSON [m]."""
         return {
             "planned_m": self.planned,
             "free_run_m": self.free_run,
@@ -50,7 +50,7 @@ class ExpectedError:
 
 
 def free_run_error(model: Model) -> float | None:
-    """What the model file states [m]; None where it states nothing that is a number."""
+    """Free-run error that the model file states [m]; None where it states no number."""
     try:
         value = float(model.provenance["free_run_error"])
     except (KeyError, ValueError):

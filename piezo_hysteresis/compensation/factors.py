@@ -1,4 +1,4 @@
-"""Factors of a numerator by where its zeros lie: inside the unit circle, outside, or too near to it for either."""
+"""Factors of a numerator by the position of its zeros: inside the unit circle, outside, or too close to it."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from scipy.linalg import convolution_matrix
 Array = NDArray[np.float64]
 
 NEGLIGIBLE = 1e-14
-"""Coefficients below this share of the largest are rounding."""
+"""Coefficients below this share of the largest one are rounding errors."""
 
 INSIDE = 1.0 - 1e-6
-"""Zeros of a smaller radius are inverted by a recursion, however long it rings."""
+"""Zeros of a smaller radius are inverted by a recursion, even if its response decays slowly."""
 
 LONGEST = 2048
-"""Taps of a preview filter at most."""
+"""Largest number of taps of a preview filter."""
 
 ROUNDING = 1e-15
-"""Taps of a preview filter below this share of their sum are left away."""
+"""Taps at the end of a preview filter are dropped if together they are below this share of the sum of all taps."""
 
 NEAREST = float(np.exp(-np.log(ROUNDING) / LONGEST))
-"""Zeros of a larger radius are inverted by preview; between `INSIDE` and this the inverse is approximate."""
+"""Zeros of a larger radius are inverted by preview; between `INSIDE` and this radius the inverse is approximate."""
 
 ORDER = 8
-"""Terms by which the gain of a zero at the unit circle is made up for."""
+"""Number of terms of the series that corrects the gain of a zero at the unit circle."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,9 +37,9 @@ class Factors:
     Parameters
     ----------
     delay : int
-        Whole samples.
+        Delay in whole samples.
     inside, outside, near : ndarray
-        Polynomials in z⁻¹; `inside` carries the factor of the whole.
+        Polynomials in z⁻¹; `inside` also contains the constant factor of B.
     """
 
     delay: int
@@ -68,7 +68,7 @@ def factors(numerator: Array) -> Factors:
 
 
 def _polished(b: Array, p: Array, q: Array) -> tuple[Array, Array]:
-    """Factors p and q of b, q beginning with 1, by Newton steps: roots of long polynomials are found roughly."""
+    """Improve the factors p and q of b by Newton steps, with q[0] = 1. Roots of long polynomials are not accurate."""
     for _ in range(3):
         missing = b - np.convolve(p, q)
         by_p = convolution_matrix(q, p.size)
@@ -80,12 +80,12 @@ def _polished(b: Array, p: Array, q: Array) -> tuple[Array, Array]:
 
 
 def preview_taps(outside: Array) -> tuple[int, Array]:
-    """1/outside as a filter that looks ahead.
+    """1/outside as a filter that uses future samples.
 
     Returns
     -------
     preview : int
-        Samples that it looks ahead.
+        Number of future samples that it uses.
     taps : (k,) ndarray
         y_i = Σ_q taps_q x_(i + preview − q).
     """
@@ -93,16 +93,16 @@ def preview_taps(outside: Array) -> tuple[int, Array]:
     if order == 0:
         return 0, 1.0 / outside
     taps = scipy.signal.lfilter([1.0], outside[::-1] / outside[-1], np.eye(1, LONGEST + order)[0]) / outside[-1]
-    # from the tail: what is left away may not add up to more than rounding
+    # summed from the tail, because the dropped taps together must stay below rounding
     left = np.cumsum(np.abs(taps[::-1]))[::-1]
     count = max(1, int((left > ROUNDING * left[0]).sum()))
     return order + count - 1, taps[:count][::-1].copy()
 
 
 def zero_phase_taps(near: Array) -> tuple[int, Array]:
-    """1/near, for zeros at the unit circle: zero-phase tracking (Tomizuka 1987) with the gain made up to `ORDER`.
+    """1/near, for zeros at the unit circle: zero-phase tracking (Tomizuka 1987) with `ORDER` terms of gain correction.
 
-    near(z⁻¹) is divided out by near(z)/|near|², and 1/|near|² is a series about its value at dc.
+    1/near(z⁻¹) is near(z)/|near|², and 1/|near|² is expanded in a series about its value at dc.
     """
     order = near.size - 1
     if order == 0:

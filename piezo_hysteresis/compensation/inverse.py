@@ -28,7 +28,7 @@ from ..errors import ModelError
 from ..model.chain import Chain, ChainState
 from ..model.model import Model
 from ..model.samples import samples
-from . import turned_block as t
+from . import inverted_block as t
 from .band import Band
 from .limits import Limits
 from .nonlinear_part import KINDS, NonlinearPart, RecursionState
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class InverseState:
-    """What an inverse carries from one block of samples to the next."""
+    """State of an inverse between two blocks of samples."""
 
     stages: tuple[State, ...]
     nonlinear: RecursionState
@@ -53,27 +53,27 @@ class Inverse:
     Parameters
     ----------
     model : Model
-        What the stage does.
+        Model of the stage.
     limits : Limits, optional
-        Of the drive; they act inside the recursion. Default none.
+        Limits of the drive; they act inside the recursion. Default: no limits.
     band : Band, optional
-        Low-pass that the wanted displacement passes first. Default none: what is wanted above the band of the stage
-        asks for any voltage.
+        Low-pass filter of the wanted displacement. Default: no filter, so that fast parts of the path may need voltages
+        of any size.
     approximate : bool
-        Leave out effects that cannot be turned round instead of refusing the chain.
+        Leave out effects that cannot be inverted instead of refusing the model.
 
     Attributes
     ----------
     preview : int
-        Samples by which u is late: the wanted displacement must be known so far ahead.
+        Number of samples by which the wanted displacement must be known ahead.
     is_exact : bool
         False where an effect was left out or has an approximate inverse.
     left_out : tuple of str
         Effects that have no inverse and were left out.
     not_on_path : tuple of str
-        Effects that the drive has no part in.
+        Effects that the drive voltage does not influence.
     noise_gain : float
-        How much rounding of the wanted displacement may grow on the way to the drive, as a share.
+        Largest factor by which rounding errors of the wanted displacement grow on the way to the drive.
 
     Raises
     ------
@@ -100,8 +100,8 @@ class Inverse:
         impossible = [e.name for e in model.effects if e.invertibility is Invertibility.IMPOSSIBLE and not e.is_off]
         if impossible and not approximate:
             raise ModelError(
-                f"{', '.join(impossible)}: cannot be turned round; expected a chain without it, or approximate=True to "
-                "leave it out and see the error that is predicted"
+                f"{', '.join(impossible)}: cannot be inverted; expected a model without it, or approximate=True, which "
+                "leaves it out and predicts the resulting error"
             )
         self.model, self.limits, self.left_out = model, limits or Limits(), tuple(impossible)
         self.sample_period = model.sample_period
@@ -118,15 +118,15 @@ class Inverse:
         self._nonlinear = NonlinearPart(blocks[: self._nonlinear_end], self.limits, self.sample_period)
         after = list(zip(labels, blocks, strict=True))[self._nonlinear_end :]
         own = [(self._nonlinear_end + k, _stage(b, label)) for k, (label, b) in enumerate(after)]
-        turned: list[tuple[int | None, t.TurnedBlock]] = [(k, stage) for k, stage in own[::-1] if stage is not None]
+        inverted: list[tuple[int | None, t.InvertedBlock]] = [(k, stage) for k, stage in own[::-1] if stage is not None]
         if band is not None:
-            turned.insert(0, (None, band.stage(self.sample_period)))
-        self._stages = turned
-        previews = [stage.preview for _, stage in turned]
+            inverted.insert(0, (None, band.stage(self.sample_period)))
+        self._stages = inverted
+        previews = [stage.preview for _, stage in inverted]
         self._ahead = [sum(previews[k + 1 :]) for k in range(len(previews))]
         self.preview = sum(previews)
-        self.is_exact = not impossible and all(stage.is_exact for _, stage in turned)
-        self.noise_gain = float(np.prod([stage.noise_gain for _, stage in turned]))
+        self.is_exact = not impossible and all(stage.is_exact for _, stage in inverted)
+        self.noise_gain = float(np.prod([stage.noise_gain for _, stage in inverted]))
 
     @property
     def preview_time(self) -> float:
@@ -138,7 +138,7 @@ class Inverse:
         return self.resume(self.chain.rest(voltage, time))
 
     def resume(self, state: ChainState) -> InverseState:
-        """State of a stage whose model, without what was left out, is in `state`; dynamics count as settled."""
+        """State of the inverse for a stage whose model is in `state`; the dynamics are taken as settled."""
         end = self._nonlinear_end
         inputs: list[float] = []
         own: list[State] = []
@@ -164,7 +164,7 @@ class Inverse:
         Parameters
         ----------
         wanted : (n,) array_like
-            Displacement [m]; u_i drives towards the sample `preview` before.
+            Displacement [m]; its sample i is reached by the drive sample i + `preview` of the output.
         state : InverseState
             From `rest`, or from the block before.
 
@@ -185,13 +185,13 @@ class Inverse:
     def command(self, wanted: ArrayLike, state: InverseState) -> tuple[Array, InverseState]:
         """Drive voltage (n + preview,) [V] for a whole path (n,) [m], which is held at its end.
 
-        The stage is at the first sample of the path `preview` samples after the first of the drive.
+        The stage reaches the first sample of the path `preview` samples after the first sample of the drive.
         """
         path = samples(wanted, "displacement")
         return self.run(np.append(path, np.full(self.preview, path[-1])), state)
 
     def c_forms(self) -> dict[str, tuple[int | None, CForm | str]]:
-        """C code of every stage in order, by name, with the number of the block of the chain that it turns round.
+        """C code of every stage in order, by name, with the number of the block of the chain that it inverts.
 
         None is the band, which settles at the displacement; the last, of number 0, is all before the dynamics.
         """
@@ -204,15 +204,15 @@ class Inverse:
 
 
 def _end_of_nonlinear_part(blocks: Sequence[Block], scale: int) -> int:
-    """Number of the first block behind drive, hysteresis and creep."""
+    """Index of the first block after drive, hysteresis and creep."""
     return next(
         (k for k, b in enumerate(blocks) if k > scale and (isinstance(b, ChangeOfUnit) or not isinstance(b, KINDS))),
         len(blocks),
     )
 
 
-def _stage(block: Block, label: str) -> t.TurnedBlock | None:
-    """The block turned round; None where nothing is to be done.
+def _stage(block: Block, label: str) -> t.InvertedBlock | None:
+    """The inverse of a block; None if the drive voltage does not influence it.
 
     Raises
     ------
@@ -222,17 +222,17 @@ def _stage(block: Block, label: str) -> t.TurnedBlock | None:
     if isinstance(block, ChannelBlock | MainsHumBlock):
         return None
     if isinstance(block, ArxBlock | FirBlock | LowPassBlock | ModeBlock):
-        return t.TurnedLinear(block, block.sections(), label)
+        return t.InvertedLinear(block, block.sections(), label)
     if isinstance(block, SoftenedArxBlock) and isinstance(block.path, WholePath):
-        return t.TurnedSoftening(block, label)
+        return t.InvertedSoftening(block, label)
     if isinstance(block, ChangeOfUnit):
-        return t.TurnedFactor(block.factor)
+        return t.InvertedFactor(block.factor)
     if isinstance(block, SensorNonlinearityBlock):
-        return t.TurnedCubic(block)
+        return t.InvertedCubic(block)
     if isinstance(block, GainDriftBlock):
-        return t.TurnedGainDrift(block)
+        return t.InvertedGainDrift(block)
     if isinstance(block, TimeBlock):
-        return t.TurnedAddition(block)
+        return t.InvertedAddition(block)
     if isinstance(block, OffsetBlock):
-        return t.TurnedOffset(block)
-    raise ModelError(f"{label}: {type(block).__name__} has no inverse, expected one of those that compensation knows")
+        return t.InvertedOffset(block)
+    raise ModelError(f"{label}: {type(block).__name__} has no inverse; expected a block that compensation can invert")

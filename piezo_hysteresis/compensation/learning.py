@@ -19,7 +19,7 @@ from .plan import Plan, plan
 Array = NDArray[np.float64]
 
 AT_NOISE = 1.1
-"""Measured error over noise, rms in the band of learning, below which the rest is noise."""
+"""Ratio of the RMS error in the band of learning to the noise, below which the error counts as noise."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -29,13 +29,13 @@ class LearningRound:
     Parameters
     ----------
     plan : Plan
-        What was played.
+        Plan that was played.
     measured : (n,) ndarray
         Displacement along the path [m].
     rms : float
-        Error along the path, noise included [m].
+        RMS error along the path, including the noise [m].
     expected : float
-        What was predicted for this round before it was played [m].
+        RMS error that was predicted before the round [m].
     """
 
     plan: Plan
@@ -45,7 +45,7 @@ class LearningRound:
 
 
 def default_filter(model: Model) -> LearningFilter:
-    """Up to 1.2 kHz at 50 kHz sampling, the same share at another rate; less where the response is not that sure."""
+    """Filter up to 1.2 kHz at 50 kHz sampling, in proportion at other rates; narrower if G is too uncertain."""
     rate = 1.0 / model.sample_period
     check = ResponseCheck.of(model, np.geomspace(1e-5 * rate, 0.06 * rate, 60))
     return LearningFilter(model.sample_period, 0.024 * rate, 0.06 * rate, check=check)
@@ -54,21 +54,21 @@ def default_filter(model: Model) -> LearningFilter:
 class IterativeLearning:
     """Corrects the reference of a path by the measured error, round by round.
 
-    The correction goes through the inverse of the model, as the path itself does: hysteresis, creep and dynamics are
-    known already, and a round need only remove what the model misses.
+    The corrected reference passes the inverse of the model, as the path itself does. So the inverse takes care of
+    hysteresis, creep and dynamics, and a round only removes errors of the model.
 
     Parameters
     ----------
     model : Model
-        What the stage does, as far as is known.
+        Model of the stage.
     first : Plan
-        Of the path.
+        First plan of the path.
     limits : Limits
         Of the drive.
     filter : LearningFilter, optional
         Default: `default_filter`.
     noise : float
-        Rms of the sensor noise [m]. Rounds stop there.
+        RMS sensor noise [m]. Learning ends when the error has reached it.
     approximate : bool
         As for `plan`.
     """
@@ -89,7 +89,7 @@ class IterativeLearning:
         self.model, self.limits, self.noise, self.approximate = model, limits, noise, approximate
         self.wanted = first.wanted
         self.next: Plan | None = first
-        """What is to be played next; None once `reason` says why not."""
+        """Plan to play next; None when learning has ended, for the reason in `reason`."""
         self.reason = ""
         self.rounds: list[LearningRound] = []
         self._reference = first.wanted.copy()
@@ -101,19 +101,19 @@ class IterativeLearning:
         return min(self.rounds, key=lambda r: r.rms)
 
     def update(self, measured: Array, start: ChainState | None = None) -> Plan | None:
-        """Take in what `next` gave, and plan another round if it is predicted to be better.
+        """Store the measurement of the plan `next`, and plan another round if it is predicted to be better.
 
         Parameters
         ----------
         measured : (m,) ndarray
-            Displacement [m], sample by sample beside the drive of `next`.
+            Displacement at every sample of the drive of `next` [m].
         start : ChainState, optional
-            State of the model before the round to come; default at rest, as for `plan`.
+            State of the model before the next round. Default: at rest, as for `plan`.
 
         Raises
         ------
         ModelError
-            On another number of samples, or where no round is left.
+            If the number of samples is another one, or learning has ended.
         """
         if self.next is None:
             raise ModelError(f"learning: has ended ({self.reason}), expected no more measurements")
@@ -152,7 +152,7 @@ class IterativeLearning:
         self.next, self.reason = None, reason
 
     def _share_of_band(self) -> float:
-        """Share of white noise, rms, that lies in the band of the filter."""
+        """RMS share of white noise inside the band of the filter."""
         frequency = np.linspace(0.0, 0.5 / self.model.sample_period, 1000)
         return float(np.sqrt(np.mean(self.filter.at(frequency) > 0.0)))
 
@@ -168,7 +168,7 @@ def learn(learning: IterativeLearning, play: Callable[[Array], Array], rounds: i
         Plays a drive (m,) [V] on the stage, settled at the voltage of the plan's start, and returns the displacement
         (m,) [m].
     rounds : int
-        Corrections at most.
+        Largest number of corrections.
     """
     for _ in range(rounds + 1):
         if learning.next is None:

@@ -1,4 +1,4 @@
-"""`LearningFilter`: the share of the error that a round corrects, by frequency."""
+"""`LearningFilter`: the share of the error that a round of learning corrects, as a function of frequency."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ Array = NDArray[np.float64]
 Response = NDArray[np.complex128]
 
 STEP = 1e-3
-"""Step of a number in units of its standard error, for the slope of the response."""
+"""Step of a parameter for the numerical derivative of the response, in units of its standard error."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ResponseCheck:
-    """Measured response of the stage over that of the model, with its uncertainty.
+    """Ratio of the measured frequency response of the stage to that of the model, with its uncertainty.
 
     Parameters
     ----------
     frequency : (k,) ndarray
-        Rising [Hz].
+        Rising frequencies [Hz].
     ratio : (k,) complex ndarray
         Ĝ/G.
     deviation : (k,) ndarray
@@ -42,19 +42,19 @@ class ResponseCheck:
 
     @classmethod
     def of(cls, model: Model, frequency: Array) -> ResponseCheck | None:
-        """Of the identified response of the dynamics: the ratio is 1, its deviation follows from the covariance.
+        """Check from the identified dynamics: the ratio is 1, and its deviation follows from the covariance.
 
         Parameters
         ----------
         model : Model
-            As identified.
+            Identified model.
         frequency : (k,) ndarray
-            Rising, below half the sample rate [Hz].
+            Rising frequencies below half the sampling rate [Hz].
 
         Returns
         -------
         ResponseCheck or None
-            None where the model states no covariance of its numbers.
+            None if the model states no covariance of its parameters.
         """
         known = model.covariance
         if known is None:
@@ -72,10 +72,10 @@ class ResponseCheck:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LearningFilter:
-    """Gain of the correction by frequency.
+    """Gain of the correction as a function of frequency.
 
     A round turns the error E into (1 − L R) E, with R the response of stage and inverse together. The error shrinks
-    where |1 − L R| < 1; the gain L falls to zero where that is not sure by two standard deviations.
+    where |1 − L R| < 1. The gain L falls to zero where this does not hold with two standard deviations of margin.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class LearningFilter:
     gain : float
         Largest gain, above 0 and at most 1.
     check : ResponseCheck, optional
-        Of the identified response; default: it is taken as right.
+        Uncertainty of the identified response. Default: the response is taken as exact.
     margin : float
         |1 − L R| with two standard deviations must stay below 1 − margin · L.
 
@@ -111,7 +111,7 @@ class LearningFilter:
             )
         if not self.at(np.linspace(0.0, self.stopped, 200)).any():
             raise ModelError(
-                "learning: convergence is sure at no frequency; identify the response of the stage better first"
+                "learning: convergence is not certain at any frequency; first identify the dynamics more accurately"
             )
 
     def at(self, frequency: Array) -> Array:
@@ -122,7 +122,7 @@ class LearningFilter:
         return np.asarray(np.where(self._factor(f, gain) <= 1.0 - self.margin * gain, gain, 0.0))
 
     def factor(self, frequency: Array) -> Array:
-        """Bound of |1 − L R| at frequencies [Hz]: by how much at most an error is multiplied in a round."""
+        """Upper bound of |1 − L R| at frequencies [Hz]: the largest factor by which a round multiplies the error."""
         return self._factor(np.asarray(frequency, dtype=np.float64), self.at(frequency))
 
     def _factor(self, f: Array, gain: Array) -> Array:
@@ -134,26 +134,26 @@ class LearningFilter:
         return np.asarray(np.abs(1.0 - gain * ratio) + 2.0 * gain * spread)
 
     def correct(self, error: Array, noise: float) -> tuple[Array, float, float]:
-        """Correction for an error, and what a round is predicted to leave.
+        """Correction for an error, and the error that is predicted after the round.
 
         Parameters
         ----------
         error : (n,) ndarray
-            Wanted − measured along the path [m].
+            Wanted minus measured displacement along the path [m].
         noise : float
-            Rms of the sensor noise, taken as white [m].
+            RMS sensor noise, taken as white [m].
 
         Returns
         -------
         correction : (n,) ndarray
             To be added to the reference [m].
         left : float
-            Rms of the error predicted after the round, without the noise of that measurement [m].
+            RMS error predicted after the round, without measurement noise [m].
         now : float
-            Rms of the present error without noise, in the band of the filter [m].
+            RMS of the present error in the band of the filter, without noise [m].
         """
         n = error.size
-        whole = np.concatenate((error, error[::-1]))  # mirrored, so that a path that does not close leaves no step
+        whole = np.concatenate((error, error[::-1]))  # mirrored: no step where it repeats
         size = whole.size
         spectrum = np.fft.rfft(whole)
         gain = self.at(np.asarray(np.fft.rfftfreq(size, self.sample_period), dtype=np.float64))
@@ -163,7 +163,7 @@ class LearningFilter:
         known = np.maximum(0.0, 1.0 - 3.0 * floor / np.maximum(smooth, 1e-300)) if floor > 0.0 else np.ones(power.size)
         weight = gain * known
         correction = np.fft.irfft(weight * spectrum, size)[:n]
-        signal = power - floor  # also below zero: the sum over noise alone shall be zero
+        signal = power - floor  # negative terms are kept, so that the sum over pure noise is zero on average
         in_band = gain > 0.0
         left = max(0.0, np.sum(((1.0 - weight) ** 2 * signal + weight**2 * np.minimum(floor, power))[in_band]))
         now = max(0.0, np.sum(signal[in_band]))

@@ -18,13 +18,13 @@ from .reachability import NearestPath, Reachability, UnreachablePart
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-4
-"""Share of the path's range below which a deviation is none."""
+"""Deviations below this share of the range of the path count as zero."""
 
 STEPS = 8
-"""Halvings in the search for the nearest path, after the first trial that works."""
+"""Number of bisection steps in the search for the nearest path, after the first trial that works."""
 
 FIRST_TRIALS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 0.99)
-"""Shares of the largest change that are tried first."""
+"""First trials of the search, as shares of the largest change."""
 
 
 def reachable(
@@ -42,9 +42,9 @@ def reachable(
     Parameters
     ----------
     model : Model
-        What the stage does.
+        Model of the stage.
     limits : Limits
-        Of the drive.
+        Limits of the drive.
     wanted : (n,) array_like
         Displacement at the model's sample period [m].
     start : ChainState, optional
@@ -52,7 +52,7 @@ def reachable(
     band, approximate
         As for `Inverse`.
     search : bool
-        Look for the nearest path, too.
+        Also search for the nearest path that the limits allow.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def reachable(
 
 
 def _followed(inverse: Inverse, y: Array, state: ChainState) -> tuple[Array, Array]:
-    """Drive for a path, and what the model does under it while the path lasts."""
+    """Drive for a path, and the displacement that the model predicts for it during the path."""
     u, _ = inverse.command(y, inverse.resume(state))
     reached, _ = inverse.model.run(u, state)
     return u, reached[inverse.preview :]
@@ -135,7 +135,7 @@ def _nearest(
     at_start = float(model.run([state.inputs[0]], state)[0][0])
 
     def led(path: Array) -> Array:
-        """The path with a way from where the stage is."""
+        """The path, with an approach from the present position of the stage."""
         lead = max(1, round(0.05 / model.sample_period))
         rise = 0.5 - 0.5 * np.cos(np.pi * np.arange(lead) / lead)
         return np.concatenate((at_start + (path[0] - at_start) * rise, path))
@@ -155,7 +155,10 @@ def _nearest(
 
 
 def _smallest(works: Callable[[float], bool], most: float) -> float | None:
-    """Smallest change up to `most` that works; None where none of `FIRST_TRIALS` does. Too large a one may not."""
+    """Smallest change up to `most` that works, found by bisection; None if none of `FIRST_TRIALS` works.
+
+    A change that is larger than necessary may fail, too.
+    """
     tried = [0.0, *(most * share for share in FIRST_TRIALS)]
     found = next((k for k in range(1, len(tried)) if works(tried[k])), None)
     if found is None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..errors import StageError
 
 RESOLUTION = 5e-5
-"""Usual resolution of a plan, as a share of the range of the drive: 0.5 mV of 10 V."""
+"""Default resolution of a plan, as a share of the range of the drive: 0.5 mV for 10 V."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +22,9 @@ class Limits:
     max_slew_rate : float
         Steepest change between two samples [V/s].
     resolution : float
-        Changes behind the amplifier up to this do not turn a backlash round [V]. Turning it needs a jump by its whole
-        width; without a resolution, rounding errors of a path that stands still make the drive jump. Default 0: every
-        change turns it.
+        Voltage changes up to this size do not reverse a backlash [V]. A reversal needs a jump by the full width of the
+        backlash, and without a resolution the rounding errors of a constant path would cause such jumps. Default 0:
+        every change reverses it.
 
     Raises
     ------
@@ -50,6 +50,6 @@ class Limits:
 
     @property
     def resolved(self) -> Limits:
-        """The same with a resolution: that given, else `RESOLUTION` of a finite range."""
+        """The same limits with a resolution: the given one, or `RESOLUTION` times the range if the range is finite."""
         span = self.voltage_max - self.voltage_min
         return self if self.resolution or not math.isfinite(span) else replace(self, resolution=RESOLUTION * span)

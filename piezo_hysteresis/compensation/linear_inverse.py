@@ -15,11 +15,11 @@ Array = NDArray[np.float64]
 
 
 class LinearInverse:
-    """x from y = H x, `preview` samples late.
+    """Computes x from y = H x, `preview` samples later.
 
-    Zeros inside the unit circle become poles of a recursion, exactly, also slow ones. A zero outside and the delay
-    need the future: 1/(1 − z0 z⁻¹) = −Σ_(k ≥ 1) (z/z0)^k. Zeros at the circle are inverted by zero-phase tracking,
-    which is approximate.
+    Zeros inside the unit circle become poles of a recursion, which is exact. Zeros outside and the delay need future
+    samples: 1/(1 − z0 z⁻¹) = −Σ_(k ≥ 1) (z/z0)^k. Zeros at the unit circle are inverted by zero-phase tracking, which
+    is approximate.
 
     Parameters
     ----------
@@ -28,27 +28,27 @@ class LinearInverse:
     gain : float
         H(1) as the block uses it at rest.
     name : str
-        Effect, for messages.
+        Name of the effect, for messages.
 
     Attributes
     ----------
     preview : int
-        Samples of the wanted output that must be known ahead.
+        Number of future samples of y that must be known.
     is_exact : bool
-        False where a zero lies at the unit circle.
+        False if a zero lies at the unit circle.
     noise_gain : float
-        Σ |impulse response|: how much rounding and noise of y may grow.
+        Σ |impulse response|: the largest factor by which rounding errors and noise of y grow.
 
     Raises
     ------
     ModelError
-        If H blocks a constant.
+        If H(1) = 0, so that no constant input gives a constant output.
     """
 
     def __init__(self, section: Section, gain: float, name: str) -> None:
         numerator, denominator = section
         if gain == 0.0 or not np.any(numerator):
-            raise ModelError(f"{name}: passes no constant, so no drive holds a displacement; expected a gain at dc")
+            raise ModelError(f"{name}: its gain at dc is 0, so no voltage holds a displacement; expected a gain")
         parts = factors(numerator)
         ahead, taps = preview_taps(parts.outside)
         near, zero_phase = zero_phase_taps(parts.near)

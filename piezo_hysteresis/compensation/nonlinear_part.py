@@ -30,7 +30,7 @@ from .limits import Limits
 Array = NDArray[np.float64]
 
 RecursionState = tuple[Array, Array, Array, Array]
-"""Of drive and loop, plays, last inputs of the relaxations, relaxations."""
+"""State of drive and loop, of the plays, last inputs of the relaxations, and state of the relaxations."""
 
 KINDS = (
     AmplifierSaturationBlock,
@@ -46,13 +46,13 @@ KINDS = (
     CreepExponentialBlock,
     SumBlock,
 )
-"""Blocks that the recursion knows; a low-pass is one of them before the hysteresis only."""
+"""Blocks that the recursion can invert, in addition to a low-pass before the hysteresis."""
 
 LOOPS = (BoucWenBlock, PublishedBlock, HysteresisMemoryBlock, LevelDependentMemoryBlock)
 """Blocks with a static part of their own."""
 
 FARTHEST = 1e3
-"""Normalised drive beyond which no root is sought."""
+"""Largest normalised drive in which a root is searched."""
 
 
 class NonlinearPart:
@@ -61,7 +61,7 @@ class NonlinearPart:
     Parameters
     ----------
     blocks : sequence of Block
-        From the drive to the creep; sums of blocks taken apart.
+        Blocks from the drive to the creep; sums are split into their members.
     limits : Limits
         Of the drive.
     sample_period : float
@@ -121,10 +121,10 @@ class NonlinearPart:
             steps = np.array([pole.step for pole in block.poles]).reshape(-1, 3)
             banks.append((0.0, 1.0 - steps[:, 0], steps[:, 1], block.c))
         else:
-            raise ModelError(f"{type(block).__name__}: has no inverse, expected one of those that compensation knows")
+            raise ModelError(f"{type(block).__name__}: has no inverse; expected a block that compensation can invert")
 
     def _bracket(self) -> None:
-        """Where roots are sought: between the turning points of the static curve, inside the limits."""
+        """Set the interval in which roots are searched: between extrema of the static curve, inside the limits."""
         p1, p2, square, fourth = self.poly
         c, bends = self.weights
         slope = np.array([p2 + c.sum(), 2.0 * (square + c @ bends), 3.0 * p1, 4.0 * fourth])
@@ -149,7 +149,7 @@ class NonlinearPart:
         return starts, direct, fade, lead, weights, gains
 
     def start(self, inputs: Sequence[float], states: Sequence[State]) -> RecursionState:
-        """State of the recursion from the last inputs and the states of the blocks, sums taken apart."""
+        """State of the recursion from the last inputs and states of the blocks; sums are split into their members."""
         state, plays, lasts = np.zeros(8), np.zeros(self.radii.size), []
         banks: list[Array] = [np.zeros(0)]
         at = float(inputs[0])

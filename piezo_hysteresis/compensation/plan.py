@@ -1,4 +1,4 @@
-"""`Plan`: the drive for a path, whether the path is reachable, and the expected error. Nothing has moved yet."""
+"""`Plan`: the drive for a path, whether the path is reachable, and the expected error, before the stage moves."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ class Plan:
     wanted : (n,) ndarray
         The path [m].
     voltage : (m,) ndarray
-        Drive [V]: the way to the path, the preview, the path, the way back where it was asked for.
+        Drive [V]: the approach, the preview, the path, and the way back if there is one.
     predicted : (m,) ndarray
-        Displacement under the drive, by the whole model [m].
+        Displacement that the complete model predicts for the drive [m].
     begin : int
-        Sample of the drive at which the path begins.
+        Index of the drive sample at which the path begins.
     sample_period : float
         [s]
     reachability : Reachability
-        Of the way and the path; times from the start of the path.
+        Reachability of the approach and the path; times count from the start of the path.
     expected : ExpectedError
-        Along the path.
+        Expected error along the path.
     left_out, not_on_path : tuple of str
-        Effects that the inverse does not hold.
+        Effects that the inverse does not contain.
     preview : int
-        Samples by which the drive is ahead.
+        Number of samples by which the drive is ahead of the path.
     end : ChainState
         State of the model after the drive.
     """
@@ -74,12 +74,12 @@ class Plan:
 
     @property
     def range(self) -> float:
-        """Of the path [m]."""
+        """Range of the path [m]."""
         return float(np.ptp(self.wanted))
 
 
 def smooth_way(begin: float, end: float, count: int) -> Array:
-    """From one level to another without a kink, shape (count,); the first sample is `begin`."""
+    """Smooth transition between two levels, shape (count,); the first sample is `begin`."""
     return np.asarray(begin + (end - begin) * (0.5 - 0.5 * np.cos(np.pi * np.arange(count) / max(count, 1))))
 
 
@@ -108,27 +108,27 @@ def plan(
     Parameters
     ----------
     model : Model
-        What the stage does.
+        Model of the stage.
     wanted : (n,) array_like
         Displacement at the model's sample period [m].
     limits : Limits
-        Of the drive.
+        Limits of the drive.
     start : ChainState, optional
         State of the model now. Default: at rest at 0 V, or at the limit that is nearest to it.
     approach : float
-        Duration of the smooth way from where the stage is to the first sample of the path [s].
+        Duration of the smooth approach from the present position to the first sample of the path [s].
     way_back : float
-        Duration of the smooth way from the last voltage to that at which the drive began [s]; longer where the slew
-        limit asks for it. Default 0: the last voltage is held.
+        Duration of the smooth return to the voltage at which the drive began [s]; longer if the slew limit requires it.
+        Default 0: the last voltage is held.
     band : Band, optional
-        Low-pass of the path. Default `Band.of` the model's sample period.
+        Low-pass filter of the path. Default: `Band.of` the sample period of the model.
     approximate : bool
-        Leave out effects that cannot be turned round.
+        Leave out effects that cannot be inverted.
 
     Raises
     ------
     ModelError
-        On a path that is empty or not finite, or a chain that cannot be turned round.
+        If the path is empty or not finite, or the model cannot be inverted.
     """
     y, limits = samples(wanted, "displacement"), limits.resolved
     for name, duration in (("approach", approach), ("way_back", way_back)):

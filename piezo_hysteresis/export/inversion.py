@@ -20,7 +20,7 @@ class CInverse:
     forms : dict of str to CForm
         By name, in the order of the inverse; the first takes metres, the last returns volts.
     stages : dict of str to (int or None)
-        Number of the block of the chain that each turns round; None settles at the displacement.
+        Number of the block of the chain that each inverts; None settles at the displacement.
     preview : int
         Samples that must be known ahead.
     """

@@ -1,4 +1,4 @@
-"""`TurnedBlock`: inverse of one block between the creep and the sensor, from its output to its input."""
+"""`InvertedBlock`: inverse of one block between the creep and the sensor, from its output to its input."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .linear_inverse import LinearInverse
 Array = NDArray[np.float64]
 
 
-class TurnedBlock(ABC):
+class InvertedBlock(ABC):
     """The inverse of a block.
 
     Attributes
@@ -53,7 +53,7 @@ class TurnedBlock(ABC):
         return "has no C form of its inverse"
 
 
-class TurnedFactor(TurnedBlock):
+class InvertedFactor(InvertedBlock):
     """y = factor · x."""
 
     def __init__(self, factor: float) -> None:
@@ -66,7 +66,7 @@ class TurnedFactor(TurnedBlock):
         return CForm("return x / factor;", numbers={"factor": self.factor})
 
 
-class TurnedLinear(TurnedBlock):
+class InvertedLinear(InvertedBlock):
     """Inverse of sections of linear dynamics in series."""
 
     def __init__(self, block: Block, sections: Iterable[Section], name: str) -> None:
@@ -110,7 +110,7 @@ def force_for(x, x0, p, z, w):
         z[1], z[0] = z[0], moved
 
 
-class TurnedSoftening(TurnedBlock):
+class InvertedSoftening(InvertedBlock):
     """Inverse of a softened mode that drives the rest of G: first the rest, then the force on the mode."""
 
     def __init__(self, block: SoftenedArxBlock, name: str) -> None:
@@ -178,7 +178,7 @@ static double cubic_root(double y, double s2, double s3)
 """C function of `cubic_root`."""
 
 
-class TurnedCubic(TurnedBlock):
+class InvertedCubic(InvertedBlock):
     """y = x + s2 x² + s3 x³."""
 
     def __init__(self, block: SensorNonlinearityBlock) -> None:
@@ -203,7 +203,7 @@ def at_time(step: str, block: TimeBlock, ahead: int) -> CForm | str:
     return CForm(step, rest, {"ahead": float(ahead)}, parts={"forward": forward})
 
 
-class TurnedGainDrift(TurnedBlock):
+class InvertedGainDrift(InvertedBlock):
     """y = x · g(t)."""
 
     def __init__(self, block: GainDriftBlock) -> None:
@@ -216,7 +216,7 @@ class TurnedGainDrift(TurnedBlock):
         return at_time("return x / ME_forward_step(&s->forward, 1.0);", self.block, ahead)
 
 
-class TurnedAddition(TurnedBlock):
+class InvertedAddition(InvertedBlock):
     """y = x + d(t)."""
 
     def __init__(self, block: TimeBlock) -> None:
@@ -229,7 +229,7 @@ class TurnedAddition(TurnedBlock):
         return at_time("return x - ME_forward_step(&s->forward, 0.0);", self.block, ahead)
 
 
-class TurnedOffset(TurnedBlock):
+class InvertedOffset(InvertedBlock):
     """y = x + y0 + r x_rest."""
 
     def __init__(self, block: OffsetBlock) -> None:
