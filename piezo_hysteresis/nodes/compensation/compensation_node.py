@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, String
@@ -18,19 +19,21 @@ from ...model.model import Model
 from ...model.model_file import load, loads
 from ...online.warmup import compile_kernels
 from ..identification.driver_client import DriverClient
+from ..messages.conversions import values_of
 from ..messages.phase_text import phase_name
 from ..messages.samples import SampleReader
 from ..runtime.guarded_node import GuardedNode
+from ..runtime.job_actions import JobActions, by_service
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..runtime.sending import send
 from ..topics import advertise, subscribe
 from .applied_state import AppliedState, check_period
-from .path_runs import TICK, Job, PathRuns
+from .path_runs import TICK, Job, PathError, PathRuns
 from .set_point import SetPoint
 from .settings import COMPENSATION
-from .status import CompensationStatus
-from .trajectory import described, trajectory_from_cloud, why_not
+from .status import ENDED, CompensationStatus
+from .trajectory import described, trajectory_from_cloud, trajectory_to_cloud, why_not
 
 
 class CompensationNode(GuardedNode):
@@ -59,10 +62,13 @@ class CompensationNode(GuardedNode):
         subscribe(self, "set_displacement", self._on_set_displacement)
         for name, callback in (("plan", self._on_plan), ("learn", self._on_learn), ("stop", self._on_stop)):
             self.create_service(Trigger, f"~/{name}", callback)
+        self._actions = JobActions(self, {"track": self._on_goal}, by_service(self._on_stop), ENDED)
+        self._status.listener = self._on_status
         self.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def end(self) -> None:
         """Stop what is under way, while services still work."""
+        self._actions.end()
         if self._job is not None:
             self._give_up()
             asked = self._driver.stop()
@@ -99,7 +105,7 @@ class CompensationNode(GuardedNode):
             return
         self._set_point.measured(float(np.mean(block.displacement)), block.size)
 
-    def _on_trajectory(self, cloud: PointCloud2) -> None:
+    def _on_trajectory(self, cloud: PointCloud2) -> Trigger.Response:
         name = cloud.header.frame_id[:64]
         try:
             applied, limits = self._ready()
@@ -107,9 +113,17 @@ class CompensationNode(GuardedNode):
             wanted = trajectory_from_cloud(cloud, applied.sample_period, self._values["longest_trajectory"])
         except PiezoError as error:
             self._status.refuse(name, str(error))
-            return
+            return Trigger.Response(message=str(error))
         self._set_point.leave()
         self._begin(name, self._runs.follow(name, wanted, limits))
+        return Trigger.Response(success=True)
+
+    def _on_goal(self, goal: Any) -> Trigger.Response:
+        return self._on_trajectory(trajectory_to_cloud(goal.displacement, goal.phase, self.get_clock().now().to_msg()))
+
+    def _on_status(self, status: DiagnosticStatus) -> None:
+        if self._job is None or values_of(status)["state"] != "refused":  # another path was refused, not this one
+            self._actions.report(status)
 
     def _on_set_displacement(self, message: Float64) -> None:
         try:
@@ -172,7 +186,8 @@ class CompensationNode(GuardedNode):
             self._finish()
         except Exception as error:
             self._finish()
-            report = self._status.refuse if self._driver.state == "refused" else self._status.failed
+            refused = isinstance(error, PathError) or self._driver.state == "refused"
+            report = self._status.refuse if refused else self._status.failed
             report(self._phase, reason_of(error))
             if not isinstance(error, PiezoError):
                 raise

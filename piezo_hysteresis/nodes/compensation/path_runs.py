@@ -25,6 +25,10 @@ _STARTED_WITHIN = 20.0
 Job = Generator[None]
 
 
+class PathError(StageError):
+    """A path that cannot be had."""
+
+
 class PathRuns:
     """Jobs that go on by one step at every tick of the node.
 
@@ -90,14 +94,21 @@ class PathRuns:
         return future.result()
 
     def follow(self, name: str, wanted: np.ndarray, limits: Limits) -> Job:
-        """Plan a path and, where it can be had, play it."""
+        """Plan a path and play it.
+
+        Raises
+        ------
+        PathError
+            If a part of it cannot be had; nothing has moved.
+        StageError
+            If the driver refuses or stops it, or samples do not come.
+        """
         self._status.show("planning", f"{wanted.size} samples", name)
         yield from self._until(lambda: self._applied().is_ready, "the model to be run over what was applied")
         found: Plan = yield from self._in_thread(self._pool.submit(self.planned, wanted, limits))
         self.last = (name, found)
         if not found.reachability.is_whole:
-            self._status.refuse(name, why_not(found))
-            return
+            raise PathError(why_not(found))
         if not self._values["play"]:
             self._status.show("planned", described(found), name, expected=found.expected.total)
             return

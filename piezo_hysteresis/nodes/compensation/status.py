@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 
@@ -9,6 +11,9 @@ from ..messages.conversions import diagnostic
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
+
+ENDED = ("done", "planned", "refused", "failed", "stopped")
+"""States in which the job of a path has ended."""
 
 
 class CompensationStatus:
@@ -18,6 +23,11 @@ class CompensationStatus:
     ----------
     node : GuardedNode
         The compensation node; its full name stands before every status.
+
+    Attributes
+    ----------
+    listener : callable
+        Called with every status that is new.
     """
 
     def __init__(self, node: GuardedNode) -> None:
@@ -25,6 +35,7 @@ class CompensationStatus:
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: compensation"
         self._publisher = advertise(node, "status")
         self._diagnostics = advertise(node, DIAGNOSTICS)
+        self.listener: Callable[[DiagnosticStatus], None] = lambda status: None
         self.refused = 0
         self._shown = DiagnosticStatus()
         self.show("idle", "waiting for a model and a trajectory")
@@ -47,6 +58,7 @@ class CompensationStatus:
         if status != self._shown:
             self._shown = status
             send(self._publisher, status)
+            self.listener(status)
 
     def refuse(self, phase: str, reason: str) -> None:
         """Report that nothing moves, and why."""

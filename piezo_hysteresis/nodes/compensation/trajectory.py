@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from builtin_interfaces.msg import Time
+from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
 from ...compensation import Plan
 from ...errors import RecordError
-from ..messages.cloud import from_cloud
+from ..messages.cloud import from_cloud, to_cloud
 from ..messages.conversions import PERIOD_TOLERANCE
 
 Array = NDArray[np.float64]
@@ -36,6 +37,11 @@ def trajectory_from_cloud(cloud: PointCloud2, sample_period: float, longest: flo
             got = float(time[-1] - time[0]) / (time.size - 1)
             raise RecordError(f"trajectory: got a period of {got:g} s, expected {sample_period:g} s (the driver's)")
     return np.array(wanted, dtype=np.float64)
+
+
+def trajectory_to_cloud(displacement: ArrayLike, phase: str, stamp: Time) -> PointCloud2:
+    """The message of `trajectory` for a wanted displacement (n,) [m]."""
+    return to_cloud({"displacement": np.array(displacement, dtype=np.float64)}, {"displacement": "f8"}, stamp, phase)
 
 
 def described(plan: Plan) -> str:

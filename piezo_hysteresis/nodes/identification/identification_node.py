@@ -23,17 +23,17 @@ from ...model.model_parameters import PREFIX
 from ...recording.segmentation.decimation import save_decimation
 from ..runtime.fit_process import FitProcess, Job
 from ..runtime.guarded_node import GuardedNode
+from ..runtime.job_actions import JobActions, by_service
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..topics import QOS_OVERRIDES
 from .driver_client import DriverClient
 from .experiment_folder import ExperimentFolder
 from .fit_jobs import diagnosis, identification
-from .job_actions import JobActions
 from .protocol_runner import Progress, run_protocol
 from .served_model import ServedModel
 from .settings import IDENTIFICATION, PROTOCOLS
-from .status import IdentificationStatus
+from .status import ENDED, IdentificationStatus
 
 START = Model((HYSTERESIS(), Arx(), Offset()), 2e-5)
 """Declared, not valid, before there is a result."""
@@ -69,8 +69,8 @@ class IdentificationNode(GuardedNode):
             ("abort", self._on_abort),
         ):
             self.create_service(Trigger, f"~/{name}", callback)
-        begin = {"identify": self._on_identify, "diagnose": self._on_diagnose}
-        self._actions = JobActions(self, begin, self._on_abort, self._result)
+        begin = {"identify": by_service(self._on_identify), "diagnose": by_service(self._on_diagnose)}
+        self._actions = JobActions(self, begin, by_service(self._on_abort), ENDED, self._result)
         self._status.listener = self._actions.report
         self.create_timer(_TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 

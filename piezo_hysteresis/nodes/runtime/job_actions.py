@@ -1,10 +1,10 @@
-"""`JobActions`: `~/identify` and `~/diagnose` as actions, where the package of their types is installed."""
+"""`JobActions`: the long jobs of a node as actions, where the package of their types is installed."""
 
 from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -17,43 +17,48 @@ from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from ...errors import reason_of
 from ..messages.conversions import values_of
-from ..runtime.guarded_node import GuardedNode
-from .status import ENDED
+from .guarded_node import GuardedNode
 
 INTERFACES = "piezo_hysteresis_interfaces"
 """Package of the types: optional, built by colcon beside this one."""
 
+SUCCEEDED = ("done", "planned")
+"""States of a job that ended well."""
 _SUFFIX = "_actions"
 """After the name of the node: the name of the node that serves its actions."""
 
 
 class JobActions:
-    """Actions under the name of the identification node, on a node and threads of their own.
+    """Actions under the name of a node, on a node and threads of their own.
 
     A goal waits for the end of its job in one thread, while another one takes requests to cancel it. What touches the
-    job is done in the thread of the identification node.
+    job is done in the thread of the node itself.
 
     Parameters
     ----------
     node : GuardedNode
-        The identification node.
+        Whose jobs these are.
     begin : mapping
-        Name of the action to the callback of the service that does the same.
+        Name of the action to what begins the job of a goal; it answers as a service does.
     abort : callable
-        The callback of the service `~/abort`.
+        Ends the job under way.
+    ended : collection of str
+        States in which a job has ended; `SUCCEEDED` are those of a success.
     result : callable
-        Further fields of a result, by name, once a job has ended.
+        Further fields of a result, by name, once a job has succeeded.
     """
 
     def __init__(
         self,
         node: GuardedNode,
-        begin: Mapping[str, Callable[[Trigger.Request, Trigger.Response], Trigger.Response]],
-        abort: Callable[[Trigger.Request, Trigger.Response], Trigger.Response],
-        result: Callable[[], Mapping[str, str]],
+        begin: Mapping[str, Callable[[Any], Trigger.Response]],
+        abort: Callable[[], object],
+        ended: Collection[str],
+        result: Callable[[], Mapping[str, str]] = dict,
     ) -> None:
-        self._main, self._begin, self._abort, self._result = node, begin, abort, result
+        self._main, self._begin, self._abort, self._ended, self._result = node, begin, abort, ended, result
         self._goal: queue.SimpleQueue[Any] | None = None
         self._executor: MultiThreadedExecutor | None = None
         if find_spec(INTERFACES) is None:
@@ -63,7 +68,7 @@ class JobActions:
             f"{node.get_name()}{_SUFFIX}",
             context=node.context,
             namespace=node.get_namespace(),
-            use_global_arguments=False,  # they may rename the identification node
+            use_global_arguments=False,  # they may rename the node
             enable_rosout=False,
             start_parameter_services=False,
         )
@@ -85,7 +90,7 @@ class JobActions:
         """Pass a status of the job under way on to the goal that began it."""
         goal = self._goal
         if goal is not None:
-            if values_of(status)["state"] in ENDED:
+            if values_of(status)["state"] in self._ended:
                 self._goal = None
             goal.put(status)
 
@@ -96,7 +101,7 @@ class JobActions:
         """
         goal, self._goal = self._goal, None
         if goal is not None:
-            goal.put(Trigger.Response(message="the identification node ends"))
+            goal.put(Trigger.Response(message=f"{self._main.get_name()} ends"))
         executor, self._executor = self._executor, None
         if executor is not None:
             executor.shutdown(timeout_sec=1.0)
@@ -105,43 +110,54 @@ class JobActions:
     def _execute(self, name: str, kind: Any, handle: Any) -> Any:
         """Follow one goal to its end, in a thread of the actions; the result in the type of the action."""
         reports: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._in_main(lambda: self._start(name, reports))
+        self._in_main(lambda: self._start(name, handle.request, reports))
         while True:
             report = reports.get()
             if isinstance(report, Trigger.Response):
                 handle.abort()
                 return kind.Result(success=False, message=report.message)
-            values = values_of(report)
-            if values["state"] in ENDED:
+            values = {**values_of(report), "reason": report.message}
+            if values["state"] in self._ended:
                 break
-            handle.publish_feedback(
-                kind.Feedback(
-                    state=values["state"],
-                    phase=values["phase"],
-                    percent=float(values["percent"]),
-                    reason=report.message,
-                )
-            )
-        done = values["state"] == "done"
+            handle.publish_feedback(_filled(kind.Feedback, values))
+        done = values["state"] in SUCCEEDED
         if done:
             handle.succeed()
         elif handle.is_cancel_requested:
             handle.canceled()
         else:
             handle.abort()
-        fields = {key: text for key, text in self._result().items() if hasattr(kind.Result, key)} if done else {}
-        return kind.Result(success=done, message=report.message, experiment=values["experiment"], **fields)
+        result = _filled(kind.Result, {**values, **(self._result() if done else {})})
+        result.success, result.message = done, report.message
+        return result
 
-    def _start(self, name: str, reports: queue.SimpleQueue[Any]) -> None:
-        response = self._begin[name](Trigger.Request(), Trigger.Response())
+    def _start(self, name: str, goal: Any, reports: queue.SimpleQueue[Any]) -> None:
+        try:
+            response = self._begin[name](goal)
+        except Exception as error:
+            reports.put(Trigger.Response(message=reason_of(error)))
+            raise
         if response.success:
             self._goal = reports
         else:
             reports.put(response)
 
     def _cancel(self, handle: Any) -> CancelResponse:
-        self._in_main(lambda: self._abort(Trigger.Request(), Trigger.Response()))
+        self._in_main(self._abort)
         return CancelResponse.ACCEPT
 
     def _in_main(self, action: Callable[[], object]) -> None:
         self._main.executor.create_task(self._main.guarded(action))
+
+
+def by_service(
+    callback: Callable[[Trigger.Request, Trigger.Response], Trigger.Response],
+) -> Callable[..., Trigger.Response]:
+    """What the callback of a service does, for a goal whose fields do not matter."""
+    return lambda *goal: callback(Trigger.Request(), Trigger.Response())
+
+
+def _filled(kind: Any, values: Mapping[str, str]) -> Any:
+    """A message of this type from the values that have the name of a field."""
+    fields = {name: text for name, text in kind.get_fields_and_field_types().items() if name in values}
+    return kind(**{name: float(values[name]) if text == "double" else values[name] for name, text in fields.items()})
