@@ -60,6 +60,7 @@ setup(
         "zstandard",
     ],
     extras_require={
+        "fmu": ["fmpy"],
         "hardware": ["nidaqmx[grpc]"],
         "labview": ["npTDMS"],
         "notebook": ["jupyterlab", "jupytext", "pandas", "xarray"],

@@ -3,6 +3,9 @@
 The C files need a C99 compiler and nothing else: a header, a source, and a self-test that compares the source with the
 model. They hold the prediction and, where the model has one, the inverse with the limits of the drive inside. Every
 effect of the catalogue can be written. The program is right for the sample period of the model only.
+
+Co-simulation units (FMI 3.0) hold the same code for Simulink, Dymola, OpenModelica and others, with a library for this
+computer where it has a C compiler.
 """
 
 from __future__ import annotations
@@ -14,7 +17,8 @@ from pathlib import Path
 
 from ..compensation import Band, Inverse, Limits
 from ..errors import ModelError
-from ..export import c_program
+from ..export import c_program, fmus
+from ..export.fmu import compiler
 from ..export.inversion import inversion
 from ..model import model_file
 from ..model.model import Model
@@ -26,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Declare the subcommand."""
     parser = subparsers.add_parser("export", description=__doc__)
     parser.add_argument("model", metavar="MODEL", help="model file")
-    parser.add_argument("--to", choices=("c",), default="c", help="what to write (default: c)")
+    parser.add_argument("--to", choices=("c", "fmu"), default="c", help="what to write (default: c)")
     parser.add_argument("-o", "--output", metavar="FOLDER", required=True, help="folder of the files")
     parser.add_argument(
         "--name",
@@ -61,16 +65,20 @@ def run(args: argparse.Namespace) -> int:
     require_new_folder("-o", args.output, args.force)
     model = _load(args.model)
     inverse, why_not = _inverse(model, args)
-    _write(c_program(model, args.name, inverse), Path(args.output).expanduser())
+    files = (c_program if args.to == "c" else fmus)(model, args.name, inverse)
+    _write(files, Path(args.output).expanduser())
     out = console()
-    out.print(f"wrote {args.name}.h, {args.name}.c and {args.name}_test.c to {args.output}")
-    out.print(f"sample period: {model.sample_period:g} s; call {args.name}_step once in every such period")
+    out.print(f"wrote {', '.join(files)} to {args.output}")
+    out.print(f"sample period: {model.sample_period:g} s; the model takes one sample in every such period")
     if inverse is not None:
         ahead = f"{inverse.preview} samples ({inverse.preview_time:g} s)"
         out.print(f"inverse: the wanted displacement must be known {ahead} ahead")
     elif why_not:
         out.print(f"no inverse was written: {why_not}")
-    out.print(f"check: cc -std=c99 {args.name}_test.c {args.name}.c -lm -o {args.name}_test && ./{args.name}_test")
+    if args.to == "c":
+        out.print(f"check: cc -std=c99 {args.name}_test.c {args.name}.c -lm -o {args.name}_test && ./{args.name}_test")
+    elif compiler() is None:
+        out.print("no C compiler was found: the units hold sources only; install one, or name it in CC")
     return 0
 
 
@@ -94,12 +102,12 @@ def _load(path: str) -> Model:
     return model_file.load(path)
 
 
-def _write(files: Mapping[str, str], folder: Path) -> None:
+def _write(files: Mapping[str, str] | Mapping[str, bytes], folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, text in files.items():
+        for name, content in files.items():
             draft = folder / f"{name}.tmp"
-            draft.write_text(text, encoding="utf-8")
+            draft.write_bytes(content.encode() if isinstance(content, str) else content)
             draft.replace(folder / name)
     except OSError as error:
         raise ModelError(f"{folder}: cannot be written ({error.strerror or error})") from None

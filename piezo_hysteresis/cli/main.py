@@ -25,7 +25,7 @@ COMMANDS = {
     "validate": "compare a model with an experiment in free-run simulation",
     "diagnose": "find where a model is wrong and which effect is missing",
     "compensate": "compute the drive voltage for a wanted displacement",
-    "export": "write a model as C code for a microcontroller or other software",
+    "export": "write a model as C code or co-simulation unit (FMU)",
     "view": "show an experiment in the browser, with zoom",
     "report": "write one page about an experiment and its models",
     "import": "convert a recording of other software into an experiment",

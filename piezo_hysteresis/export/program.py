@@ -58,7 +58,7 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
         "name": name,
         "model": model,
         "version": __version__,
-        "hash": to_parameters(model)[f"{PREFIX}hash"],
+        "hash": model_hash(model),
         "channels": found.channels,
         "limit": RUNAWAY * model.displacement_scale,
         "has_state": [n for n, form in found.forms.items() if form.has_state],
@@ -88,6 +88,11 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
         values["library"] = c_text.library({**found.forms, **turned.forms})
     files = {f"{name}.h": "header.h.jinja", f"{name}.c": "source.c.jinja", f"{name}_test.c": "self_test.c.jinja"}
     return {file: templates().get_template(source).render(values) for file, source in files.items()}
+
+
+def model_hash(model: Model) -> str:
+    """Hash of everything but validity and provenance, as in the model file."""
+    return str(to_parameters(model)[f"{PREFIX}hash"])
 
 
 def _comment(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import zipfile
 
 import numpy as np
 import pytest
@@ -61,6 +62,24 @@ def test_a_model_without_an_inverse_is_written_without_it_and_says_so(piezo, tmp
     done = piezo("export", model, "-o", tmp_path / "c")
     assert done.status == 0 and "no inverse was written: softening_of_one_mode" in done.out
     assert "inverse" not in (tmp_path / "c" / "piezo.h").read_text()
+
+
+def test_co_simulation_units_are_written_and_kept(piezo, model, tmp_path):
+    words = ("export", model, "--to", "fmu", "-o", tmp_path / "units", "--name", "stage_x")
+    done = piezo(*words)
+    assert done.status == 0 and "wrote stage_x.fmu, stage_x_inverse.fmu" in done.out, done.err
+    with zipfile.ZipFile(tmp_path / "units" / "stage_x.fmu") as unit:
+        description = unit.read("modelDescription.xml").decode()
+    assert 'fmiVersion="3.0"' in description and 'fixedInternalStepSize="2e-05"' in description
+    assert piezo(*words).status == 2 and piezo(*words, "--force").status == 0
+
+
+def test_a_compiler_that_fails_is_told_in_one_line(piezo, model, tmp_path, monkeypatch):
+    (tmp_path / "broken").write_text("#!/bin/sh\necho no licence >&2\nexit 1\n")
+    (tmp_path / "broken").chmod(0o755)
+    monkeypatch.setenv("CC", str(tmp_path / "broken"))
+    refused = piezo("export", model, "--to", "fmu", "-o", tmp_path / "units")
+    assert refused.status == 2 and "no licence" in refused.err and len(refused.err.splitlines()) == 1
 
 
 def test_limits_and_band_of_the_inverse_are_those_that_were_asked_for(piezo, model, tmp_path):

@@ -1,0 +1,146 @@
+"""A model as FMI 3.0 co-simulation units (FMU): the C program, a description, and a library where a compiler is."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import __version__
+from ..compensation import Inverse
+from ..errors import ModelError
+from ..model.chain import RUNAWAY
+from ..model.model import Model
+from .prediction import prediction
+from .program import c_program, model_hash, templates
+
+UNITS = {"s": 's="1"', "V": 'kg="1" m="2" s="-3" A="-1"', "m": 'm="1"', "K": 'K="1"'}
+"""Units of the variables by their exponents of base units."""
+FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
+"""Options of the compiler."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Input or output of a unit: name, SI unit, meaning, and value before it is set."""
+
+    name: str
+    unit: str
+    meaning: str
+    start: float = 0.0
+
+
+VOLTAGE = Quantity("voltage", "V", "drive voltage before the amplifier")
+"""Input of the prediction, output of the inverse."""
+DISPLACEMENT = Quantity("displacement", "m", "displacement of the stage")
+"""Output of the prediction, input of the inverse."""
+CHANNELS = {
+    "other_displacement": Quantity("other_displacement", "m", "displacement of the other axis"),
+    "temperature": Quantity("temperature", "K", "temperature of the stage", 293.15),
+}
+"""Further measured inputs."""
+
+
+@dataclass(frozen=True, slots=True)
+class CoSimulation:
+    """What one unit computes.
+
+    Parameters
+    ----------
+    identifier : str
+        Name of the unit and of its library.
+    prefix : str
+        Of its functions in the C program: empty, or ``"inverse_"``.
+    token : str
+        By which an importer tells this unit from others.
+    description : str
+        One sentence.
+    inputs, output : tuple of Quantity, Quantity
+        In the order of the arguments of the C function, and what it returns.
+    limit : float
+        Outputs of this size mean that the model runs away.
+    """
+
+    identifier: str
+    prefix: str
+    token: str
+    description: str
+    inputs: tuple[Quantity, ...]
+    output: Quantity
+    limit: float
+
+
+def fmus(model: Model, name: str = "piezo", inverse: Inverse | None = None) -> Mapping[str, bytes]:
+    """Co-simulation units by the names of their files: NAME.fmu, and NAME_inverse.fmu with an inverse.
+
+    They hold their C sources, and a library for this computer where it has a C compiler (see `compiler`).
+
+    Raises
+    ------
+    ModelError
+        As `c_program`; also if the compiler fails.
+    """
+    program, digest = c_program(model, name, inverse), model_hash(model)
+    further = tuple(CHANNELS[channel] for channel in prediction(model).channels)
+    about = f"piezo stage, sample period {model.sample_period!r} s"
+    runaway = RUNAWAY * model.displacement_scale
+    parts = [CoSimulation(name, "", digest, f"Prediction of a {about}", (VOLTAGE, *further), DISPLACEMENT, runaway)]
+    if inverse is not None:
+        words = f"Inverse of a {about}: drive voltage for the displacement wanted {inverse.preview} samples later"
+        turned = CoSimulation(
+            f"{name}_inverse", "inverse_", f"{digest} inverse", words, (DISPLACEMENT,), VOLTAGE, math.inf
+        )
+        parts.append(turned)
+    return {f"{part.identifier}.fmu": _packed(part, model, name, program) for part in parts}
+
+
+def compiler() -> str | None:
+    """The C compiler of this computer: that of the environment variable CC, or cc, gcc or clang; None without one."""
+    return next(filter(None, (shutil.which(c) for c in (os.environ.get("CC"), "cc", "gcc", "clang") if c)), None)
+
+
+def _packed(part: CoSimulation, model: Model, name: str, program: Mapping[str, str]) -> bytes:
+    values = {"part": part, "model": model, "name": name, "units": UNITS}
+    values |= {"version": __version__, "hash": model_hash(model)}
+
+    def rendered(file: str) -> str:
+        return templates().get_template(f"{file}.jinja").render(values)
+
+    sources = {file: text for file, text in program.items() if file in (f"{name}.h", f"{name}.c")}
+    sources["fmi3.c"] = rendered("fmi3.c")
+    held: dict[str, str | bytes] = {"modelDescription.xml": rendered("modelDescription.xml")}
+    held |= {f"sources/{file}": text for file, text in sources.items()}
+    held["sources/buildDescription.xml"] = rendered("buildDescription.xml")
+    held |= _library(part.identifier, sources)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file, content in held.items():
+            archive.writestr(zipfile.ZipInfo(file), content, zipfile.ZIP_DEFLATED)  # no date: same model, same bytes
+    return packed.getvalue()
+
+
+def _library(identifier: str, sources: Mapping[str, str]) -> dict[str, bytes]:
+    """The compiled library by its place in the unit; none where there is no compiler."""
+    program, system = compiler(), {"Linux": ("linux", ".so"), "Darwin": ("darwin", ".dylib")}.get(platform.system())
+    if program is None or system is None:
+        return {}
+    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    with tempfile.TemporaryDirectory() as folder:
+        for file, text in sources.items():
+            (Path(folder) / file).write_text(text, encoding="utf-8")
+        files = sorted(file for file in sources if file.endswith(".c"))
+        command = [program, *FLAGS, *files, "-lm", "-o", "library"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        if done.returncode:
+            reason = (done.stderr.strip().splitlines() or ["no message"])[0]
+            raise ModelError(f"{program}: cannot compile the unit ({reason}); name another compiler in CC")
+        binary = (Path(folder) / "library").read_bytes()
+    return {f"binaries/{machine}-{system[0]}/{identifier}{system[1]}": binary}
