@@ -29,11 +29,11 @@ class InvertedBlock(ABC):
     Attributes
     ----------
     preview : int
-        Samples that must be known ahead.
+        Number of future samples that must be known.
     is_exact : bool
-        Whether run(inverse(y)) is y to rounding.
+        Whether run(inverse(y)) equals y up to rounding.
     noise_gain : float
-        How much rounding and noise may grow on the way.
+        Largest factor by which rounding errors and noise grow.
     """
 
     preview: int = 0
@@ -46,7 +46,7 @@ class InvertedBlock(ABC):
 
     @abstractmethod
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
-        """Causes x (n,) of the wanted y (n,), which happen at `time` (n,) [s], and the state after them."""
+        """Inputs x (n,) at `time` (n,) [s] that give the wanted outputs y (n,), and the state after them."""
 
     def c_form(self, ahead: int) -> CForm | str:
         """`run` as C code from `ahead` samples after the start on; ``rest`` takes the input x of the block at rest."""
@@ -138,7 +138,7 @@ class InvertedSoftening(InvertedBlock):
 
 @kernel
 def cubic_root(y, s2, s3, x):
-    """x (n,) with x + s2 x² + s3 x³ = y (n,), the one joined to zero; else the turning point."""
+    """x (n,) with x + s2 x² + s3 x³ = y (n,), on the branch through zero; where there is none, its extremum."""
     for i in range(y.size):
         root = y[i]
         for _ in range(60):

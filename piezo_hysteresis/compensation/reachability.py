@@ -19,15 +19,15 @@ class UnreachablePart:
     begin, end : float
         Time from the start of the path [s].
     largest : float
-        Largest deviation of what the drive gives instead, signed [m].
+        Largest deviation from the path inside the limits, with its sign [m].
     needed_min, needed_max : float
-        Voltage that the path would need [V].
+        Lowest and highest voltage that the path would need [V].
     needed_slew : float
         Steepest change that it would need [V/s].
     limit : str
         ``voltage_min``, ``voltage_max`` or ``max_slew_rate``.
     after_loop : bool
-        True where the same displacement can be had from rest, but no longer after the swing before it.
+        True if the displacement is reachable from rest, but not after the motion before it, because of the hysteresis.
     """
 
     begin: float
@@ -64,11 +64,11 @@ class NearestPath:
     Parameters
     ----------
     offset : float or None
-        To be added to the whole path [m].
+        Offset of the whole path [m].
     amplitude : float or None
-        Factor about the middle of the path, below 1.
+        Factor below 1 by which the path is scaled about its middle.
     band : float or None
-        Frequency above which the path may hold nothing [Hz].
+        Frequency above which the path may have no components [Hz].
     """
 
     offset: float | None
@@ -83,11 +83,11 @@ class Reachability:
     Parameters
     ----------
     parts : tuple of UnreachablePart
-        Empty where the whole path can be had.
+        Unreachable parts; empty if the whole path is reachable.
     nearest : NearestPath or None
-        None where the whole path can be had.
+        Nearest reachable path; None if the whole path is reachable.
     displacement : (n,) ndarray
-        What the limited drive gives [m].
+        Displacement under the limited drive [m].
     voltage : (n + preview,) ndarray
         The limited drive [V].
     """
@@ -99,5 +99,5 @@ class Reachability:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all of the path can be had."""
+        """Whether the whole path is reachable."""
         return not self.parts

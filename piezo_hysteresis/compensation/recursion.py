@@ -1,7 +1,7 @@
 """The part of the inverse that is nonlinear in the last sample: creep, hysteresis, amplifier and limits in one loop.
 
-Every state follows what the limits have let through, not what was wanted: after a limit the inverse goes on from where
-the stage really is.
+Every state follows the limited drive, not the wanted one. So the inverse continues from the real state of the stage
+after a limit was reached.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NAMES_IN_C = (
 VOLTAGE, SLEWED, POLE, HELD, PUSHED, LAST, H, W = range(8)
 """States: drive, behind the slew limit, behind the pole, behind the play, before the play [V]; v, h and w."""
 SAME = 1e-13
-"""Changes below this share of the voltage are no reversal to a play."""
+"""A change below this share of the voltage does not count as a reversal of a play."""
 TOUCHING = 1e-6
 """Distance from an edge of the play, in shares of its half width, that counts as touching."""
 

@@ -14,20 +14,20 @@ from .description import Samples
 
 
 class Agreement:
-    """Follows drive and measurement block by block.
+    """Compares the requested drive with the measurement, block by block.
 
-    A difference of one sign that lasts longer than the settling time is no lag of the amplifier: saturation, exchanged
-    channels, another sample period, a repeated block and a servo that is on all show so. A displacement that stays
-    exactly the same while the drive moves is no measurement.
+    A difference of one sign that lasts longer than the settling time cannot be a lag of the amplifier. It shows
+    saturation, exchanged channels, another sample period, a repeated block, or a servo that is switched on. A
+    displacement that stays exactly the same while the drive moves is not a measurement.
 
     Parameters
     ----------
     tolerance : float
         Largest steady difference of the voltages [V].
     settling_samples : int
-        Samples within which the voltage follows a step.
+        Number of samples that the voltage needs to follow a step.
     displacement_min, displacement_max : float
-        Range of the sensor [m]: at its ends the signal may stand still, which readers of a recording report as clipped.
+        Range of the sensor [m]. At its ends the signal may be constant; readers of a recording report it as clipped.
     """
 
     def __init__(
@@ -44,19 +44,19 @@ class Agreement:
         self._value, self._low, self._high = math.nan, math.inf, -math.inf
 
     def check(self, asked: Samples, voltage: Samples, displacement: Samples) -> None:
-        """Take the next block.
+        """Compare the next block.
 
         Parameters
         ----------
         asked, voltage : (n,) ndarray
-            Drive asked for and measured [V].
+            Requested and measured drive [V].
         displacement : (n,) ndarray
             Measured displacement [m].
 
         Raises
         ------
         DeviceError
-            Naming the first sample of the difference.
+            If they disagree; the message names the first sample of the difference.
         """
         self._follows(asked, voltage)
         self._moves(voltage, displacement)

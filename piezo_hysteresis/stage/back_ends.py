@@ -1,6 +1,6 @@
 """`BACK_ENDS`: every kind of stage that a driver can open, by the value of the driver's parameter `stage`.
 
-A further device is a folder beside this file that exports PARAMETERS and `open`, and one line of `BACK_ENDS`.
+To support another device, add a folder beside this file that exports PARAMETERS and `open`, and a line to `BACK_ENDS`.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ class BackEnd:
     Parameters
     ----------
     rows : tuple of Parameter or Setting
-        Its ROS parameters, declared under the prefix ``"<word>."``.
+        ROS parameters of the stage, declared under the prefix ``"<word>."``.
     open : callable
         Makes the stage from the values of the rows and an `Opening`.
     is_device : bool
-        True for hardware: locked by the name of the device, and never faster than real time.
+        True for hardware. It is locked by the name of the device and runs in real time.
     has_keeper : bool
-        True where a second process can bring the device to its safe voltage.
+        True if a second process can bring the device to its safe voltage.
     keeper_ends_driver : bool
-        True where it can do that only after the driver has ended, because the device serves one process at a time.
+        True if that process can do so only after the driver has ended, because the device serves one process at a time.
     """
 
     rows: tuple[Row, ...]
@@ -47,7 +47,7 @@ BACK_ENDS: Mapping[str, BackEnd] = {
     "gcs2": BackEnd(gcs2.PARAMETERS, gcs2.open, is_device=True, has_keeper=True),
     "nidaqmx": BackEnd(daqmx.PARAMETERS, daqmx.open, is_device=True, has_keeper=True, keeper_ends_driver=True),
 }
-"""Every back end by its word."""
+"""Every back end by the value of the parameter `stage`."""
 
 
 def open_stage(word: str, values: Mapping[str, Any], opening: Opening) -> Stage:
@@ -58,14 +58,14 @@ def open_stage(word: str, values: Mapping[str, Any], opening: Opening) -> Stage:
     word : str
         Key of `BACK_ENDS`.
     values : mapping
-        Of its rows, by name.
+        Values of its parameters, by name.
     opening : Opening
         Sample period and speed; the reader of recordings for `replay`.
 
     Raises
     ------
     PiezoError
-        If the stage cannot be opened like that; one that was opened is closed again.
+        If the stage cannot be opened with these values. A stage that was opened is closed again.
     """
     if opening.real_time_factor != 1.0 and BACK_ENDS[word].is_device:
         raise ParameterError(

@@ -13,7 +13,7 @@ from ..errors import StageError, printable
 Samples = NDArray[np.float64]
 
 _PERIOD_TOLERANCE = 1e-6
-"""Relative difference up to which two sample periods are one."""
+"""Relative difference up to which two sample periods count as equal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,39 +23,39 @@ class Description:
     Parameters
     ----------
     name : str
-        Model and serial number, or what is simulated; unique per device, so that a driver can lock it.
-        What cannot be printed, of a device that names itself, becomes its escape.
+        Model and serial number, or name of the simulation; unique per device, so that a driver can lock it. Characters
+        that cannot be printed are replaced by their escapes.
     streaming : bool
         True for a `StreamingStage`, False for a `MemoryStage`.
     sample_period_min, sample_period_max : float
         Shortest and longest sample period [s].
     sample_period_step : float
-        Periods are whole multiples of it [s]; 0 where any period in the range is possible.
+        Sample periods are whole multiples of it [s]; 0 if any period in the range is possible.
     voltage_min, voltage_max : float
         Drive limits before the amplifier [V].
     max_slew_rate : float
-        Steepest drive that is accepted [V/s]; infinite where a step of one sample is harmless.
+        Steepest drive that is accepted [V/s]; infinite if a step within one sample is harmless.
     safe_voltage : float
         Drive voltage of the stage at rest [V].
     longest_block : int, optional
-        Samples per block that the device holds; None where there is no limit.
+        Largest number of samples in a block; None if there is no limit.
     amplifier_gain : float
         Piezo voltage over drive voltage [V/V].
     displacement_min, displacement_max : float
-        Sensor range [m]; samples on it are clipped.
+        Sensor range [m]; samples at its ends are clipped.
     measured_voltage : bool
-        True where the voltage returned is measured, False where it is the one commanded.
+        True if the returned voltage is measured, False if it is the commanded one.
     latency : float
-        Streaming stages: time by which an answer is late [s]; sample i of what is returned was applied and measured
-        that long before sample i of the drive given is. 0 where they belong together. A stage with latency has a clock
-        of its own, which sets the pace: `exchange` returns when the samples are there.
+        Delay of the answers of a streaming stage [s]: sample i of an answer was applied and measured that long before
+        sample i of the given drive will be applied; 0 if they are the same sample. A stage with latency has its own
+        clock, and `exchange` returns when that clock has produced the samples.
     ignores_drive : bool
-        True for a replayed recording: what is asked for is not played.
+        True for a replayed recording, which does not play the requested drive.
 
     Raises
     ------
     StageError
-        If limits are crossed or the safe voltage lies outside them.
+        If a minimum lies above its maximum, or the safe voltage lies outside the limits.
     """
 
     name: str
@@ -113,14 +113,14 @@ class Description:
         return float(sample_period)
 
     def check_voltage(self, voltage: ArrayLike, present_voltage: float, sample_period: float) -> Samples:
-        """Return `voltage` as a contiguous array if the stage may play it: the last line of defence.
+        """Return `voltage` as a contiguous array if the stage may play it. This is the last check before the device.
 
         Parameters
         ----------
         voltage : (n,) array_like
             Drive voltage [V].
         present_voltage : float
-            Voltage applied before the first sample [V]; the slew counts from it.
+            Voltage applied before the first sample [V]; the slew of the first sample counts from it.
         sample_period : float
             Time between samples [s].
 
@@ -131,7 +131,7 @@ class Description:
         Raises
         ------
         StageError
-            On another shape, too long a block, or samples that are not finite, outside the limits or too steep.
+            If the shape is wrong, the block is too long, or samples are not finite, outside the limits or too steep.
         """
         try:
             block = np.ascontiguousarray(voltage, dtype=np.float64)

@@ -15,14 +15,14 @@ def guarded(retreat: Callable[[], None], reached: Callable[[], str], unknown: Ca
     Parameters
     ----------
     retreat : callable
-        Goes to the safe voltage; DeviceError where that fails too.
+        Goes to the safe voltage; raises DeviceError if that fails, too.
     reached, unknown : callable
-        The end of the message: where the stage is after the retreat, and what is known where the retreat failed.
+        Return the end of the message: where the stage is after the retreat, or what is known if the retreat failed.
 
     Raises
     ------
     StageError
-        In place of the DeviceError, with where the stage is.
+        In place of the DeviceError; the message says where the stage is.
     """
     try:
         yield

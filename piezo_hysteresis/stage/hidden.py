@@ -37,18 +37,18 @@ class HiddenEffect:
 def hidden_effect(
     seed: int, base: PlantParameters | None = None, *, name: str | None = None, highest_voltage: float = 6.0
 ) -> HiddenEffect:
-    """Draw one effect of the catalogue and its size, both large enough to matter and small enough to be real.
+    """Draw one effect of the catalogue and its size. The size is large enough to be found and realistic.
 
     Parameters
     ----------
     seed : int
-        The same seed hides the same effect.
+        Seed of the random choice; the same seed hides the same effect.
     base : PlantParameters, optional
-        Stage to hide it in; that of another hidden effect gives two. Default: nothing else hidden.
+        Stage to hide it in. The stage of another hidden effect then has two. Default: a stage without hidden effects.
     name : str, optional
         Draw only the size of this effect.
     highest_voltage : float
-        Highest drive the experiment will use [V]; saturation is put near it.
+        Highest drive of the experiment [V]; saturation is drawn near it.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def hidden_effect(
     Raises
     ------
     ParameterError
-        On an unknown name, or where the base leaves no room for the effect.
+        If the name is unknown, or the effect does not fit the base.
     """
     base = PlantParameters() if base is None else base
     rng = np.random.default_rng(seed)
@@ -70,7 +70,7 @@ def hidden_effect(
 
 
 def _size(rng: np.random.Generator, low: float, high: float) -> float:
-    """A size between `low` and `high`, every order of magnitude as likely."""
+    """A size between `low` and `high`, uniform in its logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 

@@ -1,4 +1,4 @@
-"""`Limiter`: range, slew and ramp rate of the drive, last before the device on every path to it."""
+"""`Limiter`: range, slew and ramp rate of the drive. Every voltage passes it last, before the device."""
 
 from __future__ import annotations
 
@@ -13,23 +13,22 @@ from ..errors import StageError
 from .description import Description, Samples
 
 LONGEST_PART = 65536
-"""Samples of a ramp that are made at once; the next ones follow while they are played."""
+"""Number of samples of a ramp that are computed at once; the next ones are computed while these are played."""
 
 
 class Limiter:
     """Limits the output of a stage, sample by sample.
 
-    A stage asks its limiter before it gives its device a waveform, and takes from it the samples of every way that it
-    goes by itself: to a set-point, to the safe voltage, after a fault, on closing. A stage begins with the limits of
-    its own description; a driver narrows them to its own with `Stage.restrict`.
+    A stage passes every waveform to its limiter before the device gets it. The limiter also computes every ramp of the
+    stage itself: to a set-point, to the safe voltage, after a fault, and on closing. A stage starts with the limits of
+    its own description; a driver narrows them with `Stage.restrict`.
 
     Parameters
     ----------
     limits : Description
         Range, steepest slew, safe voltage and longest block.
     ramp_rate : float
-        Rate of the ways that the stage goes by itself [V/s]; never above the steepest slew. Infinite where neither
-        limits it: such a way is one step.
+        Rate of the stage's own ramps [V/s], at most the steepest slew. If both are infinite, a ramp is one step.
     """
 
     def __init__(self, limits: Description, ramp_rate: float = math.inf) -> None:
@@ -38,12 +37,12 @@ class Limiter:
         self.limits, self.ramp_rate = limits, min(ramp_rate, limits.max_slew_rate)
 
     def restricted(self, limits: Description, ramp_rate: float) -> Limiter:
-        """The same stage held to the range and slew of `limits` and to a ramp rate [V/s].
+        """The limiter of the same stage, restricted to the range and slew of `limits` and to a ramp rate [V/s].
 
         Raises
         ------
         StageError
-            If that would allow what the stage does not, or does not contain the safe voltage.
+            If they allow more than the stage does, or do not contain the safe voltage.
         """
         own = self.limits
         inside = own.voltage_min <= limits.voltage_min and limits.voltage_max <= own.voltage_max
@@ -71,29 +70,30 @@ class Limiter:
         return self.limits.check_voltage(voltage, present_voltage, sample_period)
 
     def goal(self, voltage: float) -> float:
-        """Return a voltage to go to [V]; StageError if it is not finite or outside the range."""
+        """Return the voltage `goal` [V]; StageError if it is not finite or outside the range."""
         return float(self.limits.check_voltage(np.array([voltage], dtype=np.float64), float(voltage), 1.0)[0])
 
     def way(
         self, present_voltage: float, goal: float, sample_period: float, longest: int = LONGEST_PART
     ) -> Iterator[Samples]:
-        """Samples of the straight way to a voltage, the present one left out, the last one exactly the goal.
+        """Samples of the straight ramp to a voltage, without the present voltage. The last one is exactly the goal.
 
         Parameters
         ----------
         present_voltage : float
-            Voltage applied now [V]; it may lie outside the limits, where another program has left it there.
+            Voltage applied now [V]; it may lie outside the limits if another program has left it there.
         goal : float
-            Where the way ends [V].
+            Voltage at the end of the ramp [V].
         sample_period : float
             Time between samples [s].
         longest : int
-            Samples in one part, at most.
+            Largest number of samples in one part.
 
         Yields
         ------
         (n,) ndarray of float64
-            No two samples are further apart than `ramp_rate` times `sample_period`; one sample at least in all.
+            Parts of the ramp. Neighbouring samples differ by at most `ramp_rate` times `sample_period`; there is at
+            least one sample.
         """
         step = self.ramp_rate * sample_period
         count = max(math.ceil(abs(goal - present_voltage) / step * (1 - 1e-12)), 1)

@@ -20,11 +20,11 @@ class Opening:
     Parameters
     ----------
     sample_period : float
-        Time between samples [s]; 0 for the stage's own.
+        Time between samples [s]; 0 for the default of the stage.
     real_time_factor : float
-        Seconds of a simulated or replayed stage per second; 1 for every real one.
+        Simulated or replayed seconds per second; 1 for every device.
     read : callable
-        Reads the records of a recording from its path: stages read no files of samples by themselves.
+        Reads the records of a recording from its path. (Stages do not import the readers of recordings.)
     """
 
     sample_period: float = 0.0

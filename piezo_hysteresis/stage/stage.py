@@ -25,11 +25,11 @@ class Acquired:
     Parameters
     ----------
     voltage : (n,) ndarray
-        Drive voltage really applied [V].
+        Applied drive voltage [V].
     displacement : (n,) ndarray
         Measured displacement [m].
     channels : mapping of str to (n,) ndarray, optional
-        What else was measured, as in `Record.channels`.
+        Other measured channels, as in `Record.channels`.
     """
 
     voltage: Samples
@@ -38,21 +38,21 @@ class Acquired:
 
 
 class Stage(Protocol):
-    """What both kinds of device share: description, clock, slow path and the way to safety."""
+    """Common part of both kinds of device: description, clock, slow path, and the ramp to the safe voltage."""
 
     @property
     def description(self) -> Description:
-        """Limits and kind of the device; does not change while it is open."""
+        """Limits and kind of the device. They do not change while it is open."""
         ...
 
     @property
     def sample_period(self) -> float:
-        """Sample period in force [s]."""
+        """Present sample period [s]."""
         ...
 
     @property
     def voltage(self) -> float:
-        """Drive voltage in force [V]."""
+        """Present drive voltage [V]."""
         ...
 
     def configure(self, sample_period: float) -> None:
@@ -60,7 +60,7 @@ class Stage(Protocol):
         ...
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
-        """Hold the range and slew of `limits` and a ramp rate [V/s] from now on, on every path to the device.
+        """From now on, keep every voltage inside the range and slew of `limits`, and ramp at this rate [V/s].
 
         StageError if they allow more than the stage does.
         """
@@ -71,7 +71,7 @@ class Stage(Protocol):
         ...
 
     def read_voltage(self) -> float:
-        """Slow path: the drive voltage measured now [V]; the one in force where nothing measures it."""
+        """Slow path: the drive voltage measured now [V]; the present commanded voltage if it is not measured."""
         ...
 
     def read_displacement(self) -> float:
@@ -79,11 +79,11 @@ class Stage(Protocol):
         ...
 
     def safe(self) -> None:
-        """Stop what plays and go to the safe voltage at the ramp rate; harmless when repeated."""
+        """Stop a waveform that is playing, and ramp to the safe voltage. A repeated call does no harm."""
         ...
 
     def close(self) -> None:
-        """Make safe and release the device; harmless when repeated, every other call then raises StageError."""
+        """Go to the safe voltage and release the device. A repeated call does no harm; any other raises StageError."""
         ...
 
 
@@ -91,15 +91,15 @@ class StreamingStage(Stage, Protocol):
     """A device whose clock keeps running while blocks are exchanged."""
 
     def exchange(self, voltage: Samples) -> Acquired:
-        """Apply a block of drive voltages and return the samples applied and measured, as many as were given.
+        """Apply a block of drive voltages, and return the same number of applied and measured samples.
 
-        Sample i of the answer belongs to sample i of the drive, or to the one `Description.latency` before it; voltage
-        and displacement of the answer belong together always. The next block follows without a gap.
+        Sample i of the answer belongs to sample i of the drive, or to the sample `Description.latency` before it.
+        Voltage and displacement of the answer always belong together. The next block follows without a gap.
 
         Raises
         ------
         StageError
-            If the drive breaks a limit (nothing is played), or the device fails.
+            If the drive violates a limit (then nothing is played), or the device fails.
         """
         ...
 
@@ -108,18 +108,18 @@ class MemoryStage(Stage, Protocol):
     """A device that plays and records from its own memory: upload, arm, start, wait, read."""
 
     def watch(self, is_interrupted: Callable[[], bool]) -> None:
-        """Look at `is_interrupted` before every message of upload, arm, start and read; StoppedError once it is true.
+        """Call `is_interrupted` before every message of upload, arm, start and read; StoppedError once it is true.
 
-        Nothing is started after that, and the way to safety does not look.
+        Nothing is started after that. The ramp to the safe voltage cannot be interrupted.
         """
         ...
 
     def upload(self, voltage: Samples) -> None:
-        """Store a waveform [V]; it counts from the voltage in force; StageError if it breaks a limit."""
+        """Store a waveform [V] that starts from the present voltage; StageError if it violates a limit."""
         ...
 
     def arm(self) -> None:
-        """Make generator and recorder ready; StageError without a waveform."""
+        """Prepare generator and recorder; StageError if there is no waveform."""
         ...
 
     def start(self) -> None:
@@ -127,7 +127,7 @@ class MemoryStage(Stage, Protocol):
         ...
 
     def wait(self, timeout: float) -> None:
-        """Return when the waveform has been played; StageError after `timeout` seconds, the waveform plays on."""
+        """Return when the waveform has been played; StageError after `timeout` seconds. The waveform continues then."""
         ...
 
     def read(self) -> Acquired:

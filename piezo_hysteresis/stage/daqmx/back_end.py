@@ -21,10 +21,12 @@ PARAMETERS: tuple[Row, ...] = (
     Setting("voltage_input", _DAQMX.voltage_input, "analogue input of the amplifier's monitor; empty: none"),
     Setting("server", _DAQMX.server, "host:port of an NI gRPC device server; empty: the driver on this machine"),
     Parameter("sample_period_min", "", "s", _DAQMX.sample_period_min, 1e-9, 1.0, "shortest sample period", "the card"),
-    Parameter("lead", "", "s", _DAQMX.lead, 1e-3, 10.0, "output that waits in the buffer: the latency", "the machine"),
+    Parameter(
+        "lead", "", "s", _DAQMX.lead, 1e-3, 10.0, "duration of output in the buffer; it is the latency", "the machine"
+    ),
     Parameter("voltage_min", "u_min", "V", _DAQMX.voltage_min, -10.0, 10.0, "lowest drive voltage", "rig"),
     Parameter("voltage_max", "u_max", "V", _DAQMX.voltage_max, -10.0, 10.0, "highest drive voltage", "rig"),
-    Parameter("max_slew_rate", "S", "V/s", 0.0, 0.0, 1e12, "steepest drive; has to be given", "rig"),
+    Parameter("max_slew_rate", "S", "V/s", 0.0, 0.0, 1e12, "steepest drive; required", "rig"),
     Parameter("safe_voltage", "u_s", "V", 0.0, -10.0, 10.0, "drive voltage of the stage at rest", "rig"),
     Setting(
         "assume_safe",
@@ -40,9 +42,7 @@ PARAMETERS: tuple[Row, ...] = (
     Parameter("settling_time", "", "s", 0.01, 0.0, 10.0, "time the amplifier needs to follow a step", "rig"),
     Parameter("sensor_range", "", "V", _DAQMX.sensor_range, 1e-3, 10.0, "the inputs span ± this voltage", "the card"),
     Parameter("io_delay", "", "s", 0.0, 0.0, 1.0, "delay of the card itself, from a loop-back", "loop_back_delay"),
-    Parameter(
-        "timeout", "", "s", _DAQMX.timeout, 0.01, 600.0, "longest wait for samples, silence of a server", "network"
-    ),
+    Parameter("timeout", "", "s", _DAQMX.timeout, 0.01, 600.0, "longest wait for samples or for a server", "network"),
 )
 """Of the driver, under ``nidaqmx.``."""
 

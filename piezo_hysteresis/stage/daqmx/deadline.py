@@ -1,4 +1,4 @@
-"""`Deadline`: no call to a device server waits for ever, even if a cable is disconnected."""
+"""`Deadline`: limits the time that a call to a device server waits, even if a cable is disconnected."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc]  # grpc 
     Parameters
     ----------
     seconds : float
-        Longest silence of the server, beyond the time that a call itself may wait for samples [s].
+        Longest time without an answer [s], in addition to the time for which a call waits for samples.
     """
 
     def __init__(self, seconds: float) -> None:

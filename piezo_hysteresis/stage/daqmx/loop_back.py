@@ -9,9 +9,9 @@ from ...errors import StageError
 from ..stage import StreamingStage
 
 _COUNT = 4096
-"""Samples of the test signal."""
+"""Number of samples of the test signal."""
 _LEAST_CORRELATION = 0.9
-"""Correlation from which the delay is known."""
+"""Smallest correlation from which the delay is accepted."""
 
 
 def loop_back_delay(stage: StreamingStage, amplitude: float = 1.0) -> float:
@@ -35,7 +35,7 @@ def loop_back_delay(stage: StreamingStage, amplitude: float = 1.0) -> float:
     Raises
     ------
     StageError
-        If what comes back is not what was put out.
+        If the measured signal is not the output signal.
     """
     d, start = stage.description, stage.voltage
     side = 1.0 if start + amplitude <= d.voltage_max else -1.0

@@ -28,9 +28,10 @@ class DaqmxSetup:
     sample_period : float
         Time between samples [s].
     sample_period_min : float
-        Shortest period the card is to be used at [s].
+        Shortest sample period for this card [s].
     lead : float
-        Output that waits in the buffer of the card [s]: its latency, and how late a block may come.
+        Duration of output in the buffer of the card [s]. It is the latency of the stage, and the time by which a block
+        may be late.
     voltage_min, voltage_max : float
         Limits of the drive before the amplifier [V].
     max_slew_rate : float

@@ -10,7 +10,7 @@ from ...errors import DeviceError
 _CODE_PAGE = "cp1252"
 """Character set of GCS."""
 _LONGEST_ANSWER = 1 << 26
-"""Bytes of an answer at most."""
+"""Largest size of an answer [byte]."""
 
 
 class Gcs2Error(DeviceError):
@@ -22,7 +22,7 @@ class NoAnswerError(Gcs2Error):
 
 
 class Connection:
-    """A TCP link that is opened when it is needed and closed as soon as it can be out of step.
+    """A TCP link. It is opened when needed, and closed when query and answer may no longer match.
 
     After a time-out or half an answer it is unknown to which query the next bytes belong; the link is then closed, and
     the next `send` opens a new one.
@@ -57,7 +57,7 @@ class Connection:
         Raises
         ------
         Gcs2Error
-            If there is no link and none can be made, or it is lost.
+            If no link can be opened, or the link is lost.
         """
         link = self._opened()
         try:

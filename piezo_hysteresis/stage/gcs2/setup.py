@@ -15,7 +15,7 @@ class Gcs2Setup:
     Parameters
     ----------
     host, port
-        Where the controller listens.
+        Address and TCP port of the controller.
     axis : str
         Axis identifier, as ``SAI?`` lists it.
     channel : int
@@ -27,7 +27,7 @@ class Gcs2Setup:
     voltage_option, displacement_option : int
         Record options of piezo voltage [U] and actual position.
     amplifier_gain : float
-        Piezo voltage over drive voltage [V/V]; 1 where the drive is the piezo voltage itself.
+        Piezo voltage over drive voltage [V/V]; 1 if the drive is the piezo voltage itself.
     command_per_volt, command_at_zero : float
         Open-loop command of ``SVA`` and of wave points: command = command_at_zero + command_per_volt × piezo voltage
         [U]; it may be volts or µm.
@@ -38,28 +38,28 @@ class Gcs2Setup:
     max_slew_rate : float
         Steepest drive [V/s], and rate of the way to the safe voltage unless a driver has a lower one; has to be given.
     voltage_tolerance : float
-        Largest steady difference between piezo voltage asked for and measured [V].
+        Largest steady difference between requested and measured piezo voltage [V].
     settling_time : float
         Time that amplifier and ``VOL?`` need to follow a step [s].
     points_per_command : int
         Wave points in one ``WAV`` line; the longest line a controller takes is not documented [U].
     rows_per_answer : int
-        Recorded samples asked for at once.
+        Number of recorded samples per query.
     read_back : bool
         Read the wave table back and compare it before anything moves.
     longest_wave : int
-        Points of the wave table; 0 to ask the controller with ``WMS?``, which not all of them know [U].
+        Number of points of the wave table; 0 to query it by ``WMS?``, which not all controllers know [U].
     longest_multiple : int
         Largest multiple of the servo time that can be a sample period [U].
     servo_time_parameter, recorder_parameter : int
         Numbers of the controller parameters servo time [s] and recorder points shared by all tables [U] beyond E-727.
     timeout : float
-        Longest silence of the controller [s].
+        Longest time without an answer of the controller [s].
 
     Raises
     ------
     StageError
-        On a value that cannot be.
+        If a value is impossible.
     """
 
     host: str

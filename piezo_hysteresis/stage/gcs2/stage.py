@@ -18,15 +18,15 @@ from .axis import Axis
 from .setup import Gcs2Setup
 
 _POLL = 5e-3
-"""Shortest time between two questions whether the generator runs [s]."""
+"""Shortest time between two queries whether the generator is running [s]."""
 
 
 class Gcs2Stage:
     """One axis, driven by voltage from the wave table and recorded by the data recorder at the servo rate.
 
     Opening asks for identity, servo time and limits and moves nothing. Before every open-loop move the servo is
-    switched off, and that is verified. When the device fails in between, the stage goes to its safe voltage over a new
-    link if it has to; the error says whether that was reached.
+    switched off, and that is verified. If the device fails, the stage goes to its safe voltage, over a new link if
+    necessary; the error message says whether it got there.
 
     Parameters
     ----------
@@ -60,12 +60,12 @@ class Gcs2Stage:
 
     @property
     def sample_period(self) -> float:
-        """Sample period in force [s], a multiple of the servo time."""
+        """Present sample period [s], a multiple of the servo time."""
         return self._sample_period
 
     @property
     def voltage(self) -> float:
-        """Drive voltage in force [V]: measured on opening, after that the one commanded."""
+        """Present drive voltage [V]: measured on opening, later the commanded one."""
         return self._voltage
 
     def configure(self, sample_period: float) -> None:
@@ -176,7 +176,7 @@ class Gcs2Stage:
         return self._acquired
 
     def safe(self) -> None:
-        """Stop what plays and go to the safe voltage, over a new link where the old one is lost."""
+        """Stop a waveform that is playing, and ramp to the safe voltage, over a new link if the old one is lost."""
         if self._closed:
             return
         try:
@@ -221,7 +221,7 @@ class Gcs2Stage:
             self._go(self._description.safe_voltage)
 
     def _go(self, goal: float) -> None:
-        """Go to a voltage [V] along the limiter's way, sample by sample on the servo clock; the servo is off."""
+        """Ramp to a voltage [V] with the samples of the limiter, on the servo clock; the servo is off."""
         self._waveform = None
         longest = cast(int, self._description.longest_block)
         for part in self._limiter.way(self._voltage, goal, self._axis.servo_time, longest):

@@ -15,7 +15,7 @@ from .connection import Gcs2Error
 from .setup import Gcs2Setup
 
 _PROBE_POINTS = 50
-"""Points of the line that the controller is asked to draw, to see whether it can."""
+"""Number of points of the test line by which it is found out whether the controller can draw lines."""
 
 
 class WaveTable:
@@ -29,7 +29,7 @@ class WaveTable:
     Attributes
     ----------
     is_interrupted : callable
-        Looked at between two messages of a transfer.
+        Called between two messages of a transfer.
     limits : tuple of float
         Lowest and highest piezo voltage [V].
     """
@@ -41,13 +41,13 @@ class WaveTable:
         self._draws_lines: bool | None = None
 
     def require_not_interrupted(self) -> None:
-        """StoppedError once a stop has been asked for."""
+        """Raise StoppedError once a stop has been requested."""
         if self.is_interrupted():
             raise StoppedError(f"{self.client.connection.place}: stopped before the waveform was played and read")
 
     @contextmanager
     def uninterrupted(self) -> Iterator[None]:
-        """Let what is done within the block come to its end."""
+        """Do not interrupt what is done within the block."""
         watched, self.is_interrupted = self.is_interrupted, bool
         try:
             yield

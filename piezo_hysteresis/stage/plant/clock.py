@@ -1,8 +1,8 @@
 """`Clock`: how one hold interval of the converter is cut into the sub-steps of the plant.
 
-The plant is time-invariant from converter to displacement, so its dead time may stand at the very front: the plant
-lives on a time axis shifted by the dead time, where the hold begins at a sub-step and the reading falls on another one.
-A dead time of any length is then exact, without interpolation.
+The plant is time-invariant from converter to displacement, so its dead time can be applied first. The plant then runs
+on a time axis that is shifted by the dead time: the hold begins at one sub-step, and the reading coincides with another
+one. A dead time of any length is exact in this way, without interpolation.
 """
 
 from __future__ import annotations

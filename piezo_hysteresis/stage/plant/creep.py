@@ -21,7 +21,7 @@ from .quantity import Group, quantity
 Samples = NDArray[np.float64]
 
 REFERENCE_TIME = 0.1
-"""Time after a step at which creep changes nothing [s]."""
+"""Time after a step at which the displacement with creep equals that without creep [s]."""
 
 _ELEMENTS_PER_DECADE = 4
 """Kelvin-Voigt elements per decade of time."""

@@ -1,4 +1,4 @@
-"""Converter and amplifier: from the drive asked for to the voltage at the piezo, exact at every sub-step."""
+"""Converter and amplifier: from the requested drive to the voltage at the piezo, exact at every sub-step."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Electronics(Group):
         return 2 * self.dac_range / 2**self.dac_bits if self.dac_bits else 0.0
 
     def convert(self, voltage: Samples) -> Samples:
-        """The drive the converter really gives [V]: the nearest of its steps that lies within the drive limits."""
+        """The drive that the converter puts out [V]: the nearest of its steps within the drive limits."""
         if not self.dac_bits:
             return np.array(voltage)
         half = 2 ** (self.dac_bits - 1)

@@ -203,7 +203,7 @@ def _vibrate(w, kind, before, transition, early, late, force0, force1, spring, o
                 for r in range(n):
                     new[r] += force0[k, r] * f0 + force1[k, r] * f1
             for r in range(n):
-                # what has rung down is at rest: subnormal numbers are slow
+                # a decayed oscillation is set to rest, because arithmetic with subnormal numbers is slow
                 state[r] = new[r] if abs(new[r]) > 1e-30 else 0.0
             w0 = w1
     last[0] = w0
