@@ -20,7 +20,7 @@ class CChain:
     forms : mapping of str to CForm
         By name, in chain order; the first takes volts, the last returns metres.
     channels : tuple of str
-        Further measured inputs.
+        Further measured inputs, in alphabetical order, which is that of the arguments.
     """
 
     forms: dict[str, CForm]
@@ -41,7 +41,7 @@ def prediction(model: Model) -> CChain:
         if isinstance(form, str):
             raise ModelError(f"{label}: {form}, so the model cannot be exported; expected a model without it")
         forms["hysteresis" if isinstance(block, SumBlock) else label] = form
-    return CChain(forms, tuple(form.channel for form in forms.values() if form.channel))
+    return CChain(forms, tuple(sorted({form.channel for form in forms.values() if form.channel})))
 
 
 def rest_calls(forms: dict[str, CForm], state: str) -> Sequence[str]:
