@@ -25,28 +25,28 @@ from .hysteresis import fit_hysteresis
 Array = NDArray[np.float64]
 
 PLAYS = 16
-"""Plays, geometric in their half widths."""
+"""Number of play operators; their half widths form a geometric series."""
 WIDEST = 0.47
-"""Half width of the widest play, share of the range of the drive; one of half the range would stand still in a loop."""
+"""Half width of the widest play, as a share of the drive range; a play of half the range would never move."""
 BLOCKS = 8
-"""Blocks into which the records are cut, about."""
+"""Approximate number of blocks into which the records are cut."""
 FOLDS = 4
-"""Fits with a part of the blocks left out."""
+"""Number of folds of the cross-validation."""
 FEWEST = 64
-"""Samples of a block at least."""
+"""Smallest number of samples in a block."""
 TIE = 1.2
-"""Ratio of errors up to which neither leads; then plays are taken, they are bounded by what the loops show."""
+"""Ratio of errors up to which the data do not decide; then plays are used, which stay inside the largest loop."""
 
 
 def with_plays(model: Model, records: Sequence[Record]) -> Model | None:
-    """The model with plays in the place of its Bouc-Wen state, whose polynomial stays; None without such a state.
+    """The model with plays instead of the state of its operator, whose polynomial stays; None if there is no such form.
 
     Parameters
     ----------
     model : Model
-        With its hysteresis.
+        Model with a hysteresis.
     records : sequence of Record
-        Their drive sets the widest play.
+        Records whose drive determines the widest play.
     """
     loop = model.hysteresis.memoryless()
     if loop is None:
@@ -58,7 +58,7 @@ def with_plays(model: Model, records: Sequence[Record]) -> Model | None:
 
 
 def linear_numbers(model: Model) -> list[str]:
-    """Numbers of the plays and of the polynomial beside them."""
+    """Parameters of the plays and of the polynomial."""
     polynomial = [f"{model.hysteresis.name}.{n}" for n in model.hysteresis.linear_numbers()]
     return polynomial + [f"{MEMORY.name}.c[{j}]" for j in range(PLAYS)]
 
@@ -66,14 +66,14 @@ def linear_numbers(model: Model) -> list[str]:
 def choose_memory(
     joint: Fit, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int], loops: Collection[int]
 ) -> tuple[Fit, tuple[Notice, ...]]:
-    """The joint fit, or the same with plays where these predict better what was left out.
+    """The joint fit, or a fit with plays instead of the state if cross-validation prefers them.
 
     Parameters
     ----------
     joint : Fit
-        Of a model with its hysteresis.
+        Fit of a model with a hysteresis.
     records : sequence of Record
-        The experiment, in order.
+        Records of the experiment, in order.
     floors : sequence of float
         Floor of every record [m].
     fitted, loops : collection of int
@@ -82,9 +82,9 @@ def choose_memory(
     Returns
     -------
     fit : Fit
-        The one that holds.
+        The chosen fit.
     notices : tuple of Notice
-        ``memory`` with both errors on blocks left out.
+        ``memory``, with both errors of the cross-validation.
     """
     plays = with_plays(joint.model, records)
     if plays is None:
@@ -92,7 +92,7 @@ def choose_memory(
     blocks, sizes = _blocks(*select(records, floors, loops))
     state_error = left_out(blocks, sizes, lambda used: fit_hysteresis(joint.model, blocks, used).model)
     plays_error = left_out(blocks, sizes, lambda used: _fit_plays(plays, blocks, used))
-    # the mean of logarithms keeps one bad block from deciding
+    # with the mean of logarithms, a single bad block does not decide
     of_plays, of_state = (float(np.mean(np.log(np.maximum(e, 1.0)))) for e in (plays_error, state_error))
     message = (
         f"in cross-validation play operators reach {np.exp(of_plays):.3g} times the floor and "
@@ -121,11 +121,11 @@ def left_out(blocks: Sequence[Record], floors: Sequence[float], fitted_to: Calla
     Parameters
     ----------
     blocks : sequence of Record
-        In order, those of one record continuing.
+        Blocks in order; those of one record continue each other.
     floors : sequence of float
-        Floor of every block [m]; infinite where it only carries the state.
+        Noise floor of every block [m]; infinite if it only determines the state.
     fitted_to : callable
-        The model fitted to the blocks of the indices it is given.
+        From indices of blocks to the model fitted to them.
     """
     judged = [i for i, f in enumerate(floors) if np.isfinite(f)]
     errors = {}
@@ -141,7 +141,7 @@ def _fit_plays(model: Model, blocks: Sequence[Record], used: Collection[int]) ->
 
 
 def _blocks(records: Sequence[Record], floors: Sequence[float]) -> tuple[list[Record], list[float]]:
-    """Records cut into about `BLOCKS` of equal length in all, as far as they are long enough."""
+    """Cut the records into about `BLOCKS` blocks of equal length, as far as they are long enough."""
     length = max(FEWEST, sum(r.size for r, f in zip(records, floors, strict=True) if np.isfinite(f)) // BLOCKS)
     blocks, sizes = [], []
     for record, floor in zip(records, floors, strict=True):

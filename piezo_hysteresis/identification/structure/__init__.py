@@ -1,1 +1,1 @@
-"""The structure of a model without broadband records: which effects it takes to predict other rates and amplitudes."""
+"""The structure of a model without broadband records: the effects it needs to predict other rates and amplitudes."""

@@ -1,4 +1,4 @@
-"""How well any model predicts rates, amplitudes and records that were left out of its fit."""
+"""Score of a model: how well it predicts rates, amplitudes and records that were left out of its fit."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from .pieces import Kind, pieces_of
 from .scores import ModelStructure, judge
 
 WHOLE = ModelStructure(True, 2, True)
-"""The structure in which nothing of a model is off."""
+"""The structure with all effects switched on."""
 
 SEEN = 0.05
-"""Share of its record that a piece must hold to count as a drive of its own."""
+"""Smallest share of a record from which a piece counts as a separate drive."""
 
 
 def score_left_out(
@@ -29,7 +29,7 @@ def score_left_out(
     Parameters
     ----------
     model : Model
-        With values from which one linear step leads to those that the rest asks for.
+        Fitted model; each refit without a fold is one linear step from its parameters.
     records : sequence of Record
         In order.
     floors : sequence of float
@@ -37,7 +37,7 @@ def score_left_out(
     fitted : collection of int
         Indices of the records that count.
     adjusts : bool
-        Whether the numbers of the model follow what is left; False for a model from other data, which stays as it is.
+        Whether the parameters are refitted to the remaining data; False for a model from other data.
     """
     names = [n for n in free_numbers(model) if not _is_of_high_order(model, n)] if adjusts else []
     pieces = pieces_of(records, fitted)
@@ -54,5 +54,5 @@ def has_several_drives(records: Sequence[Record], fitted: Collection[int]) -> bo
 
 
 def _is_of_high_order(model: Model, name: str) -> bool:
-    """Coefficients of dynamics of more than one pole: they stay, since records without noise do not determine them."""
+    """Coefficients of dynamics with more than one pole. They are not fitted: only broadband records determine them."""
     return name.startswith(f"{Arx.name}.") and len(model[Arx.name].values["a"]) > 1  # type: ignore[arg-type]

@@ -15,27 +15,27 @@ from .pieces import Kind, RecordPiece
 from .ringing import RESOLVED, ringing_frequency
 
 LAGS = (0.3, 1.5, 4.0)
-"""Delays at which a fit begins [samples]."""
+"""Start values of the delay [samples]."""
 RINGING_STAYS = 0.7
-"""Share of the power behind a step that a mode may leave."""
+"""A mode is accepted if at most this share of the power after a step remains."""
 POLE_GAINS = 0.98
-"""Share of the cost that a pole may leave."""
+"""A pole is accepted if at most this share of the cost remains."""
 SILENT_GAINS = 0.8
-"""Share of the cost that a mode may leave which does not ring, but raises the gain of fast drives."""
+"""A mode that raises the gain at high frequency, without ringing, is accepted if at most this share remains."""
 SILENT = (4.0, 10.0)
-"""Frequencies at which the fit of such a mode begins, times the fastest drive."""
+"""Start values of the frequency of such a mode, as multiples of the highest drive frequency."""
 DAMPING = 0.02
-"""Damping ratio at which the fit of a mode begins."""
+"""Start value of the damping ratio of a mode."""
 SILENT_DAMPING = 0.2
-"""Damping ratio of a mode that does not ring; its lag is part of the delay."""
+"""Damping ratio assumed for a mode that does not ring; its lag is part of the delay."""
 WHOLE = 0.3
-"""Distance from 1 of the share of a mode of the whole stage; ringing with another share may be an alias of it."""
+"""Largest deviation from 1 of the share of a mode of the whole stage; with another share it may be an alias."""
 SHAPE, SHARE = tuple(f"{ExtraResonance.name}.{n}" for n in ("f0", "zeta")), f"{ExtraResonance.name}.r"
-"""Numbers of a mode."""
+"""Parameters of a mode."""
 
 
 def free_numbers(model: Model) -> list[str]:
-    """Numbers that a fit of a structure frees: all but those that are fixed or the gauge."""
+    """Parameters that the fit of a structure adjusts: all except fixed ones and the gauge."""
     held = {GAIN} if not model[Arx.name].values["a"] else set()
     loop = model.hysteresis
     if not loop.has_memory:
@@ -46,14 +46,14 @@ def free_numbers(model: Model) -> list[str]:
 def fit_structure(
     model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float], held: Collection[str] = ()
 ) -> PieceFit:
-    """Fit all free numbers of a model but those in `held`."""
+    """Fit all free parameters of a model except those in `held`."""
     return fit_pieces(model, pieces, floors, [n for n in free_numbers(model) if n not in held])
 
 
 def fit_linear_part(
     model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]
 ) -> tuple[PieceFit, float, list[Notice]]:
-    """Delay, then a mode where the stage rings or its gain rises with the frequency, then a pole where it helps.
+    """Fit a delay; then a mode, if the stage rings or its gain rises with frequency; then a pole, if it helps.
 
     Parameters
     ----------
@@ -67,11 +67,11 @@ def fit_linear_part(
     Returns
     -------
     fit : PieceFit
-        All free numbers at their best.
+        Fit of all free parameters.
     lead : float
-        ln of the factor by which a mode that rings lowers the cost; 0 where none does.
+        ln of the factor by which a ringing mode lowers the cost; 0 without such a mode.
     notices : list of Notice
-        ``ringing``, where a mode was taken.
+        ``ringing``, if a mode was accepted.
     """
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
     plain = min(found, key=lambda f: f.cost)
@@ -89,7 +89,7 @@ def fit_linear_part(
 
 
 def held_by(fit: PieceFit) -> tuple[str, ...]:
-    """Numbers of a mode that a fit holds."""
+    """Parameters of a mode that a fit does not adjust."""
     return tuple(n for n in (*SHAPE, SHARE) if n in fit.model.values() and n not in fit.names)
 
 
@@ -115,7 +115,7 @@ def _with_mode(
 
 
 def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> Iterator[PieceFit]:
-    """Fits with a mode that no step shows: one number each, its frequency, or its share at the highest frequency."""
+    """Fits with a mode that no step shows; each adjusts either its frequency, or its share at the highest frequency."""
     loops = [p.record for p in pieces if p.kind is Kind.LOOP]
     fastest = max((excitation_content(r).bandwidth for r in loops), default=0.0)
     top = RESOLVED / min(p.record.sample_period for p in pieces)

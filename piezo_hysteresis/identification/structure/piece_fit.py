@@ -1,4 +1,4 @@
-"""A joint fit to pieces of records: one sensor zero per record, whatever the number of its pieces."""
+"""A joint fit to pieces of records, with one sensor zero for all pieces of a record."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from .pieces import WEIGHTS, RecordPiece
 Array = NDArray[np.float64]
 
 STIFF = 1e-9
-"""Share of the diagonal that keeps undetermined directions where they are."""
+"""Damping that keeps undetermined directions at their start, as a share of the diagonal."""
 FARTHEST = 1e10
-"""Damping beyond which no step helps."""
+"""Damping at which the search gives up."""
 LARGEST_POLE = 0.999
-"""Radius of the pole of a lag, at most."""
+"""Largest radius of the pole of a lag."""
 POLE, GAIN, DELAY = (f"{Arx.name}.{n}" for n in ("a[0]", "b[0]", "delay"))
-"""Numbers of a lag."""
+"""Parameters of a lag."""
 PERFECT = 1e-9
-"""Cost of data without noise from a model of the same form: nothing is left to fit."""
+"""Cost at which the fit ends, because the model reproduces the data exactly."""
 CONVERGED = 1e-4
 """Relative decrease of the cost at which the fit ends."""
 
@@ -39,20 +39,20 @@ class PieceFit:
     Parameters
     ----------
     model : Model
-        With the fitted values.
+        Model with the fitted values.
     names : tuple of str
         Free numbers.
     matrices : (p, q + r + 1, q + r + 1) ndarray
-        Of every piece, over its samples and its floor squared: sensitivities of the q numbers, the zeros of the r
-        records, and the residual.
+        Inner products of every piece, divided by its number of samples and its squared noise floor: sensitivities of
+        the q parameters, the zeros of the r records, and the residual.
     weights : (p,) ndarray
-        Of the pieces; their sum is 1.
+        Weights of the pieces; their sum is 1.
     cost : float
-        Weighted mean of R², zeros free.
+        Weighted mean of R² with fitted zeros.
     converged : bool
-        False where the limit of iterations came first.
+        False if the limit of iterations was reached first.
     iterations : int
-        Linearisations.
+        Number of linearisations.
     """
 
     model: Model
@@ -70,7 +70,7 @@ class PieceFit:
 
     @property
     def zeros(self) -> Array:
-        """Zeros of the records at their best [m], shape (r,)."""
+        """Fitted sensor zeros of the records [m], shape (r,)."""
         total, numbers = self.total, len(self.names)
         matrix, cross = total[numbers:-1, numbers:-1], total[numbers:-1, -1]
         return np.asarray(np.linalg.lstsq(matrix, cross, rcond=None)[0])
@@ -82,7 +82,7 @@ class PieceFit:
         return np.array([m[-1, -1] - 2.0 * zeros @ m[own, -1] + zeros @ m[own, own] @ zeros for m in self.matrices])
 
     def box(self) -> tuple[Array, Array]:
-        """How far every number may move, down and up; zeros without end."""
+        """Distance of every parameter to its lower and upper bound; zeros are not bounded."""
         values = self.model.values()
         rows = [self.model.row(n) for n in self.names]
         now = np.array([values[n] for n in self.names])
@@ -111,7 +111,7 @@ def linearised(
 
 
 def cost_of(total: Array, numbers: int) -> float:
-    """Weighted mean of R² with the zeros at their best."""
+    """Weighted mean of R² with fitted zeros."""
     zeros, cross = total[numbers:-1, numbers:-1], total[numbers:-1, -1]
     return float(total[-1, -1] - cross @ np.linalg.lstsq(zeros, cross, rcond=None)[0])
 
@@ -124,7 +124,7 @@ def fit_pieces(
     max_iterations: int = 25,
     damping: float = 1e-6,
 ) -> PieceFit:
-    """Fit the numbers `names` by damped Gauss-Newton inside the bounds of their table.
+    """Fit the parameters `names` by damped Gauss-Newton steps inside their bounds.
 
     Parameters
     ----------
@@ -137,9 +137,9 @@ def fit_pieces(
     names : sequence of str
         Free numbers.
     max_iterations : int
-        Linearisations at most.
+        Largest number of linearisations.
     damping : float
-        Of the first step, share of the diagonal.
+        Damping of the first step, as a share of the diagonal.
     """
     names = tuple(names)
     matrices, weights = linearised(model, pieces, floors, names)
@@ -178,7 +178,7 @@ def _step(now: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float],
 
 
 def best_step(now: PieceFit, total: Array, damping: float = 0.0) -> Array:
-    """Change of numbers and zeros that `total`, some sum of the matrices, asks for."""
+    """Least-squares change of parameters and zeros for `total`, a sum of matrices of pieces."""
     directions = free_directions(now)
     hessian = directions.T @ total[:-1, :-1] @ directions
     diagonal = np.maximum(np.diag(hessian), 1e-30)
@@ -192,7 +192,7 @@ def best_step(now: PieceFit, total: Array, damping: float = 0.0) -> Array:
 
 
 def free_directions(now: PieceFit) -> Array:
-    """Directions (q + r, d) in which numbers and zeros may move, G(1) held."""
+    """Directions (q + r, d) in which parameters and zeros may change while G(1) is constant."""
     own = gauge(now.model, now.names)
     zeros = now.matrices.shape[1] - 1 - len(now.names)
     whole = np.zeros((own.shape[0] + zeros, own.shape[1] + zeros))

@@ -14,13 +14,13 @@ from ...record import Record, Samples
 from ..records.leading_step import step_length
 
 SWING = 0.005
-"""Share of the range of the drive that a turn must go back, so that noise is none."""
+"""A turning point counts if the drive goes back by this share of its range; noise does not."""
 PER_DECADE = 2
-"""Classes of the rate per decade."""
+"""Number of classes of the rate per decade."""
 AMPLITUDES = 3
-"""Classes of the amplitude, equal shares of the largest."""
+"""Number of classes of the amplitude, equally spaced up to the largest one."""
 FEWEST = 32
-"""Samples of a piece at least."""
+"""Smallest number of samples in a piece."""
 MOST = 24
 """Number of pieces from which a record is cut into equal pieces instead, because its drive has no single rates."""
 EQUAL = 5
@@ -53,15 +53,15 @@ class RecordPiece:
     Parameters
     ----------
     record : Record
-        Its samples; continues the piece before it.
+        Samples of the piece; it continues the piece before it.
     origin : int
         Index of the record that it was cut from.
     kind : Kind
         What the drive does.
     rate : int
-        Class of the rate, of loops.
+        Class of the rate, for loops.
     amplitude : int
-        Class of the amplitude, of loops.
+        Class of the amplitude, for loops.
     """
 
     record: Record
@@ -72,7 +72,7 @@ class RecordPiece:
 
 
 def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[RecordPiece]:
-    """Every record cut in pieces; those not in `fitted` only carry the state of the stage.
+    """Cut every record into pieces. Records that are not in `fitted` only determine the state of the stage.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def _cut(record: Record, index: int, largest: float) -> list[RecordPiece]:
 
 
 def _loops(record: Record, u: Samples, largest: float) -> list[tuple[int, int, int]]:
-    """Ends of the sections of one rate and one amplitude, with the classes of both."""
+    """Ends of the sections with one rate and one amplitude, and the classes of both."""
     if not u.size:
         return []
     turns = np.empty(u.size, np.int64)
@@ -123,7 +123,7 @@ def _loops(record: Record, u: Samples, largest: float) -> list[tuple[int, int, i
     times = np.maximum(edges - starts, 1) * record.sample_period
     spans = np.abs(u[edges] - u[starts])
     rates = np.round(PER_DECADE * np.log10(0.5 / times)).astype(int)
-    # one swing more or less is not another rate
+    # one swing more or less does not make another rate
     rates = np.array([int(np.median(rates[max(0, k - 1) : k + 2])) for k in range(rates.size)])
     sizes = np.minimum((AMPLITUDES * spans / largest).astype(int), AMPLITUDES - 1)
     found: list[tuple[int, int, int]] = []
@@ -153,7 +153,7 @@ def _with_parts(found: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]
 
 @kernel
 def find_turns(u: Samples, least: float, turns: NDArray[np.int64]) -> int:
-    """Indices at which u (n,) turns back by more than `least`, to turns (n,); their number."""
+    """Write the indices at which u (n,) turns back by more than `least` to turns (n,); returns their number."""
     count = 0
     low, high, at_low, at_high, direction = u[0], u[0], 0, 0, 0
     for i in range(u.size):

@@ -1,4 +1,4 @@
-"""The frequency at which a stage rings behind a step, from what a model without a mode leaves there."""
+"""The frequency at which a stage rings after a step, from the residual of a model without a mode."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from ...model.model import Model
 from .pieces import Kind, RecordPiece
 
 CYCLES = 4.0
-"""Fewest cycles in the piece behind the step."""
+"""Smallest number of cycles in the piece after the step."""
 RESOLVED = 0.45
-"""Highest frequency, cycles per sample: faster modes are a lag."""
+"""Highest frequency [cycles per sample]; a faster mode acts as a lag."""
 STANDS_OUT = 10.0
-"""Power of the highest line over the median of its spectrum."""
+"""Smallest ratio of the highest spectral line to the median of the spectrum, in power."""
 
 
 def ringing_frequency(model: Model, pieces: Sequence[RecordPiece]) -> float | None:
-    """Frequency of the highest line of the residual behind steps [Hz]; None where none stands out.
+    """Frequency of the highest spectral line of the residual after steps [Hz]; None if no line stands out.
 
     Parameters
     ----------
     model : Model
-        Without a mode.
+        Model without a mode.
     pieces : sequence of RecordPiece
         In order.
     """

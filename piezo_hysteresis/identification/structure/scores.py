@@ -1,4 +1,4 @@
-"""Structures of a model, judged on rates, amplitudes and records that were left out, from inner products alone."""
+"""Scores of model structures by cross-validation over rates, amplitudes and records; computed from inner products."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 MOST_LEFT_OUT = 0.75
-"""Share of the experiment that a fold may leave out, every record counting the same."""
+"""Largest share of the experiment that a fold leaves out; every record counts the same."""
 FEWEST = 3
-"""Folds below which every piece is one more."""
+"""With fewer folds than this, every piece becomes a further fold."""
 FAST, SLOW = f"{CreepTwoRates.name}.gamma_fast", f"{CreepTwoRates.name}.gamma_slow"
-"""Rates of the creep in the full model."""
+"""Parameters of the creep rates in the full model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +32,11 @@ class ModelStructure:
     Parameters
     ----------
     square : bool
-        The even term of the drive.
+        Whether it has the even term of the drive.
     creep_rates : int
-        Numbers of the creep: 0, 1 (logarithmic) or 2.
+        Number of creep rates: 0, 1 (logarithmic) or 2.
     level : bool
-        Weights of the plays that depend on the level.
+        Whether the weights of the plays depend on the level.
     """
 
     square: bool
@@ -45,7 +45,7 @@ class ModelStructure:
 
     @property
     def size(self) -> int:
-        """Number of numbers."""
+        """Number of optional parameters."""
         return int(self.square) + self.creep_rates + 2 * int(self.level)
 
     @property
@@ -56,7 +56,7 @@ class ModelStructure:
         return (*square, *creep, *((MEMORY.level_term.name,) if self.level else ()))
 
     def is_held(self, name: str) -> bool:
-        """Whether the number `name` is off in this structure."""
+        """Whether the parameter `name` is off in this structure."""
         owner = name.partition(".")[0]
         return (
             (owner == EvenInputPolynomial.name and not self.square)
@@ -68,23 +68,23 @@ class ModelStructure:
 STRUCTURES = tuple(
     ModelStructure(square, rates, level) for square in (False, True) for rates in (0, 1, 2) for level in (False, True)
 )
-"""All that are offered."""
+"""All structures to choose from."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Judged:
-    """How well a structure predicts what was left out.
+    """Score of a structure by cross-validation.
 
     Parameters
     ----------
     structure : ModelStructure
-        Its effects.
+        The structure.
     score : float
         Mean over the folds of ln max(1, R²).
     step : (q,) ndarray
-        Change of the numbers that all pieces ask for.
+        Change of the parameters that all pieces together require.
     without : (k, q) ndarray
-        The same with each fold left out.
+        The same change with each fold left out.
     """
 
     structure: ModelStructure
@@ -94,9 +94,9 @@ class Judged:
 
 
 def folds_of(pieces: Sequence[RecordPiece]) -> list[Mask]:
-    """Sets of the pieces that count to leave out, as masks: every rate, every amplitude, every record.
+    """Folds as masks of the pieces that count: every rate, every amplitude and every record is left out once.
 
-    Where these are few, every piece. Nothing is left out beside which little remains.
+    If these are few, every piece is left out once, too. A fold never leaves out most of the experiment.
     """
     counted = [p for p in pieces if WEIGHTS[p.kind] > 0.0]
     loops = np.array([p.kind is Kind.LOOP for p in counted])
@@ -121,16 +121,16 @@ def folds_of(pieces: Sequence[RecordPiece]) -> list[Mask]:
 
 
 def judge(full: PieceFit, pieces: Sequence[RecordPiece], structures: Sequence[ModelStructure]) -> Iterator[Judged]:
-    """Every structure inside the fitted full one, with the bounds of its numbers kept.
+    """Score every structure as a part of the fitted full model, inside the bounds of its parameters.
 
     Parameters
     ----------
     full : PieceFit
-        Of a model that holds all optional effects.
+        Fit of a model with all optional effects.
     pieces : sequence of RecordPiece
-        Those of the fit.
+        Pieces of that fit.
     structures : sequence of ModelStructure
-        To be judged.
+        Structures to score.
     """
     folds = folds_of(pieces)
     kinds = [p.kind for p in pieces if WEIGHTS[p.kind] > 0.0]
@@ -139,7 +139,7 @@ def judge(full: PieceFit, pieces: Sequence[RecordPiece], structures: Sequence[Mo
         free, fixed, low, high = _space(full, structure)
         whole = _solve(full.total, free, fixed, low, high)
         logs, steps = [], []
-        if held.any():  # what a hold shows of creep no other piece does: it is not left out
+        if held.any():  # only holds show creep well, so they are not left out
             logs.append(_logs(full, whole, held, False))
         for mask in folds:
             weights = np.where(mask, 0.0, full.weights)
@@ -154,7 +154,7 @@ def judge(full: PieceFit, pieces: Sequence[RecordPiece], structures: Sequence[Mo
 
 
 def _space(full: PieceFit, structure: ModelStructure) -> tuple[Array, Array, Array, Array]:
-    """Directions in which a structure is free, where it stands in those that are not, and the bounds."""
+    """Free directions of a structure, its fixed values in the other directions, and the bounds."""
     size = full.matrices.shape[1] - 1
     values = full.model.values()
     low, high = full.box()
@@ -166,7 +166,7 @@ def _space(full: PieceFit, structure: ModelStructure) -> tuple[Array, Array, Arr
             kept.remove(k)
     if structure.creep_rates == 1 and FAST in full.names:
         fast, slow = full.names.index(FAST), full.names.index(SLOW)
-        # both rates move together, from the fast one
+        # both rates are equal and follow the fast one
         free[slow, fast] = 1.0
         fixed[slow] = values[FAST] - values[SLOW]
         kept.remove(slow)
@@ -185,7 +185,7 @@ def _solve(total: Array, free: Array, fixed: Array, low: Array, high: Array) -> 
 
 
 def _logs(full: PieceFit, step: Array, mask: Mask, zero_free: bool) -> float:
-    """Mean ln max(1, R²) of the pieces in `mask`; the zero of a record of which nothing was fitted is free."""
+    """Mean ln max(1, R²) of the pieces in `mask`; the zero of a record without fitted pieces is free."""
     numbers, logs = len(full.names), []
     zeros = np.arange(numbers, step.size)
     rest = full.matrices[~mask].sum(axis=0) if not mask.all() else np.zeros_like(full.matrices[0])

@@ -1,4 +1,4 @@
-"""How sure the numbers of a chosen structure are: residual, folds left out, and structures that are still possible."""
+"""Uncertainty of the parameters of the chosen structure, from the residual, the folds and other possible structures."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .pieces import Kind, RecordPiece
 from .scores import FAST, Judged
 
 OPEN = 0.4
-"""Difference of scores within which a structure is still possible: what it would change is uncertainty."""
+"""Difference of scores within which another structure is possible; its parameter changes count as uncertainty."""
 
 
 def spread_of(full: PieceFit, final: PieceFit, chosen: Judged, judged: Sequence[Judged]) -> Array:
-    """Covariance of the chosen numbers from folds left out and from structures that are still possible."""
+    """Covariance of the parameters from the folds and from other possible structures."""
     numbers = len(full.names)
     own = chosen.without - chosen.step
     count = len(own)
@@ -37,12 +37,12 @@ def spread_of(full: PieceFit, final: PieceFit, chosen: Judged, judged: Sequence[
 
 
 def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float], spread: Array) -> Fit:
-    """In the form of every other fit; the variance of the residual is added to `spread`."""
+    """The fit to pieces as a `Fit`; the variance from the residual is added to `spread`."""
     numbers = len(found.names)
     total = found.total
     counted = [p for p in pieces if p.kind is not Kind.CONDITIONING]
     inverse = _inverse(found)
-    # the residual is structure, not noise: a piece of n samples counts as √n of them
+    # the residual is a model error, not noise, so a piece of n samples counts as √n independent samples
     meat = np.zeros_like(total[:-1, :-1])
     left = found.squares
     for weight, square, matrix, piece in zip(found.weights, left, found.matrices, counted, strict=True):
@@ -72,7 +72,7 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
 
 
 def _inverse(found: PieceFit) -> Array:
-    """Of the normal equations, in the directions that are free; numbers at a bound stay there."""
+    """Inverse of the normal equations in the free directions; parameters at a bound stay there."""
     directions = free_directions(found)
     low, high = found.box()
     stuck = (low >= 0.0) | (high <= 0.0)
