@@ -41,14 +41,14 @@ def what_a_stage_does() -> Figure:
         record = stage.play(sine(LIMITS, frequency, 3.0 / frequency))
         last = slice(-round(1.0 / frequency / record.sample_period) - 1, None)
         rate.plot(record.voltage[last], record.displacement[last] * 1e6, color=colour, label=f"{frequency:g} Hz")
-    rate.set(title="rate dependence", xlabel="drive u [V]")
+    rate.set(title="rate dependence", xlabel="drive u [V]", ylabel="displacement y [µm]")
     rate.legend()
 
     record = stage.play(np.concatenate([hold(LIMITS, 0.0, 0.1), steps(LIMITS, (0.0, 0.5), 10.0)])[5000:], average=500)
     onset = int(np.argmax(record.voltage > 4.9)) + 1
     time = record.sample_period * np.arange(record.size - onset)
     creep.semilogx(time[1:], record.displacement[onset + 1 :] * 1e6, color=BLACK, linewidth=1.0)
-    creep.set(title="creep after a step to 5 V", xlabel="time since the step [s]")
+    creep.set(title="creep after a step to 5 V", xlabel="time since the step [s]", ylabel="displacement y [µm]")
     return figure
 
 

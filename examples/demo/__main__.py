@@ -16,6 +16,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+import numpy as np
 import picture
 import rclpy
 import scan
@@ -54,7 +55,7 @@ class Demo:
         self.folder = folder
         self.console = Console(highlight=False, soft_wrap=True)
         self.begin = time.monotonic()
-        self.voltage: NDArray = probe(LIMITS)
+        self.parts: dict[str, NDArray] = probe(LIMITS)
         self.traces: dict[str, Trace] = {}
         self.verdict = ""
         self.scan: Scan | None = None
@@ -96,7 +97,7 @@ class Demo:
 
     def look(self, bench: Bench, name: str, model: Model) -> None:
         """Play the probe and show what the model node, which follows `model`, leaves of it."""
-        trace = bench.play(self.voltage, "probe")
+        trace = bench.play(np.concatenate(list(self.parts.values())), "probe")
         self.traces[name] = trace
         before = next(iter(self.traces.values())).rms
         bar = "█" * max(1, round(40 * trace.rms / before))
@@ -166,7 +167,7 @@ class Demo:
         """Figures and the page."""
         assert self.scan is not None
         self.scan.save(self.folder)
-        picture.save(self.folder / "residual.png", self.voltage, LIMITS.sample_period, self.traces)
+        picture.save(self.folder / "residual.png", self.parts, LIMITS.sample_period, self.traces)
         command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "report", os.path.relpath(experiment)]
         for label, file in (("identified", "identification.yaml"), ("extended", "diagnosis.yaml")):
             command += ["--model", f"{label}={experiment / file}"]

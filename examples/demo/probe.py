@@ -9,13 +9,13 @@ from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.identification.protocol.excitation import hold, mixture, sine, steps, triangle
 
 
-def probe(limits: DriveLimits) -> NDArray[np.float64]:
-    """Slow loops, a fast sine, levels held, and a random mixture [V]: 8 s that no fit has seen."""
-    parts = (
-        triangle(limits, (1.0, 0.6), 1.0),
-        sine(limits, 200.0, 0.3, centre=0.5, amplitude=0.4),
-        steps(limits, (0.2, 0.8, 0.4), 1.0, slew_rate=limits.ramp_rate),
-        hold(limits, 0.0, 0.5),
-        mixture(limits, 1.5, seed=12345),
-    )
-    return np.concatenate([limits.from_safe_to_safe(part) for part in parts])
+def probe(limits: DriveLimits) -> dict[str, NDArray[np.float64]]:
+    """Slow loops, a fast sine, levels held, and a random mixture [V], by name: 8 s that no fit has seen."""
+    parts = {
+        "slow loops": triangle(limits, (1.0, 0.6), 1.0),
+        "200 Hz": sine(limits, 200.0, 0.3, centre=0.5, amplitude=0.4),
+        "levels held": steps(limits, (0.2, 0.8, 0.4), 1.0, slew_rate=limits.ramp_rate),
+        "rest": hold(limits, 0.0, 0.5),
+        "random mixture": mixture(limits, 1.5, seed=12345),
+    }
+    return {name: limits.from_safe_to_safe(part) for name, part in parts.items()}

@@ -15,7 +15,7 @@ from validation import draw_loops, error_row, sine
 
 def figure_7() -> Exhibit:
     """Loops of the dynamic model at the frequencies of Table 1."""
-    figure, axes = canvas(2, 3)
+    figure, axes = canvas(2, 3, sharex=True, sharey=True)
     row = draw_loops(axes, joint("bouc_wen").model, "bouc_wen", "dynamic model", {"color": DYNAMIC})
     stage, record = plant("bouc_wen"), sine("bouc_wen", 50.0)
     stroke = float(np.ptp(record.displacement[last_period(record, 50.0)]))

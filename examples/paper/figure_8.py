@@ -15,7 +15,7 @@ from validation import draw_loops
 
 def figure_8() -> Exhibit:
     """Loops of MBW alone at the frequencies of Table 1."""
-    figure, axes = canvas(2, 3)
+    figure, axes = canvas(2, 3, sharex=True, sharey=True)
     model = alone(joint("bouc_wen").model)
     row = draw_loops(axes, model, "bouc_wen", "MBW alone", {"color": STATIC})
     return Exhibit(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 import published
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
@@ -33,13 +34,14 @@ def error_row(model: Model, operator: str) -> list[float]:
 
 
 def draw_loops(axes: list[Axes], model: Model, operator: str, label: str, style: Mapping[str, object]) -> list[float]:
-    """Measured and predicted loop at every frequency, one per axes; returns the errors."""
+    """Simulated stage and model: the loop at every frequency, one per axes; returns the errors."""
     row = error_row(model, operator)
     for ax, frequency, error in zip(axes, published.FREQUENCIES, row, strict=True):
         voltage, measured, predicted = last_loop(model, sine(operator, frequency), frequency)
-        ax.plot(voltage, measured * 1e6, color="#000000", label="measured")
+        voltage, measured, predicted = (np.append(x, x[0]) for x in (voltage, measured, predicted))  # close the loop
+        ax.plot(voltage, measured * 1e6, color="#000000", label="simulated stage")
         ax.plot(voltage, predicted * 1e6, "--", label=label, **style)
-        ax.set(xlabel="u [V]", ylabel="y [µm]")
-        ax.set_title(f"{frequency:g} Hz: {error:.2f} %")
+        ax.set(xlabel="drive u [V]", ylabel="displacement y [µm]")
+        ax.set_title(f"{frequency:g} Hz: error {error:.2f} % of peak-to-peak", fontsize="medium")
     axes[0].legend()
     return row

@@ -15,7 +15,7 @@ ENOUGH = 1.5
 
 @dataclass(frozen=True, slots=True)
 class VerdictText:
-    """One headline and the sentences under it."""
+    """One headline, the sentence that is the verdict, and the sentences that go into detail."""
 
     headline: str
     sentences: tuple[str, ...]
@@ -42,7 +42,7 @@ def verdict(comparison: ModelComparison, answer: Mapping[str, Any] | None = None
         advice = (more,) if _excess(comparison) > ENOUGH else ()
         return VerdictText(_fit_headline(comparison), (*cautions, *_fit_sentences(comparison), *advice))
     said = answer_verdict(answer)
-    return VerdictText(said.headline, (*cautions, *said.sentences, *_fit_sentences(comparison)))
+    return VerdictText(said.headline, (*said.sentences, *cautions, *_per_record_sentences(comparison)))
 
 
 def answer_verdict(answer: Mapping[str, Any]) -> VerdictText:
@@ -73,12 +73,7 @@ def _fit_sentences(comparison: ModelComparison) -> tuple[str, ...]:
     ]
     if before is not None:
         sentences.append(f"Before, it was {nanometre(before.rms)}, {before.percent:.3g} % of range.")
-    model = comparison.model
-    fitted = [] if model is None else [e.public_name() for e in model.effects if not e.is_predicted_live()]
-    sentences += [
-        f"{name.replace('_', ' ').capitalize()} is fitted to each recording in this error; it is not predicted live."
-        for name in fitted
-    ]
+    sentences += _per_record_sentences(comparison)
     if _excess(comparison) <= ENOUGH:
         sentences.append("This error is at the floor: only noise remains.")
     else:
@@ -87,6 +82,16 @@ def _fit_sentences(comparison: ModelComparison) -> tuple[str, ...]:
             f"The error is largest in {worst.phase}: {worst.percent:.3g} % of range, {times:.3g} times its floor."
         )
     return tuple(sentences)
+
+
+def _per_record_sentences(comparison: ModelComparison) -> tuple[str, ...]:
+    """What the error holds that a running stage does not show."""
+    model = comparison.model
+    fitted = [] if model is None else [e.public_name() for e in model.effects if not e.is_predicted_live()]
+    return tuple(
+        f"{name.replace('_', ' ').capitalize()} is fitted to each recording in this error; it is not predicted live."
+        for name in fitted
+    )
 
 
 def sentence(text: str) -> str:

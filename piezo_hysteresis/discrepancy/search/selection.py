@@ -50,6 +50,9 @@ MOST_TURNS = 5
 ALIKE = 0.97
 """|cos| of two signatures from which they count as one."""
 
+NO_GAIN = 0.005
+"""Smallest gain in cross-validation that is stated as a number: below it, it would read 0.00."""
+
 
 def select(
     model: Model,
@@ -176,7 +179,8 @@ def _turn(
             rejected.append(Rejection(candidate.name, message))
     for other in _others(screened, refits):
         most = max(0.0, before.cost - other.score.cost)
-        rejected.append(Rejection(other.name, f"in cross-validation it gains at most {most:.2f} in mean ln R²"))
+        gains = f"it gains at most {most:.2f} in mean ln R²" if most >= NO_GAIN else "it does not reduce the error"
+        rejected.append(Rejection(other.name, f"in cross-validation {gains}"))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
 
 

@@ -25,6 +25,8 @@ COHERENT = 0.5
 """Lines of less coherence are left out."""
 GAP = 8
 """Incoherent lines in a row at which the drive is taken to end."""
+EDGE = 20
+"""Lines with which the last one is compared; it is left out where it is three times as uncertain."""
 
 
 @styled
@@ -145,6 +147,9 @@ def _spread(found: FrequencyResponse) -> NDArray[np.intp]:
     # by chance single lines of pure noise look coherent: stop at the first wide gap
     (gaps,) = np.nonzero(np.diff(good) > GAP)
     good = good[: gaps[0] + 1] if gaps.size else good
+    # at the edge of the band of the drive single lines are left that say nothing
+    while good.size > EDGE and found.deviation[good[-1]] > 3.0 * np.median(found.deviation[good[-EDGE:-1]]):
+        good = good[:-1]
     wanted = np.geomspace(found.frequency[good[0]], found.frequency[good[-1]], POINTS)
     nearest = np.abs(np.log(found.frequency[good])[:, None] - np.log(wanted)).argmin(axis=0)
     return np.asarray(good[np.unique(nearest)])

@@ -68,6 +68,10 @@ class ModelComparison:
         """Errors of the model that growth began with, None where it did not grow."""
         return self.errors[next(iter(self.models))] if len(self.models) > 1 else None
 
+    def drawn(self) -> list[int]:
+        """Numbers of the records to draw: those whose start is known, or all where none is or no model is given."""
+        return list(range(len(self.experiment))) if self.now is None else [row.index for row in self.now.judged]
+
     def indices(self, *phases: str) -> list[int]:
         """Numbers of the records whose phase name is, or begins with, one of `phases`."""
         return [i for i, r in enumerate(self.experiment) if r.phase in phases or r.phase.split("_")[0] in phases]

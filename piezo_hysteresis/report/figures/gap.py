@@ -30,6 +30,9 @@ def gap(comparison: ModelComparison) -> Drawing | None:
     after = np.array([now.by_phase[n] for n in names])
     data = {"phase": np.array(names), "floor_percent_of_range": floors, "error_percent_of_range": after}
     axis.plot(floors, place, linestyle="none", marker="|", markersize=13, markeredgewidth=2, color=GREY, label="floor")
+    shown = np.concatenate((floors, after))
+    left = 0.8 * float(shown[shown > 0.0].min(initial=1.0))
+    axis.barh(place, floors - left, left=left, height=0.55, color="#e8e8e8", zorder=0, label="at the floor")
     message = f"error {now.percent:.3g} % of range over all phases"
     if before is not None:
         old = np.array([before.by_phase[n] for n in names])
@@ -43,6 +46,7 @@ def gap(comparison: ModelComparison) -> Drawing | None:
     axis.set_xscale("log")
     plain_log(axis.xaxis)
     axis.set_yticks(place, names)
+    axis.set_xlim(left=left)
     axis.set_ylim(len(names) - 0.4, -0.6)
     axis.set_xlabel("rms error [% of range]")
     legend_above(figure, handles_of(axis))
@@ -52,7 +56,8 @@ def gap(comparison: ModelComparison) -> Drawing | None:
         "Error by phase",
         (
             "RMS error of every phase in free run. The floor is the noise of the sensor or 0.03 % of "
-            "the range, whichever is larger. An error at the floor needs no further explanation."
+            "the range, whichever is larger. An error inside of the grey bar is at the floor, or below it where "
+            "the sensor is better than 0.03 % of the range: it needs no further explanation."
         ),
         f"Error by phase: {message}; worst in {worst}.",
         figure,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from ...discrepancy.residual.residual import drive_frequency
 from ...record import Record
 from .comparison import ModelComparison
 from .drawing import Drawing
-from .style import MEASURED, PREDICTED, canvas, styled
+from .style import BEFORE, FLOOR, MEASURED, PREDICTED, RESIDUAL, canvas, handles_of, legend_above, styled
 from .thinning import thinned
 
 Array = NDArray[np.float64]
@@ -107,7 +108,7 @@ def loops_by_amplitude(comparison: ModelComparison) -> Drawing | None:
         (
             "Slow loops, one panel per amplitude of the drive. The dashed line (model) should cover "
             "the solid line (measured). The opening is the width of the loop at half its height, in "
-            "per cent of the height."
+            "per cent of the height. Beneath: measured minus predicted over the same drive."
         ),
     )
 
@@ -133,7 +134,8 @@ def loops_by_frequency(comparison: ModelComparison) -> Drawing | None:
         "Loops by frequency",
         (
             "The last full cycle of every sine. The slowest loop shows the hysteresis. With frequency, "
-            "the lag of amplifier, mechanics and sensor opens the loops further."
+            "the lag of amplifier, mechanics and sensor opens the loops further. Beneath: measured minus "
+            "predicted over the same drive."
         ),
     )
 
@@ -148,15 +150,33 @@ def _steady(record: Record, cycle: Cycle, frequency: float) -> bool:
     return abs(length * frequency - 1.0) < 0.1
 
 
+def _residual_against_drive(axis: Any, u: Array, residual: Array, bound: float) -> None:
+    """Both ways of a loop [V, nm], with ± twice the floor."""
+    peak = int(np.argmax(u))
+    for way, word, style in ((slice(0, peak + 1), "rising", RESIDUAL), (slice(peak, u.size), "falling", BEFORE)):
+        at = thinned(residual[way], 300)
+        axis.plot(u[way][at], residual[way][at], label=f"residual, {word} drive", **{**style, "linewidth": 0.7})
+    for sign, name in ((-1.0, "± 2 × floor"), (1.0, "_")):
+        axis.axhline(sign * bound, label=name, **FLOOR)
+
+
 def _drawing(
     comparison: ModelComparison, kept: list[Cycle], titles: list[str], name: str, title: str, caption: str
 ) -> Drawing:
     columns = min(3, len(kept))
     rows = -(-len(kept) // columns)
-    figure, axes = canvas(rows, columns, 2.9 * rows + 0.3)
+    step = 1 if comparison.now is None else 2
+    figure, axes = canvas(
+        step * rows,
+        columns,
+        (2.9 if step == 1 else 4.0) * rows + 0.3,
+        gridspec_kw={"height_ratios": [2.4, 1.0][:step] * rows},
+    )
     data: dict[str, Array] = {}
     descriptions = []
-    for panel, (axis, cycle, heading) in enumerate(zip(axes.flat, kept, titles, strict=False), 1):
+    for panel, (cycle, heading) in enumerate(zip(kept, titles, strict=True), 1):
+        row, column = step * ((panel - 1) // columns), (panel - 1) % columns
+        axis = bottom = axes[row, column]
         record = comparison.experiment[cycle.index]
         u, y = record.voltage[cycle.part], record.displacement[cycle.part]
         shown = np.union1d(thinned(u, 600), thinned(y, 300))
@@ -168,13 +188,21 @@ def _drawing(
             axis.plot(u[shown], 1e6 * p[shown], label="predicted", **PREDICTED)
             words += f", predicted {opening(u, p):.1f} %"
             data[f"predicted_m_{panel}"] = p[shown]
+            bottom = axes[row + 1, column]
+            _residual_against_drive(bottom, u, 1e9 * (y - p), 2e9 * comparison.floors[cycle.index])
+            axis.tick_params(labelbottom=False)
         axis.set_title(heading)
-        axis.set_xlabel("drive u [V]")
+        bottom.set_xlabel("drive u [V]")
         axis.text(0.97, 0.04, words.replace(", ", "\n"), transform=axis.transAxes, ha="right", fontsize=8.5)
         descriptions.append(f"{heading}: {words}")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("displacement y [µm]")
-    for axis in list(axes.flat)[len(kept) :]:
-        axis.set_axis_off()
-    axes.flat[0].legend(loc="upper left")
+    for number, axis in enumerate(axes[:, 0]):
+        axis.set_ylabel("residual [nm]" if number % step else "displacement y [µm]")
+    for panel in range(len(kept), rows * columns):
+        for extra in range(step):
+            axes[step * (panel // columns) + extra, panel % columns].set_axis_off()
+    handles = handles_of(axes[0, 0])
+    if comparison.now is not None:
+        handles |= handles_of(axes[1, 0])
+    legend_above(figure, handles, columns=len(handles))
+    figure.align_ylabels()
     return Drawing(name, title, caption, f"{title}. " + "; ".join(descriptions) + ".", figure, data)

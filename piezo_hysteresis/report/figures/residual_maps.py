@@ -68,7 +68,8 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
         "residual_maps",
         "Residual against drive, displacement and rate",
         (
-            "Grey: how often a residual occurs, on a logarithmic scale, all phases with equal weight. "
+            "Grey: how often a residual occurs, on a logarithmic scale, all phases with equal weight, "
+            "except those that begin in an unknown state. "
             "If the mean differs from zero, something is missing in the model. A mean that bends over "
             "u or y is a static nonlinearity. A mean that differs between rising and falling drive is "
             "hysteresis. A mean that grows with du/dt is a lag or a rate dependence."
@@ -82,7 +83,8 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
 def _samples(comparison: ModelComparison) -> list[tuple[Array, Array, Array, Array]]:
     assert comparison.now is not None
     parts = []
-    for record, residual in zip(comparison.experiment, comparison.now.residuals, strict=True):
+    for index in comparison.drawn():
+        record, residual = comparison.experiment[index], comparison.now.residuals[index]
         if record.size < 2:
             continue
         step = max(1, record.size // PER_RECORD)

@@ -48,7 +48,8 @@ def window(record: Record, residual: Array | None) -> slice:
 def time_series(comparison: ModelComparison) -> Drawing:
     """One panel per phase name: displacement above, residual below; fast phases around their largest residual."""
     first: dict[str, int] = {}
-    for index, record in enumerate(comparison.experiment):
+    for index in comparison.drawn():
+        record = comparison.experiment[index]
         if record.phase not in first or _rms(comparison, index) > _rms(comparison, first[record.phase]):
             first[record.phase] = index
     sines = sorted((f, r.phase) for r in comparison.experiment if (f := drive_frequency(r)) is not None)
@@ -119,8 +120,8 @@ def time_series(comparison: ModelComparison) -> Drawing:
         "Against time",
         (
             "Displacement, and below it the residual (measured minus predicted). Fast phases are shown "
-            "around their largest residual. Of repeated phases, the one with the largest error is "
-            "shown; of the sines, the slowest and the fastest."
+            "around their largest residual. A phase that begins in an unknown state is not shown. Of "
+            "repeated phases, the one with the largest error is shown; of the sines, the slowest and the fastest."
         ),
         f"Displacement against time for the phases {names}; {words}.",
         figure,

@@ -23,8 +23,12 @@ def effect_table(answer: Mapping[str, Any]) -> Table | None:
             rows.append(
                 (effect["name"], effect["family"], share, twins, name, f"{value['value']:.4g}", message, value["unit"])
             )
-    header = ("effect", "family", "explains", "confusable with", "parameter", "value", "95 %", "unit")
-    return Table("Effects found", header, tuple(rows), "", frozenset({2, 5, 6})) if rows else None
+    header = ("effect", "family", "gap explained", "confusable with", "parameter", "value", "95 %", "unit")
+    several = len({row[0] for row in rows}) > 1
+    note = (
+        "The gap explained is that of the effect and of all effects above it; the shares do not add." if several else ""
+    )
+    return Table("Effects found", header, tuple(rows), note, frozenset({2, 5, 6})) if rows else None
 
 
 def where_table(answer: Mapping[str, Any]) -> Table | None:
@@ -54,7 +58,13 @@ def gap_table(answer: Mapping[str, Any]) -> Table | None:
 
 def rejection_table(answer: Mapping[str, Any]) -> Table | None:
     """Effects that were tried and why they were not taken."""
-    rows = tuple((r["name"], r["reason"]) for r in answer.get("rejected", ()))
+    by_reason: dict[str, list[str]] = {}
+    for rejected in answer.get("rejected", ()):
+        by_reason.setdefault(rejected["reason"], []).append(rejected["name"])
+    rows = tuple(
+        (names[0], reason) if len(names) == 1 else (f"{len(names)} effects", f"{reason}: {', '.join(names)}")
+        for reason, names in by_reason.items()
+    )
     return Table("Rejected", ("effect", "reason"), rows) if rows else None
 
 

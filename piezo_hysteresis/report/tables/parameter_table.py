@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...effects import Arx
 from ...identification.fit.fit import Fit
 from ...model.model import Model
@@ -19,10 +21,10 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
     model : Model
         Values, units, bounds and meanings.
     fit : Fit, optional
-        Fit of this model, for intervals and bounds hit.
+        Fit of this model, for intervals and bounds hit; default: the intervals that the model file holds.
     """
     rows = []
-    sure = {} if fit is None else {n: 1.96 * s for n, s in fit.standard_errors.items()}
+    sure = _intervals(model, fit)
     hit = () if fit is None else fit.at_bounds
     for effect in model.effects:
         for row in effect.parameters:
@@ -47,6 +49,16 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
         note if Arx.name in model else "",
         frozenset({2, 3, 5}),
     )
+
+
+def _intervals(model: Model, fit: Fit | None) -> dict[str, float]:
+    """Half of the 95 % interval of every number that was fitted."""
+    if fit is not None:
+        return {n: 1.96 * s for n, s in fit.standard_errors.items()}
+    known = model.covariance
+    if known is None:
+        return {}
+    return {n: 1.96 * float(s) for n, s in zip(known.names, np.sqrt(np.diag(known.matrix)), strict=True)}
 
 
 def correlation_table(fit: Fit) -> Table | None:
