@@ -1,4 +1,8 @@
-"""Three processes share the tests; those that start nodes, which wait most of their time, go to two of them by file.
+"""Three processes share the tests file by file, so that none of them waits while another one still has many files.
+
+Tests that start nodes wait most of their time. Three such files at once take less of the processors than two of them
+beside a test that computes. Files that open an emulated device, whose lock one process at a time may have, stay in one
+process.
 
 Tests of real processes over DDS need the processor in time. One that fails is tried once more, and reported as RERUN: a
 promise that does not hold fails twice, a computer that was busy elsewhere does not. Nor does it fail a property: no
@@ -9,7 +13,6 @@ nodes need the signal to arrive.
 """
 
 import signal
-from zlib import crc32
 
 import pytest
 from hypothesis import settings
@@ -25,7 +28,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         nodes = item.get_closest_marker("nodes") is not None
         device = item.get_closest_marker("device") is not None
-        half = crc32(item.path.stem.encode()) % 2
-        item.add_marker(pytest.mark.xdist_group(f"nodes_{half}" if nodes or device else item.path.stem))
+        item.add_marker(pytest.mark.xdist_group("devices" if device else item.path.stem))
         if nodes:
             item.add_marker(pytest.mark.flaky(reruns=1))
