@@ -65,7 +65,7 @@ class ControllerAxis:
         limits = {"voltage_max": TOP, "max_slew_rate": SLEW, "ramp_rate": RAMP}
         own = {f"{self._word}__{name}": value for name, value in self._parameters.items()}
         own[f"{self._word}__points_per_command"] = 2000
-        named = {"sample_period": PERIOD, "keeper_timeout": 0.5, "claim_timeout": CLAIM_TIMEOUT, **limits, **own}
+        named = {"sample_period": PERIOD, "keeper_timeout": 2.0, "claim_timeout": CLAIM_TIMEOUT, **limits, **own}
         return self._lab.driver(stage=self._word, **named)
 
     def moves(self, samples, above):

@@ -9,18 +9,20 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_file import dumps
-from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.runtime.qos import LATCHED
 
 pytestmark = pytest.mark.nodes
 
-NODES = ("model_node", "identification_node")
+NODES = ("model_node", "identification_node", "compensation_node")
+PERIOD = 2e-5
 ODD_TIMES = (
     Time(sec=-(2**31)),
     Time(sec=-1, nanosec=2**32 - 1),
@@ -63,10 +65,10 @@ def test_a_driver_never_follows_simulated_time(lab):
 def test_no_date_on_the_clock_ends_a_node_that_follows_it(lab):
     processes = [lab.start(node, use_sim_time=True) for node in NODES]
     reports = lab.diagnostics()
-    lab.wait(lambda: all(newest(reports, node) for node in NODES), "both nodes")
+    lab.wait(lambda: all(newest(reports, node) for node in NODES), "the nodes")
     assert "nothing comes on /clock" in newest(reports, "model_node").message
     clock = lab.publisher(Clock, "/clock")
-    lab.wait(lambda: clock.get_subscription_count() == 2, "both clocks")
+    lab.wait(lambda: clock.get_subscription_count() == len(NODES), "their clocks")
     for _ in range(100):
         for time in ODD_TIMES:
             clock.publish(Clock(clock=time))
@@ -92,6 +94,16 @@ def test_a_number_outside_its_range_is_refused_and_ends_nothing(lab):
         assert not answer.successful
         assert answer.reason
     assert set_parameter(lab, "identification_node", "seed", 3).successful
+    assert process.is_running
+
+
+@pytest.mark.parametrize(("node", "name", "value"), [("compensation_node", "approach", 2.0), ("page_node", "port", 1)])
+def test_what_is_read_at_start_is_not_set_later_without_a_word(lab, node, name, value):
+    process = lab.start(node, **({"port": 0} if node == "page_node" else {}))
+    for odd, given in ((name, value), ("use_sim_time", True)):
+        answer = set_parameter(lab, node, odd, given)
+        assert not answer.successful
+        assert answer.reason
     assert process.is_running
 
 
@@ -155,6 +167,8 @@ def test_texts_of_others_forge_no_line(lab, topic):
         lab.streaming()
         statuses = lab.statuses()
         lab.send([0.0, 0.1, 0.0], evil)
+        lab.publisher(PointCloud2, "trajectory").publish(command_to_cloud([0.0, 0.1, 0.0], PERIOD, evil))
+        lab.wait(lambda: "refused '" in nodes[-1].output, "the refusal of a trajectory")
         lab.wait(lambda: any("refused" in lab.states(statuses, s.name) for s in list(statuses)), "the refusal")
         assert all(s.name.isprintable() and s.message.isprintable() for s in statuses)
     lab.pause(1.0)

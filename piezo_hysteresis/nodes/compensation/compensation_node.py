@@ -41,7 +41,7 @@ class CompensationNode(GuardedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("compensation_node", **options)
-        declare(self, COMPENSATION)
+        declare(self, COMPENSATION, read_only=True)
         self._values = read(self, COMPENSATION)
         compile_kernels()
         self._status = CompensationStatus(self)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 
+from ...errors import printable
 from ..messages.conversions import diagnostic
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
@@ -62,7 +63,7 @@ class CompensationStatus:
 
     def refuse(self, phase: str, reason: str) -> None:
         """Report that nothing moves, and why."""
-        self.refused += 1
+        self.refused, phase = self.refused + 1, printable(phase)
         self._node.get_logger().warning(f"refused '{phase}': {reason}", throttle_duration_sec=0.1)
         self.show("refused", reason, phase, DiagnosticStatus.WARN)
 
@@ -72,6 +73,4 @@ class CompensationStatus:
         self.show("failed", reason, phase, DiagnosticStatus.ERROR)
 
     def _repeat(self) -> None:
-        array = DiagnosticArray(status=[self._shown])
-        array.header.stamp = self._node.get_clock().now().to_msg()
-        send(self._diagnostics, array)
+        send(self._diagnostics, self._node.reported(self._shown))

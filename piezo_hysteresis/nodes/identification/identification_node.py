@@ -215,8 +215,6 @@ class IdentificationNode(GuardedNode):
                 if parameter.name in rows:
                     rows[parameter.name].check(parameter.value)
                     self._check_place(parameter)
-                elif parameter.name == "use_sim_time":
-                    raise ParameterError(f"{parameter.name} is read at start; give it then")
                 elif parameter.name.startswith(QOS_OVERRIDES):
                     continue  # declared when a recording subscribes, which is after the start
                 elif not (parameter.name.startswith(PREFIX) or self.has_parameter(parameter.name)):

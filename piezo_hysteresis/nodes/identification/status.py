@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 
 from ..messages.conversions import diagnostic, values_of
@@ -94,15 +94,5 @@ class IdentificationStatus:
             self.listener(status)
 
     def _repeat(self) -> None:
-        shown, fault = self._shown, self._node.recent_fault
-        assert shown is not None
-        status = diagnostic(
-            max(shown.level, DiagnosticStatus.WARN) if fault else shown.level,
-            shown.name,
-            f"{shown.message}; {fault}" if fault else shown.message,
-            **values_of(shown),
-            faults=self._node.faults,
-        )
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = self._node.get_clock().now().to_msg()
-        send(self._diagnostics, array)
+        assert self._shown is not None
+        send(self._diagnostics, self._node.reported(self._shown))

@@ -172,7 +172,7 @@ class ModelNode(GuardedNode):
             for parameter in parameters:
                 if parameter.name == "model_file":
                     _read(str(rows[parameter.name].check(parameter.value)))
-                elif parameter.name in (*rows, "use_sim_time"):
+                elif parameter.name in rows:
                     raise RecordError(f"{parameter.name} is read at start; give it then")
         except PiezoError as error:
             return SetParametersResult(successful=False, reason=str(error))

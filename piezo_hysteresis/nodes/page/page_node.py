@@ -42,7 +42,7 @@ class PageNode(GuardedNode):
 
     def __init__(self) -> None:
         super().__init__("page_node")
-        declare(self, PAGE)
+        declare(self, PAGE, read_only=True)
         values = read(self, PAGE)
         self._named = _split(values["axes"])
         self._feeds: dict[str, AxisFeed] = {}

@@ -8,9 +8,13 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from ...errors import reason_of
+from ..messages.conversions import diagnostic, values_of
 
 _REMEMBERED = 10.0
 """Time for which a fault is shown on /diagnostics [s]."""
@@ -19,8 +23,15 @@ _LOG_INTERVAL = 0.1
 """Shortest time between two lines about faults in the log [s]: no stream of faults fills a disk."""
 
 
+def _refuse_another_clock(parameters: list[Parameter]) -> SetParametersResult:
+    """Whoever may set parameters could stop a node by dates on /clock, or let it stamp what nobody expects."""
+    if any(parameter.name == "use_sim_time" for parameter in parameters):
+        return SetParametersResult(successful=False, reason="use_sim_time is read at start; give it then")
+    return SetParametersResult(successful=True)
+
+
 class GuardedNode(Node):
-    """Passes on what callbacks raise to `fault`, and goes on.
+    """Passes on what callbacks raise to `fault`, and goes on; keeps the clock that it was started with.
 
     Subscriptions, services and timers are guarded where they are made, which is also where rclpy makes those of its
     own (``/clock``, parameter services). A service that failed answers, with ``success`` false and the reason where its
@@ -36,6 +47,10 @@ class GuardedNode(Node):
     _newest_fault = ""
     _fault_time = 0.0
 
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self.add_on_set_parameters_callback(_refuse_another_clock)
+
     @property
     def recent_fault(self) -> str:
         """The newest fault in one line, for some seconds; empty where there was none."""
@@ -48,6 +63,21 @@ class GuardedNode(Node):
         self.faults += 1
         self._newest_fault, self._fault_time = reason_of(error), time.monotonic()
         self.get_logger().error(f"{self._newest_fault}{place}", throttle_duration_sec=_LOG_INTERVAL)
+
+    def reported(self, status: DiagnosticStatus) -> DiagnosticArray:
+        """A status for /diagnostics, stamped, with the faults so far; a recent one raises its level and is named."""
+        fault = self.recent_fault
+        told = diagnostic(
+            max(status.level, DiagnosticStatus.WARN) if fault else status.level,
+            status.name,
+            f"{status.message}; {fault}" if fault else status.message,
+            status.hardware_id,
+            **values_of(status),
+            faults=self.faults,
+        )
+        array = DiagnosticArray(status=[told])
+        array.header.stamp = self.get_clock().now().to_msg()
+        return array
 
     def guarded(self, callback: Callable[..., Any]) -> Callable[..., Any]:
         """`callback` with its exceptions passed on to `fault`: for tasks and for what is called when a future is done.

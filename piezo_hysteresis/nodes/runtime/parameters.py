@@ -12,7 +12,7 @@ from rclpy.node import Node
 from ...parameter import Row, Setting
 
 
-def declare(node: Node, rows: Iterable[Row], prefix: str = "") -> None:
+def declare(node: Node, rows: Iterable[Row], prefix: str = "", *, read_only: bool = False) -> None:
     """Declare every row as a ROS parameter with default, description and range.
 
     Parameters
@@ -23,10 +23,14 @@ def declare(node: Node, rows: Iterable[Row], prefix: str = "") -> None:
         The table.
     prefix : str
         Put before the names, e.g. ``"model.bouc_wen."``.
+    read_only : bool
+        Whether they are read at start alone; setting them later is refused.
     """
     for row in rows:
         value = list(row.value) if isinstance(row.value, tuple) else row.value
-        node.declare_parameter(prefix + row.name, value, describe(row))
+        descriptor = describe(row)
+        descriptor.read_only = read_only
+        node.declare_parameter(prefix + row.name, value, descriptor)
 
 
 def describe(row: Row) -> ParameterDescriptor:
