@@ -1,4 +1,4 @@
-"""What `make lint` checks of the layout: class names, folder and file sizes, docstrings of constants, commit subjects.
+"""What `make lint` checks of the layout: names, sizes, docstrings of constants, rooms of contracts, commit subjects.
 
 Every finding is one line; without findings nothing is printed and the exit status is 0.
 """
@@ -8,9 +8,11 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+import tomllib
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from datetime import datetime
+from itertools import zip_longest
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -33,6 +35,12 @@ LONGER = {
 """Modules that are longer, and how long they may be."""
 LONGEST_SUBJECT = 72
 """Characters of the first line of a commit message."""
+OUTSIDE = {
+    "the runtime never imports an emulator": {"cli", "emulators"},
+    "only nodes import ROS": {"nodes"},
+    "only report draws": {"cli", "fleet", "nodes", "report"},
+}
+"""Import contracts that hold for every room, and the rooms that they leave out; `cli` and `nodes` draw by `report`."""
 SUBJECTS_SINCE = "2026-11-22T20:40:00+00:00"
 """Commits written before are older than the rule on subjects."""
 
@@ -44,6 +52,7 @@ def findings() -> Iterator[str]:
     yield from full_folders(list(modules))
     yield from long_files(list(modules))
     yield from bare_constants(modules)
+    yield from incomplete_contracts(modules)
     yield from long_subjects()
 
 
@@ -83,7 +92,7 @@ def long_files(paths: list[Path]) -> Iterator[str]:
 def bare_constants(modules: dict[Path, ast.Module]) -> Iterator[str]:
     """Module constants (capitals) that no docstring follows."""
     for path, tree in modules.items():
-        for node, following in zip(tree.body, [*tree.body[1:], None], strict=True):
+        for node, following in zip_longest(tree.body, tree.body[1:]):
             names = _constants(node)
             if names and not _is_docstring(following):
                 where = f"{path.relative_to(ROOT)}:{node.lineno}"
@@ -98,6 +107,17 @@ def _constants(node: ast.stmt) -> list[str]:
 
 def _is_docstring(node: ast.stmt | None) -> bool:
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+
+
+def incomplete_contracts(modules: Iterable[Path]) -> Iterator[str]:
+    """Import contracts that do not name every room that they are for."""
+    rooms = {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in modules} - {"__init__"}
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = {c["name"]: c for c in settings["tool"]["importlinter"]["contracts"]}
+    for name, outside in OUTSIDE.items():
+        named = {module.rpartition(".")[2] for module in contracts[name]["source_modules"]}
+        for room in sorted(rooms - outside - named):
+            yield f"pyproject.toml: contract '{name}' does not name {room}, expected every room; add it"
 
 
 def long_subjects() -> Iterator[str]:
