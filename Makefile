@@ -14,5 +14,5 @@ bench-naming: setup ; @$(RUN) python -m benchmarks.naming $(BENCH)
 soak: setup ; @$(RUN) python -m benchmarks.soak $(SOAK)
 docs: setup ; @$(RUN) python docs/generate.py && scripts/docs
 
-.venv/.installed: requirements.txt requirements-fmu.txt constraints.txt ; @scripts/setup $(PYTHON) && touch $@
+.venv/.installed: requirements.txt requirements-fmu.txt requirements-s3.txt constraints.txt ; @scripts/setup $(PYTHON) && touch $@
 install/.built: .venv/.installed package.xml setup.py setup.cfg $(wildcard config/* launch/*) ; @scripts/build && touch $@

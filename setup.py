@@ -60,6 +60,7 @@ setup(
         "zstandard",
     ],
     extras_require={
+        "fleet": ["aiohttp", "dask", "distributed", "fsspec", "pyarrow"],
         "fmu": ["fmpy"],
         "hardware": ["nidaqmx[grpc]"],
         "labview": ["npTDMS"],

@@ -18,7 +18,7 @@ from benchmarks.figures import Figures, machine, show, write
 
 SPEED = ("kernels", "simulation", "identification", "growth", "start", "streaming", "diagnosis")
 """What runs where nothing is named."""
-QUALITY = ("changes", "compensation", "export", "recovery", "table_1", "real_recordings", "reading", "mirror")
+QUALITY = ("changes", "compensation", "export", "fleet", "recovery", "table_1", "real_recordings", "reading", "mirror")
 """What takes minutes or needs data, by name only."""
 
 

@@ -29,6 +29,7 @@ COMMANDS = {
     "view": "show an experiment in the browser, with zoom",
     "report": "write one page about an experiment and its models",
     "import": "convert a recording of other software into an experiment",
+    "fleet": "identify, validate or diagnose many recordings, one row of a table for each",
     "follow": "show in one line what a node does, until it has finished; needs ROS 2",
     "effects": "list the catalogue of physical effects",
 }

@@ -44,13 +44,18 @@ def document(
         Heading of every section and what stands under it.
     """
     merit = tuple(_figures_of_merit(comparison))
-    return framed(title, comparison.experiment.source, comparison.model, verdict, merit, parts, FREE_RUN)
+    return framed(title, comparison.experiment.source, chain(comparison.model), verdict, merit, parts, FREE_RUN)
+
+
+def chain(model: Model | None) -> str:
+    """The effects of a model in one line."""
+    return f"Model: {'no model' if model is None else ' → '.join(e.name for e in model.effects)}"
 
 
 def framed(
     title: str,
     source: str,
-    model: Model | None,
+    about: str,
     verdict: VerdictText,
     merit: Sequence[tuple[str, str]],
     parts: Mapping[str, tuple[Sequence[Drawing], Sequence[Table]]],
@@ -60,10 +65,8 @@ def framed(
 
     Parameters
     ----------
-    title, source : str
-        Heading, and what the page is about.
-    model : Model or None
-        Whose chain stands under the heading.
+    title, source, about : str
+        Heading, where the data lie, and the line under the heading.
     verdict : VerdictText
         Comes first.
     merit : sequence of (str, str)
@@ -76,7 +79,7 @@ def framed(
     return _template().render(
         title=title,
         source=source,
-        chain="no model" if model is None else " → ".join(e.name for e in model.effects),
+        about=about,
         style=files(__package__).joinpath("page.css").read_text(encoding="utf-8"),
         verdict=verdict,
         merit=merit,

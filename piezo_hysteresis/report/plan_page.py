@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..compensation.plan import Plan
 from ..model.model import Model
-from .document import framed
+from .document import chain, framed
 from .figures.tracking import tracking
 from .page import Page
 from .tables.plan_table import notes, plan_table
@@ -39,5 +39,5 @@ def plan_page(plan: Plan, model: Model, source: str) -> Page:
     else:
         headline = "The limits of the drive do not allow the whole path"
     verdict = VerdictText(headline, tuple(f"{line[:1].upper()}{line[1:]}." for line in notes(plan)))
-    html = framed("Compensation: a plan", source, model, verdict, merit, {"Plan": ([drawing], [table])}, FOOTER)
+    html = framed("Compensation: a plan", source, chain(model), verdict, merit, {"Plan": ([drawing], [table])}, FOOTER)
     return Page(html, (drawing,))

@@ -6,7 +6,7 @@ import argparse
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ... import recording
 from ...errors import PiezoError, RecordError, RecordingError
@@ -23,6 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         help="one or several recordings: bag, folder of .npz, .csv, .mat, …",
     )
+    add_reading_group(parser)
+
+
+def add_reading_group(parser: argparse.ArgumentParser) -> None:
+    """Declare what a file may not say about itself."""
     group = parser.add_argument_group("options for reading, if the recording does not contain the information")
     group.add_argument(
         "--format",
@@ -91,25 +96,35 @@ def read(args: argparse.Namespace) -> Experiment:
         If it cannot be read, or an option makes no sense.
     """
     try:
-        experiment = recording.read(
-            *args.experiment,
-            format=args.format,
-            axis=args.axis,
-            columns=_pairs("--column", args.column, str),
-            units=_pairs("--unit", args.unit, str),
-            sample_period=args.sample_period,
-            initial_voltage=args.initial_voltage,
-            rows=_rows(args.rows),
-            phases=_phases(args.phase),
-            include=args.include,
-            average=args.average,
-            decimate=_pairs("--decimate", args.decimate, int) or None,
-        )
+        experiment = recording.read(*args.experiment, **keywords(args))
     except RecordError as error:
         raise RecordError(as_options(str(error))) from None
     except PiezoError as error:
         raise RecordingError(as_options(str(error))) from None
     return replace(experiment, notices=tuple(replace(n, message=as_options(n.message)) for n in experiment.notices))
+
+
+def keywords(args: argparse.Namespace) -> dict[str, Any]:
+    """The options as arguments of `recording.read`.
+
+    Raises
+    ------
+    RecordingError
+        If an option makes no sense.
+    """
+    return {
+        "format": args.format,
+        "axis": args.axis,
+        "columns": _pairs("--column", args.column, str),
+        "units": _pairs("--unit", args.unit, str),
+        "sample_period": args.sample_period,
+        "initial_voltage": args.initial_voltage,
+        "rows": _rows(args.rows),
+        "phases": _phases(args.phase),
+        "include": args.include,
+        "average": args.average,
+        "decimate": _pairs("--decimate", args.decimate, int) or None,
+    }
 
 
 _OPTIONS = {

@@ -1,0 +1,37 @@
+"""`Wait`: work of a known length, for tests and measurements of a fleet; workers import it from here."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+
+from piezo_hysteresis.fleet.work_result import WorkResult
+from piezo_hysteresis.record import Experiment
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Takes its time, and ends its process at a recording with a phase ``crash``.
+
+    Parameters
+    ----------
+    seconds : float
+        Time [s].
+    """
+
+    seconds: float = 1.0
+    name = "wait"
+
+    def settings(self) -> str:
+        """The time."""
+        return f"wait {self.seconds!r}"
+
+    def __call__(self, experiment: Experiment) -> WorkResult:
+        """Wait in short steps, as Python code does."""
+        if experiment.named("crash"):
+            os._exit(9)
+        end = time.monotonic() + self.seconds
+        while (left := end - time.monotonic()) > 0.0:
+            time.sleep(min(left, 0.05))
+        return WorkResult("waited", error_percent=0.1)

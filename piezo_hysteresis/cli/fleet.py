@@ -1,0 +1,130 @@
+"""Identify, validate or diagnose many recordings: one row of a Parquet table for each, and a page about them all.
+
+The command can be given again: only recordings whose data, options or code have changed are worked on.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..effects import HYSTERESIS, OPERATORS
+from ..errors import ParameterError
+from ..fleet.attempt import RowStatus
+from ..fleet.cluster import cluster
+from ..fleet.finding import find_recordings
+from ..fleet.fleet import open_orders, run_fleet
+from ..fleet.source import NamePattern
+from ..fleet.storage import Storage
+from ..fleet.table.results import Results
+from ..fleet.work import TASKS, work_for
+from ..model import model_file
+from .options import reading_options
+from .options.destination import add_force, require_new_file
+from .terminal import console, progress
+
+TIME_LIMIT = 600.0
+"""Time limit per recording if none is given [s]."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the subcommand."""
+    parser = subparsers.add_parser("fleet", description=__doc__)
+    parser.add_argument(
+        "urls",
+        metavar="URL",
+        nargs="*",
+        help="recordings: files, folders that hold them at any depth, patterns with * and **; local, s3:// or http://; "
+        "none to write only the page",
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FOLDER", required=True, help="folder of the results; made, or added to"
+    )
+    parser.add_argument("--task", choices=TASKS, default=TASKS[0], help=f"what is done with each (default: {TASKS[0]})")
+    parser.add_argument("--model", metavar="FILE", help="model file to validate, or that a diagnosis starts from")
+    parser.add_argument(
+        "--hysteresis",
+        metavar="NAME",
+        choices=OPERATORS,
+        default=HYSTERESIS.name,
+        help=f"operator to identify: {', '.join(OPERATORS)} (default: {HYSTERESIS.name})",
+    )
+    parser.add_argument(
+        "--time-limit", metavar="S", type=float, default=TIME_LIMIT, help="per recording (default: %(default)g s)"
+    )
+    parser.add_argument("--retry", action="store_true", help="try recordings again that failed, timed out or crashed")
+    parser.add_argument(
+        "--name",
+        metavar="REGEX",
+        default="",
+        help="where a URL tells stage and date: groups (?P<stage>…) and (?P<date>…); default: the folder "
+        "that holds the recording, and the first date",
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="processes on this machine (default: one per processor)"
+    )
+    parser.add_argument("--scheduler", metavar="tcp://…", help="Dask scheduler whose workers are used instead")
+    parser.add_argument("--endpoint", metavar="URL", help="S3 server (default: AWS_ENDPOINT_URL, or Amazon's)")
+    parser.add_argument("--anonymous", action="store_true", help="read S3 without keys")
+    parser.add_argument("--report", metavar="FILE", help="write the HTML page about all rows of the task")
+    add_force(parser)
+    reading_options.add_reading_group(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Find, work, write; returns 0, or 1 where a recording has no result.
+
+    Raises
+    ------
+    PiezoError
+        On options that make no sense, or places that cannot be reached.
+    """
+    if not args.time_limit > 0.0:
+        raise ParameterError(f"--time-limit: got {args.time_limit:g} s, expected more than 0 s")
+    if args.workers is not None and args.workers < 1:
+        raise ParameterError(f"--workers: got {args.workers}, expected 1 or more")
+    require_new_file("--report", args.report, args.force)
+    if not args.urls and args.report is None:
+        raise ParameterError("fleet: got no URL and no --report, expected recordings or the page to write")
+    folder = Path(args.output).expanduser()
+    without = _worked(args, folder) if args.urls else 0
+    if args.report is not None:
+        from ..fleet.table.results_history import results_history
+        from ..report.fleet.fleet_page import fleet_page
+
+        fleet_page(results_history(folder, args.task)).save(Path(args.report).expanduser())
+        console().print(f"wrote {args.report}")
+    return 1 if without else 0
+
+
+def _worked(args: argparse.Namespace, folder: Path) -> int:
+    """Recordings that have no result after the run."""
+    model = "" if args.model is None else model_file.dumps(model_file.load(args.model))
+    work = work_for(args.task, model, args.hysteresis)
+    reading = reading_options.keywords(args)
+    places = {} if args.endpoint is None else {"endpoint": args.endpoint}
+    sources = find_recordings(args.urls, Storage(**places, anonymous=args.anonymous), NamePattern(args.name))
+    out = console()
+    with Results(folder) as results:
+        orders = open_orders(sources, work, results, reading=reading, limit=args.time_limit, retry=args.retry)
+        out.print(f"{len(sources)} recordings, {len(sources) - len(orders)} of them with a row that is up to date")
+        if orders:
+            with (
+                cluster(args.scheduler, args.workers) as client,
+                progress(args.task, _workers(client)) as report_progress,
+            ):
+                out.print(run_fleet(orders, results, client, report_progress).sentence())
+        without = sum(results.known[work.name, source.url].status != RowStatus.DONE for source in sources)
+    if without:
+        out.print(f"{without} recordings have no result; the column `error` says why.")
+    out.print(f"wrote {folder}")
+    return without
+
+
+def _workers(client: Any) -> str:
+    threads = client.nthreads()
+    several = sum(count > 1 for count in threads.values())
+    said = f"{len(threads)} workers, dashboard at {client.dashboard_link}"
+    return said + (f"; {several} workers have several threads: start them with --nthreads 1" if several else "")

@@ -1,0 +1,1 @@
+"""Many recordings on Dask: identify, validate or diagnose each, one row of a Parquet table for each."""

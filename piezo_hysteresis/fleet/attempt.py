@@ -1,0 +1,156 @@
+"""`attempt`: one recording from its URL to its row, in a worker process."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from typing import Any
+
+from .. import recording
+from ..errors import PiezoError, printable, reason_of
+from .code_hash import code_hash
+from .fetching import content_hash, fetch
+from .source import Source
+from .time_limit import RecordingTimeSpent, within
+from .work import Work
+
+Row = dict[str, Any]
+
+
+class RowStatus(StrEnum):
+    """What became of a recording."""
+
+    DONE = "done"
+    FAILED = "failed"
+    TIMED_OUT = "timed_out"
+    UNREACHABLE = "unreachable"
+    KILLED = "killed"
+    UNCHANGED = "unchanged"
+
+
+class OtherCodeError(PiezoError):
+    """A worker runs another version of this package than the one that asks."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What a worker is asked to do.
+
+    Parameters
+    ----------
+    source : Source
+        The recording.
+    work : Work
+        What is done with it.
+    reading : mapping of str to object
+        Arguments of `recording.read`.
+    settings : str
+        Hash of work and reading.
+    code : str
+        `code_hash` of who asks.
+    limit : float
+        Time limit [s].
+    known : str
+        Hash of the data that a row exists for; equal data are not worked on again. Empty where there is none.
+    """
+
+    source: Source
+    work: Work
+    reading: Mapping[str, Any]
+    settings: str
+    code: str
+    limit: float = float("inf")
+    known: str = ""
+
+    def row(self, status: RowStatus, **columns: Any) -> Row:
+        """A row with what is known before the work, and `columns`."""
+        source = self.source
+        return {
+            "recording": source.url,
+            "task": self.work.name,
+            "stage": source.stage,
+            "month": source.month,
+            "recorded_at": source.recorded_at,
+            "status": str(status),
+            "code_hash": self.code,
+            "settings_hash": self.settings,
+            "version": source.version,
+            "time_limit_s": self.limit,
+            "finished_at": datetime.now(UTC),
+            **columns,
+        }
+
+
+def attempt(order: Order) -> Row:
+    """The row of a recording, whatever happens to it.
+
+    Parameters
+    ----------
+    order : Order
+
+    Raises
+    ------
+    OtherCodeError
+        If this process has other code than who asks: its results would be filed under a wrong hash.
+    """
+    if code_hash() != order.code:
+        raise OtherCodeError(
+            f"the worker on {socket.gethostname()} runs {code_hash()} of piezo_hysteresis, expected {order.code}; "
+            "install the same version on every machine"
+        )
+    began, spent = time.monotonic(), time.process_time()
+    columns: Row = {}
+    try:
+        with within(order.limit), ExitStack() as stack:
+            status = _worked_on(order, stack, columns)
+    except RecordingTimeSpent:
+        status = RowStatus.TIMED_OUT
+        columns["error"] = f"no result after {order.limit:g} s, the time limit; give more by --time-limit"
+    columns |= {"seconds": time.monotonic() - began, "processor_seconds": time.process_time() - spent}
+    return order.row(status, worker=f"{socket.gethostname()}", **columns)
+
+
+def _worked_on(order: Order, stack: ExitStack, columns: Row) -> RowStatus:
+    try:
+        path = fetch(order.source, stack)
+        columns["data_hash"] = content_hash(order.source, path)
+    except Exception as error:  # every kind of storage fails in its own way
+        columns["error"] = f"{type(error).__name__}: {_line(error)}"
+        return RowStatus.UNREACHABLE
+    if columns["data_hash"] == order.known:
+        return RowStatus.UNCHANGED
+    try:
+        experiment = recording.read(path, **order.reading)
+        columns |= {
+            "samples": experiment.size,
+            "duration_s": sum(r.duration for r in experiment),
+            "range_m": experiment.range,
+        }
+        columns |= order.work(experiment).columns()
+    except MemoryError:
+        columns["error"] = "the recording does not fit into memory; decimate it or give fewer rows"
+        return RowStatus.FAILED
+    except Exception as error:  # a fault of this program costs one row, not the others
+        columns["error"] = reason_of(error).replace(str(path), order.source.url)
+        return RowStatus.FAILED
+    return RowStatus.DONE
+
+
+def _line(error: BaseException) -> str:
+    return printable(" ".join(str(error).split()))
+
+
+def lost(order: Order) -> Row:
+    """The row of a recording with which every worker has died.
+
+    Parameters
+    ----------
+    order : Order
+    """
+    said = "the worker process ended at every try: too little memory, or a crash in a library"
+    return order.row(RowStatus.KILLED, error=said)

@@ -1,0 +1,121 @@
+"""`cluster`: Dask workers on this machine, or those of a scheduler elsewhere, with warm kernels."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..effects import BASELINE, CATALOGUE, Arx, BoucWen, Offset
+from ..errors import RecordingError
+from ..model.model import Model
+from ..record import Record
+from .extra import package
+
+PERIOD = 2e-5
+"""Sample period of the signals that warm the kernels up [s]."""
+
+
+def warm_up() -> None:
+    """Load the compiled kernels into this process, and leave one thread to every library."""
+    threadpool_limits(limits=1)
+    drive = 3.0 + np.sin(np.arange(64.0))
+    base = Model((BoucWen(), Arx(a=(-1.6, 0.8), b=(0.1, 0.1), delay=3), Offset()), PERIOD)
+    for model in [base, *(base.with_effect(effect()) for effect in CATALOGUE if effect not in BASELINE)]:
+        record = Record(drive, drive, PERIOD)
+        model.simulate(record)
+        model.sensitivities(record, list(model.values()))
+
+
+@cache
+def _plugin() -> type:
+    base = package("distributed").WorkerPlugin
+
+    class WarmUp(base):  # type: ignore[misc, valid-type]
+        """Runs `warm_up` in every worker when it starts, and when it is started again."""
+
+        name = "piezo_fleet_warm_up"
+
+        def setup(self, worker: Any) -> None:
+            warm_up()
+
+    return WarmUp
+
+
+@contextmanager
+def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterator[Any]:
+    """A Dask client whose workers are warm.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        Address, e.g. ``"tcp://lab-server:8786"``; by default workers start on this machine and end with the block.
+    workers : int, optional
+        Processes on this machine; default one per processor that this process may use.
+
+    Raises
+    ------
+    RecordingError
+        If Dask is not installed, or the scheduler does not answer.
+    """
+    distributed, dask = package("distributed"), package("dask")
+    settings = {
+        "distributed.scheduler.allowed-failures": 0,  # `dispatch` decides
+        "distributed.admin.tick.limit": "60s",  # a fit holds the interpreter for a while
+        "distributed.deploy.lost-worker-timeout": "120s",  # a busy machine takes long to start a worker again
+        "distributed.worker.profile.enabled": False,  # it samples the stack of a fit a hundred times a second
+        # set, it takes arrays from the system and gives them back at every step of a fit: twice the processor time
+        "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
+    }
+    with dask.config.set(settings):
+        if scheduler is None:
+            count = workers or len(os.sched_getaffinity(0))
+            host = distributed.LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+            )
+        else:
+            host = None
+        try:
+            try:
+                client = distributed.Client(host if host is not None else scheduler, timeout=30)
+            except (OSError, ValueError, TimeoutError) as error:
+                raise RecordingError(
+                    f"{scheduler}: {str(error).splitlines()[0]}; expected the address of a Dask scheduler"
+                ) from None
+            with client:
+                client.register_plugin(_plugin()())
+                yield client
+        finally:
+            if host is not None:
+                host.close()
+
+
+def revive(client: Any) -> None:
+    """Start workers of this machine anew that nobody else would: those killed while they started.
+
+    Parameters
+    ----------
+    client : distributed.Client
+        From `cluster`; one of a scheduler elsewhere is left alone.
+    """
+    host = client.cluster
+    if host is None:
+        return
+
+    def forget_ended() -> None:
+        for name in [name for name, nanny in host.workers.items() if nanny.status.name in ("closed", "failed")]:
+            del host.workers[name]
+
+    host.loop.add_callback(forget_ended)
+    host.scale(len(host.worker_spec))

@@ -1,0 +1,65 @@
+"""Brings the files of a recording to this machine, and their hash."""
+
+from __future__ import annotations
+
+import hashlib
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from .source import Source
+
+BLOCK = 1 << 20
+"""Bytes that are read at a time."""
+
+
+def fetch(source: Source, stack: ExitStack) -> Path:
+    """The path of a recording on this machine: its own, or a copy that lasts as long as `stack`.
+
+    Parameters
+    ----------
+    source : Source
+    stack : ExitStack
+        Removes the copy.
+
+    Raises
+    ------
+    Exception
+        Whatever the storage raises where it cannot be reached.
+    """
+    if "://" not in source.url:
+        path = Path(source.folder or source.files[0])
+        for file in source.files:
+            Path(file).stat()
+        return path
+    fs, _ = source.storage.open(source.url)
+    copy = Path(stack.enter_context(TemporaryDirectory(prefix="piezo_fleet_")))
+    name = (source.folder or source.files[0]).rstrip("/").rpartition("/")[2]
+    target = copy / (name.partition("?")[0] or "recording")
+    if not source.folder:
+        fs.get_file(source.files[0], str(target))
+        return target
+    target.mkdir()
+    for file in source.files:
+        fs.get_file(file, str(target / file.rpartition("/")[2]))
+    return target
+
+
+def content_hash(source: Source, path: Path) -> str:
+    """``sha256:`` and 16 digits of the bytes of a recording, and of the names of its files if it is a folder.
+
+    Parameters
+    ----------
+    source : Source
+    path : Path
+        Where `fetch` put it.
+    """
+    digest = hashlib.sha256()
+    files = [path / file.rpartition("/")[2] for file in source.files] if source.folder else [path]
+    for file in sorted(files):
+        if source.folder:
+            digest.update(f"{file.name} {file.stat().st_size}\n".encode())
+        with file.open("rb") as content:
+            while block := content.read(BLOCK):
+                digest.update(block)
+    return "sha256:" + digest.hexdigest()[:16]

@@ -1,0 +1,113 @@
+"""`find_recordings`: the recordings that paths, patterns and URLs name, without reading any."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from pathlib import PurePosixPath
+from typing import Any
+
+from ..errors import PiezoError, RecordingError, printable
+from .source import NamePattern, Source, changed_at, version_of
+from .storage import Storage
+
+ENDINGS = frozenset(
+    (".csv", ".txt", ".tsv", ".dat", ".mat", ".npz", ".npy", ".h5", ".hdf5", ".hdf", ".tdms", ".mcap", ".db3")
+)
+"""Files that are taken for recordings where a folder or a pattern is given."""
+_BAG = frozenset((".mcap", ".db3", ".zstd"))
+"""Endings of the files of a bag."""
+_PHASE = re.compile(r"\d{1,3}[_ -][A-Za-z]\w*\.npz")
+"""Name of one phase of an experiment that is a folder of NPZ files."""
+_MAGIC = re.compile(r"[*?\[]")
+"""What makes a path a pattern."""
+
+Info = dict[str, Any]
+
+
+def find_recordings(
+    urls: Sequence[str], storage: Storage | None = None, names: NamePattern | None = None
+) -> tuple[Source, ...]:
+    """The recordings that are there, each once, in the order of their URLs.
+
+    Parameters
+    ----------
+    urls : sequence of str
+        Files, folders or patterns with ``*``, ``?`` and ``**``: local, s3:// or http(s)://. In a folder, at any depth,
+        a bag or a folder of ``NN_<phase>.npz`` is one recording, and so is every other file of a known ending.
+    storage : Storage, optional
+        How S3 is reached.
+    names : NamePattern, optional
+        How a URL tells stage and date.
+
+    Raises
+    ------
+    RecordingError
+        If a URL names nothing, or its storage cannot be reached.
+    """
+    storage, names = storage or Storage(), names or NamePattern()
+    found: dict[str, Source] = {}
+    for url in urls:
+        try:
+            sources = list(_named_by(url, storage, names))
+        except PiezoError:
+            raise
+        except Exception as error:  # every kind of storage fails in its own way
+            said = printable(" ".join(str(error).split())) or type(error).__name__
+            raise RecordingError(f"{url}: {said}; expected a file, a folder or a pattern that can be read") from None
+        if not sources:
+            raise RecordingError(f"{url}: got no recording, expected files ending {', '.join(sorted(ENDINGS))}")
+        found |= {source.url: source for source in sources}
+    return tuple(found[url] for url in sorted(found))
+
+
+def _named_by(url: str, storage: Storage, names: NamePattern) -> Iterator[Source]:
+    fs, path = storage.open(url)
+    if _MAGIC.search(path):
+        matches = fs.glob(path, detail=True)
+    else:
+        info = fs.info(path)
+        if info["type"] != "directory":
+            yield _source(fs, [{**info, "name": path}], "", storage, names)
+            return
+        matches = {path: info}
+    files: dict[str, Info] = {}
+    for name, info in matches.items():
+        files |= fs.find(name, detail=True) if info["type"] == "directory" else {name: info}
+    for folder, group in groupby(sorted(files.items()), key=lambda item: item[0].rpartition("/")[0]):
+        yield from _in_folder(fs, folder, [{**info, "name": name} for name, info in group], storage, names)
+
+
+def _in_folder(fs: Any, folder: str, infos: list[Info], storage: Storage, names: NamePattern) -> Iterator[Source]:
+    paths = {info["name"]: PurePosixPath(info["name"]) for info in infos}
+    if any(path.name == "metadata.yaml" for path in paths.values()):
+        bag = [i for i in infos if paths[i["name"]].suffix in _BAG or paths[i["name"]].suffix == ".yaml"]
+        yield _source(fs, bag, folder, storage, names)
+        return
+    phases = [info for info in infos if _PHASE.fullmatch(paths[info["name"]].name)]
+    if phases:
+        yield _source(fs, phases, folder, storage, names)
+    for info in infos:
+        if info not in phases and paths[info["name"]].suffix.lower() in ENDINGS:
+            yield _source(fs, [info], "", storage, names)
+
+
+def _source(fs: Any, infos: list[Info], folder: str, storage: Storage, names: NamePattern) -> Source:
+    path = folder or infos[0]["name"]
+    local = "file" in ((fs.protocol,) if isinstance(fs.protocol, str) else fs.protocol)
+    url = path if local or "://" in path else f"s3://{path}"
+    version = version_of(infos)
+    if len(infos) > 1 and version:
+        listed = "\n".join(f"{info['name']} {version_of([info])}" for info in infos)
+        version = hashlib.sha256(listed.encode()).hexdigest()[:16]
+    return Source(
+        url=url,
+        files=tuple(info["name"] for info in infos),
+        folder=folder,
+        storage=storage,
+        stage=names.stage(url),
+        recorded_at=names.date(url, changed_at(infos)),
+        version=version,
+    )

@@ -1,0 +1,152 @@
+"""`run_fleet`: works on many recordings, and keeps one row for each."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .attempt import Order, Row, RowStatus
+from .code_hash import code_hash
+from .dispatch import finished
+from .source import Source
+from .table.results import Known, Results
+from .work import Work
+
+FLUSH_TIME, FLUSH_ROWS = 20.0, 1000
+"""Time [s], and number of rows, after which rows are written; a run that is killed loses no more."""
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class FleetSummary:
+    """What a run has done.
+
+    Parameters
+    ----------
+    counts : mapping of str to int
+        Recordings by status; ``unchanged`` are those whose files looked new but held the same data.
+    seconds : float
+        Time of the run [s].
+    """
+
+    counts: Mapping[str, int]
+    seconds: float
+
+    def sentence(self) -> str:
+        """The run in one line.
+
+        >>> FleetSummary({"done": 3, "timed_out": 1}, 12.0).sentence()
+        '4 recordings in 12 s: 3 done, 1 timed out.'
+        """
+        words = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in sorted(self.counts.items()))
+        return f"{sum(self.counts.values())} recordings in {self.seconds:.0f} s: {words or 'nothing to do'}."
+
+
+def settings_hash(work: Work, reading: Mapping[str, Any]) -> str:
+    """``sha256:`` and 16 digits of the options that a result depends on."""
+    given = sorted((name, repr(value)) for name, value in reading.items() if value not in (None, {}, [], ()))
+    return "sha256:" + hashlib.sha256(f"{work.settings()}\n{given}".encode()).hexdigest()[:16]
+
+
+def open_orders(
+    sources: Sequence[Source],
+    work: Work,
+    results: Results,
+    *,
+    reading: Mapping[str, Any] | None = None,
+    limit: float = float("inf"),
+    retry: bool = False,
+) -> list[Order]:
+    """What is still to be done: recordings without a row, or whose data, code or options have changed.
+
+    Parameters
+    ----------
+    sources : sequence of Source
+    work : Work
+    results : Results
+        What is known.
+    reading : mapping, optional
+        Arguments of `recording.read`.
+    limit : float
+        Time limit per recording [s]; a recording that took longer than a smaller one is tried again.
+    retry : bool
+        Whether recordings that failed are tried again, too.
+    """
+    reading, code = dict(reading or {}), code_hash()
+    settings = settings_hash(work, reading)
+    orders = []
+    for source in sources:
+        known = results.known.get((work.name, source.url))
+        same = known is not None and (known.code_hash, known.settings_hash) == (code, settings)
+        valid = same and known is not None and _is_final(known, limit, retry)
+        if valid and known is not None and known.version == source.version != "":
+            continue
+        keep = known.data_hash if valid and known is not None else ""
+        orders.append(Order(source, work, reading, settings, code, limit, keep))
+    return orders
+
+
+def _is_final(known: Known, limit: float, retry: bool) -> bool:
+    if known.status == RowStatus.DONE:
+        return True
+    if retry or known.status == RowStatus.UNREACHABLE:
+        return False
+    return known.status != RowStatus.TIMED_OUT or limit <= known.time_limit
+
+
+def run_fleet(orders: Sequence[Order], results: Results, client: Any, progress: Progress | None = None) -> FleetSummary:
+    """Work on recordings, and write their rows as they come.
+
+    Parameters
+    ----------
+    orders : sequence of Order
+        From `open_orders`.
+    results : Results
+        Open.
+    client : distributed.Client
+        From `cluster`.
+    progress : callable, optional
+        Called with a word and the fraction done.
+
+    Raises
+    ------
+    OtherCodeError
+        If a worker runs another version of this package.
+    RecordingError
+        If the scheduler is lost; the rows that were finished are kept.
+    """
+    began = flushed = time.monotonic()
+    counts: Counter[str] = Counter()
+    unchanged: list[Row] = []
+    try:
+        for rows in finished(orders, client):
+            for row in rows:
+                counts[row["status"]] += 1
+                if row["status"] == RowStatus.UNCHANGED:
+                    unchanged.append(row)
+                else:
+                    results.add(row)
+            if results.waiting >= FLUSH_ROWS or time.monotonic() - flushed > FLUSH_TIME:
+                results.flush()
+                flushed = time.monotonic()
+            if progress is not None:
+                done = counts.total()
+                without = done - counts[RowStatus.DONE] - counts[RowStatus.UNCHANGED]
+                progress(f"{done} of {len(orders)} recordings, {without} without result", done / max(len(orders), 1))
+    finally:
+        _refresh(results, unchanged)
+        results.flush()
+    return FleetSummary(dict(+counts), time.monotonic() - began)
+
+
+def _refresh(results: Results, unchanged: Sequence[Row]) -> None:
+    """Keep the rows of recordings whose files look new but hold the same data."""
+    now = {(row["task"], row["recording"]): row for row in unchanged}
+    fresh = ("version", "stage", "month", "recorded_at", "finished_at")
+    for row in list(results.rows(now)):
+        seen = now[row["task"], row["recording"]]
+        results.add({**row, **{column: seen[column] for column in fresh}})

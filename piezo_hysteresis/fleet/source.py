@@ -1,0 +1,138 @@
+"""`Source`: one recording, where it lies, of which stage it is and when it was taken."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from ..errors import ParameterError
+from .storage import Storage
+
+UNKNOWN = "unknown"
+"""Stage or month that nothing tells."""
+_DATE = re.compile(
+    r"(?<!\d)(20\d\d)[-_]?([01]\d)[-_]?([0-3]\d)(?:[T _-]?([0-2]\d)[-:_]?([0-5]\d)(?:[-:_]?([0-5]\d))?)?"
+)
+"""A date, and a time of the day behind it or not, as they stand in names of files."""
+_STAGE = re.compile(r"(?:^|/)stage=([^/]+)")
+"""A folder that names the stage, as in results of this kind."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A recording that is still to be read.
+
+    Parameters
+    ----------
+    url : str
+        Path or URL; the recording is known by it.
+    files : tuple of str
+        Paths of its files in the storage.
+    folder : str
+        Path of the folder that is the recording; empty for a single file.
+    storage : Storage
+        How it is opened.
+    stage : str
+        Which stage was recorded.
+    recorded_at : datetime or None
+        When [UTC]; None where neither name nor storage tell.
+    version : str
+        Sizes and times of change, or tags, as the storage lists them: another one means that the data may have changed.
+        Empty where the storage tells nothing.
+    """
+
+    url: str
+    files: tuple[str, ...]
+    folder: str
+    storage: Storage
+    stage: str
+    recorded_at: datetime | None
+    version: str
+
+    @property
+    def month(self) -> str:
+        """Year and month, e.g. ``"2026-11"``."""
+        return UNKNOWN if self.recorded_at is None else f"{self.recorded_at:%Y-%m}"
+
+
+@dataclass(frozen=True, slots=True)
+class NamePattern:
+    """How a URL tells stage and date.
+
+    Parameters
+    ----------
+    text : str
+        Regular expression with a group ``stage``, a group ``date`` or both; empty for the usual places: the folder in
+        which the recording lies, and the first date in the URL.
+
+    Raises
+    ------
+    ParameterError
+        If it is no regular expression, or has neither group.
+    """
+
+    text: str = ""
+
+    def __post_init__(self) -> None:
+        try:
+            groups = re.compile(self.text).groupindex if self.text else {"stage": 1}
+        except re.error as error:
+            raise ParameterError(f"name: got '{self.text}', expected a regular expression ({error})") from None
+        if not {"stage", "date"} & set(groups):
+            raise ParameterError(f"name: got '{self.text}', expected a group (?P<stage>…) or (?P<date>…) in it")
+
+    def stage(self, url: str) -> str:
+        """The stage that a URL names.
+
+        >>> NamePattern().stage("s3://lab/stage_7/2026-11-03.npz"), NamePattern("(?P<stage>[0-9]+)_").stage("/1_x.csv")
+        ('stage_7', '1')
+        """
+        if named := self._group(url, "stage"):
+            return named
+        if found := _STAGE.search(url):
+            return found[1]
+        folders = url.partition("://")[2].rstrip("/").split("/") if "://" in url else url.rstrip("/").split("/")
+        return (folders[-2] if len(folders) > 1 else "") or UNKNOWN
+
+    def date(self, url: str, changed: datetime | None) -> datetime | None:
+        """When a recording was taken; where the URL does not say, when its newest file was written.
+
+        >>> NamePattern().date("/lab/x/20261103T1530.npz", None).isoformat()
+        '2026-11-03T15:30:00+00:00'
+        """
+        for found in _DATE.finditer(self._group(url, "date") or url):
+            try:
+                year, month, day, hour, minute, second = (int(part or 0) for part in found.groups())
+                return datetime(year, month, day, hour, minute, second, tzinfo=UTC)
+            except ValueError:
+                continue
+        return changed
+
+    def _group(self, url: str, name: str) -> str:
+        found = re.search(self.text, url) if self.text else None
+        return (found.groupdict().get(name) or "") if found else ""
+
+
+def version_of(infos: list[dict[str, Any]]) -> str:
+    """What the storage tells about files, in one line; empty where it tells no time and no tag of some file."""
+    parts = []
+    for info in infos:
+        mark = info.get("ETag") or info.get("mtime") or info.get("Last-Modified") or info.get("LastModified")
+        if mark is None:
+            return ""
+        parts.append(f"{info.get('size')} {mark}")
+    return "; ".join(parts)
+
+
+def changed_at(infos: list[dict[str, Any]]) -> datetime | None:
+    """When the newest of some files was written [UTC]."""
+    times = []
+    for info in infos:
+        time = info.get("mtime") or info.get("LastModified")
+        if isinstance(time, int | float):
+            times.append(datetime.fromtimestamp(time, UTC))
+        elif isinstance(time, datetime):
+            times.append(time if time.tzinfo else time.replace(tzinfo=UTC))
+    return max(times, default=None)

@@ -1,0 +1,79 @@
+"""`Storage`: opens the place that a URL names: a disk, an S3 server, a web server."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from ..errors import RecordingError, printable
+from .extra import package
+
+
+@dataclass(frozen=True, slots=True)
+class Storage:
+    """How URLs are opened. The keys of S3 come from the environment or from ``~/.aws``, never from here.
+
+    Parameters
+    ----------
+    endpoint : str, optional
+        URL of an S3 server other than Amazon's; default the environment variable ``AWS_ENDPOINT_URL``, if there is one.
+    anonymous : bool
+        Whether S3 is asked without keys, as public buckets allow.
+    """
+
+    endpoint: str | None = field(default_factory=lambda: os.environ.get("AWS_ENDPOINT_URL"))
+    anonymous: bool = False
+
+    def open(self, url: str) -> tuple[Any, str]:
+        """The file system (an fsspec one) that holds `url`, and the path there.
+
+        Raises
+        ------
+        RecordingError
+            If there is none for such a URL.
+        """
+        scheme = urlsplit(url).scheme if "://" in url else ""
+        if scheme == "s3":
+            bucket = url.removeprefix("s3://").partition("/")[0]
+            return _s3(bucket, self.endpoint, self.anonymous), url[5:].rstrip("/")
+        if not scheme:
+            return _disk(), str(Path(url).expanduser().absolute())
+        try:
+            fs, path = package("fsspec").core.url_to_fs(url)
+        except (ValueError, ImportError) as error:
+            raise RecordingError(
+                f"{url}: {printable(str(error))}; expected a local path, s3://, http:// or https://"
+            ) from None
+        return fs, path
+
+
+@cache
+def _disk() -> Any:
+    return package("fsspec").filesystem("file")
+
+
+@cache
+def _s3(bucket: str, endpoint: str | None, anonymous: bool) -> Any:
+    """The S3 client of Arrow behind the interface of fsspec.
+
+    The usual partner of fsspec (s3fs) needs python-dateutil below 3, see docs/decisions/0022.
+    """
+    wrapper = package("fsspec.implementations.arrow").ArrowFSWrapper
+    arrow = package("pyarrow.fs")
+    try:
+        if endpoint is not None:
+            parts = urlsplit(endpoint)
+            region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION") or "us-east-1"
+            return wrapper(
+                arrow.S3FileSystem(
+                    anonymous=anonymous, endpoint_override=parts.netloc, scheme=parts.scheme or "https", region=region
+                )
+            )
+        region = arrow.resolve_s3_region(bucket)
+        return wrapper(arrow.S3FileSystem(anonymous=anonymous, region=region))
+    except (OSError, ValueError) as error:
+        raise RecordingError(f"s3://{bucket}: {printable(str(error))}; expected a bucket that can be read") from None

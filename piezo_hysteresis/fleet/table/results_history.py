@@ -1,0 +1,81 @@
+"""The results of a folder as the history that the page shows."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import RecordingError
+from ...report.fleet.history import FleetHistory, ParameterSeries
+from .results import read_results
+
+COLUMNS = [
+    "recording", "task", "stage", "status", "verdict", "error", "recorded_at", "free_run_error_percent",
+    "floor_percent", "parameters",
+]  # fmt: skip
+"""Columns that the page needs."""
+
+
+def results_history(folder: Path, task: str) -> FleetHistory:
+    """The rows of one task, in the order of their time.
+
+    Parameters
+    ----------
+    folder : Path
+        Written by `Results`.
+    task : str
+        Which rows.
+
+    Raises
+    ------
+    RecordingError
+        If there are none.
+    """
+    rows = [row for row in read_results(folder, COLUMNS).to_pylist() if row["task"] == task]
+    if not rows:
+        raise RecordingError(f"{folder}: got no rows of the task {task}, expected some; run piezo fleet --task {task}")
+    times = np.array(
+        ["NaT" if row["recorded_at"] is None else row["recorded_at"].replace(tzinfo=None).isoformat() for row in rows],
+        dtype="datetime64[us]",
+    )
+    order = np.argsort(times, kind="stable")
+    rows, times = [rows[i] for i in order], times[order]
+    found: dict[str, list[tuple[int, dict[str, object]]]] = defaultdict(list)
+    for i, row in enumerate(rows):
+        for parameter in row["parameters"] or ():
+            if "[" not in parameter["name"] and parameter["value"] is not None:
+                found[parameter["name"]].append((i, parameter))
+    return FleetHistory(
+        source=str(folder),
+        task=task,
+        recording=_texts(rows, "recording"),
+        stage=_texts(rows, "stage"),
+        status=_texts(rows, "status"),
+        verdict=_texts(rows, "verdict"),
+        reason=_texts(rows, "error"),
+        time=times,
+        error=_numbers(rows, "free_run_error_percent"),
+        floor=_numbers(rows, "floor_percent"),
+        parameters={name: _series(parts) for name, parts in found.items()},
+    )
+
+
+def _series(parts: list[tuple[int, dict[str, object]]]) -> ParameterSeries:
+    rows = [parameter for _, parameter in parts]
+    return ParameterSeries(
+        str(rows[0]["unit"] or ""),
+        np.array([i for i, _ in parts], dtype=np.intp),
+        _numbers(rows, "value"),
+        _numbers(rows, "lower"),
+        _numbers(rows, "upper"),
+    )
+
+
+def _texts(rows: list[dict[str, object]], column: str) -> np.ndarray:
+    return np.array([str(row[column] or "") for row in rows], dtype=object).astype(str)
+
+
+def _numbers(rows: list[dict[str, object]], column: str) -> np.ndarray:
+    return np.array([np.nan if row[column] is None else row[column] for row in rows], dtype=float)

@@ -1,0 +1,94 @@
+"""`WorkResult`: what one recording gave, in the form that a row holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..identification.fit.fit import Fit
+from ..record import Notice
+
+
+@dataclass(frozen=True, slots=True)
+class WorkResult:
+    """The answer of one work on one recording.
+
+    Parameters
+    ----------
+    verdict : str
+        A stable word: see the page about fleets.
+    effects : tuple of str
+        Effects of the model, or those that a diagnosis names.
+    converged : bool or None
+        Whether a fit came to its end; None where nothing was fitted.
+    error : float or None
+        Free-run error [m].
+    error_percent, before_percent, floor_percent : float or None
+        Free-run error, that before effects were added, and its floor [% of range].
+    parameters : tuple of mapping
+        ``name``, ``value``, ``lower`` and ``upper`` (95 %, may be None), ``unit``, ``at_bound``.
+    notices : tuple of Notice
+        What was found in the data.
+    model : str or None
+        Text of the model file.
+    """
+
+    verdict: str
+    effects: tuple[str, ...] = ()
+    converged: bool | None = None
+    error: float | None = None
+    error_percent: float | None = None
+    before_percent: float | None = None
+    floor_percent: float | None = None
+    parameters: tuple[Mapping[str, Any], ...] = ()
+    notices: tuple[Notice, ...] = ()
+    model: str | None = None
+
+    def columns(self) -> dict[str, Any]:
+        """The columns of the row that this fills; numbers that are not finite become None."""
+        return {
+            "verdict": self.verdict,
+            "effects": list(self.effects),
+            "converged": self.converged,
+            "free_run_error_m": _finite(self.error),
+            "free_run_error_percent": _finite(self.error_percent),
+            "before_percent": _finite(self.before_percent),
+            "floor_percent": _finite(self.floor_percent),
+            "parameters": [dict(parameter) for parameter in self.parameters],
+            "quality": [
+                {"kind": n.kind, "phase": n.phase, "message": n.message, "severe": n.severe} for n in self.notices
+            ],
+            "severe_findings": sum(n.severe for n in self.notices),
+            "model": self.model,
+        }
+
+
+def fitted_parameters(fit: Fit | None) -> tuple[Mapping[str, Any], ...]:
+    """The fitted numbers with their 95 % intervals, ended at their bounds.
+
+    Parameters
+    ----------
+    fit : Fit or None
+        None gives nothing.
+    """
+    return () if fit is None else tuple(_parameters(fit))
+
+
+def _parameters(fit: Fit) -> Iterable[Mapping[str, Any]]:
+    for name, value in fit.values.items():
+        row = fit.model.row(name)
+        lower, upper = fit.interval(name)
+        yield {
+            "name": name,
+            "value": _finite(value),
+            "lower": _finite(max(lower, row.lower)),
+            "upper": _finite(min(upper, row.upper)),
+            "unit": row.unit,
+            "at_bound": name in fit.at_bounds,
+        }
+
+
+def _finite(number: float | None) -> float | None:
+    return None if number is None or not math.isfinite(number) else float(number)

@@ -1,0 +1,82 @@
+"""`fleet_page`: one page about many recordings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..document import framed
+from ..page import Page
+from ..verdict import VerdictText
+from ..words import POOR
+from .fleet_figures import errors_by_stage, errors_over_time, parameters_over_time
+from .fleet_tables import failure_table, outlier_table, stage_table
+from .history import FleetHistory
+from .outliers import OutlyingStage, outlying_stages
+
+FOOTER = (
+    "Errors are those of free-run simulation, RMS over the peak-to-peak displacement of the recording. Intervals are "
+    "those of one recording; differences between recordings of a stage may be larger."
+)
+"""How the numbers are to be read."""
+
+
+def fleet_page(history: FleetHistory) -> Page:
+    """Draw and write the page.
+
+    Parameters
+    ----------
+    history : FleetHistory
+        Of one task.
+    """
+    outliers = outlying_stages(history)
+    candidates = {
+        "Parameters": ([parameters_over_time(history, outliers)], [outlier_table(outliers)]),
+        "Errors": (
+            [errors_over_time(history), errors_by_stage(history)],
+            [stage_table(history), failure_table(history)],
+        ),
+    }
+    parts = {
+        heading: ([d for d in drawings if d is not None], [t for t in tables if t is not None])
+        for heading, (drawings, tables) in candidates.items()
+    }
+    parts = {heading: part for heading, part in parts.items() if any(part)}
+    done = int(history.is_done.sum())
+    verdict = VerdictText(f"{done} of {history.size} recordings have a result", tuple(_sentences(history, outliers)))
+    title, about = f"Many recordings: {history.task}", f"{len(history.stages)} stages"
+    html = framed(title, history.source, about, verdict, tuple(_merit(history)), parts, FOOTER)
+    return Page(html, tuple(d for drawings, _ in parts.values() for d in drawings))
+
+
+def _sentences(history: FleetHistory, outliers: Sequence[OutlyingStage]) -> Iterator[str]:
+    errors = history.error[np.isfinite(history.error)]
+    if errors.size:
+        good = int(np.sum(errors <= POOR))
+        yield f"The error is at most {POOR:g} % of the range in {good} of {errors.size} recordings."
+    poor = Counter(history.stage[history.error > POOR].tolist())
+    if poor:
+        named = ", ".join(f"{stage} ({count})" for stage, count in poor.most_common(5))
+        yield f"Recordings with a larger error are most frequent at {named}; see piezo diagnose."
+    elif errors.size:
+        yield "No stage needs another class of models."
+    if outliers:
+        names = list(dict.fromkeys(o.stage for o in outliers))
+        first = f"the first in {outliers[0].parameter}"
+        yield f"{len(names)} of the stages lie apart from the others: {', '.join(names[:5])}, {first}."
+    lost = Counter(history.status[~history.is_done].tolist())
+    if lost:
+        words = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in lost.most_common())
+        yield f"Without a result: {words}."
+
+
+def _merit(history: FleetHistory) -> Iterator[tuple[str, str]]:
+    errors = history.error[np.isfinite(history.error)]
+    yield "recordings", f"{history.size}"
+    yield "no result", f"{int(np.sum(~history.is_done))}"
+    yield "stages", f"{len(history.stages)}"
+    if errors.size:
+        yield "median error", f"{np.median(errors):.3g} %"
+        yield "largest error", f"{errors.max():.3g} %"

@@ -1,0 +1,81 @@
+"""The tables about many recordings: outlying stages, stages, recordings without a result."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..tables.table import Table
+from ..words import POOR
+from .history import FleetHistory
+from .outliers import FAR, OutlyingStage
+
+ROWS = 40
+"""Most rows of a table."""
+_NUMBERS = re.compile(r"\d+(\.\d+)?([eE][+-]?\d+)?")
+"""What differs between two messages of one kind."""
+
+
+def outlier_table(outliers: Sequence[OutlyingStage]) -> Table | None:
+    """The stages that lie apart, the farthest first."""
+    if not outliers:
+        return None
+    rows = tuple(
+        (o.stage, o.parameter, f"{o.value:.5g}", f"{o.typical:.5g}", o.unit, f"{o.distance:.1f}") for o in outliers
+    )
+    note = (
+        f"Distance of the median of a stage from the median of all stages, in standard deviations: more than {FAR:g}. "
+        "The deviation is that of the stages, from their median absolute deviation, and that of one recording."
+    )
+    header = ("stage", "parameter", "median", "all stages", "unit", "distance")
+    return Table("Outlying stages", header, rows[:ROWS], note + _more(rows), frozenset({2, 3, 5}))
+
+
+def stage_table(history: FleetHistory) -> Table:
+    """Every stage: recordings, results, errors, verdicts; the largest median error first."""
+    rows = []
+    for stage in history.stages:
+        member = history.stage == stage
+        errors = history.error[member & np.isfinite(history.error)]
+        verdicts = Counter(v.replace("_", " ") for v in history.verdict[member & history.is_done])
+        median = float(np.median(errors)) if errors.size else np.inf
+        rows.append(
+            (
+                median,
+                (
+                    stage,
+                    f"{int(member.sum())}",
+                    f"{int(np.sum(member & ~history.is_done))}",
+                    f"{median:.3g}" if errors.size else "",
+                    f"{errors.max():.3g}" if errors.size else "",
+                    f"{int(np.sum(errors > POOR))}",
+                    ", ".join(f"{count} {word}" for word, count in verdicts.most_common()),
+                ),
+            )
+        )
+    cells = tuple(row for _, row in sorted(rows, key=lambda r: -r[0]))
+    header = ("stage", "recordings", "no result", "median error [%]", "largest [%]", f"above {POOR:g} %", "verdicts")
+    return Table("Stages", header, cells[:ROWS], _more(cells).strip(), frozenset(range(1, 6)))
+
+
+def failure_table(history: FleetHistory) -> Table | None:
+    """Why recordings have no result, the most frequent reason first, with one recording each."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for i in np.flatnonzero(~history.is_done):
+        said = str(history.reason[i]).replace(str(history.recording[i]), "").strip(" :")
+        groups.setdefault((str(history.status[i]), _NUMBERS.sub("…", said)), []).append(int(i))
+    if not groups:
+        return None
+    rows = tuple(
+        (status.replace("_", " "), f"{len(found)}", str(history.reason[found[0]]), str(history.recording[found[0]]))
+        for (status, _), found in sorted(groups.items(), key=lambda item: -len(item[1]))
+    )
+    header = ("status", "recordings", "reason, of one of them", "recording")
+    return Table("Recordings without a result", header, rows[:ROWS], _more(rows).strip(), frozenset({1}))
+
+
+def _more(rows: Sequence[object]) -> str:
+    return f" {len(rows) - ROWS} more rows are left out." if len(rows) > ROWS else ""

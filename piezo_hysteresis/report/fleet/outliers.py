@@ -1,0 +1,71 @@
+"""`outlying_stages`: stages one of whose parameters lies far from those of the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .history import FleetHistory, ParameterSeries
+
+FAR = 3.5
+"""Distance from which a stage is outlying, in standard deviations (Iglewicz and Hoaglin 1993, modified z-score)."""
+FEWEST = 4
+"""Stages from which a spread can be told."""
+MAD = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutlyingStage:
+    """A stage that differs from the others.
+
+    Parameters
+    ----------
+    stage, parameter, unit : str
+        Which, in what.
+    value : float
+        Median over its recordings.
+    typical : float
+        Median over the stages.
+    distance : float
+        |value − typical| over the root of the sum of squares of the spread of the stages and of the standard error of
+        one recording.
+    """
+
+    stage: str
+    parameter: str
+    unit: str
+    value: float
+    typical: float
+    distance: float
+
+
+def outlying_stages(history: FleetHistory) -> tuple[OutlyingStage, ...]:
+    """The stages that are far from the others, the farthest first.
+
+    Parameters
+    ----------
+    history : FleetHistory
+    """
+    found = [o for name, series in history.parameters.items() for o in _outlying(history, name, series)]
+    return tuple(sorted(found, key=lambda o: -o.distance))
+
+
+def _outlying(history: FleetHistory, name: str, series: ParameterSeries) -> list[OutlyingStage]:
+    owner = history.stage[series.index]
+    stages = np.unique(owner)
+    if stages.size < FEWEST:
+        return []
+    medians = np.array([np.median(series.value[owner == stage]) for stage in stages])
+    errors = (series.upper - series.lower) / (2 * 1.96)
+    known = np.isfinite(errors)
+    sure = np.array([np.median(errors[(owner == s) & known]) if np.any((owner == s) & known) else 0.0 for s in stages])
+    typical = float(np.median(medians))
+    scale = np.hypot(MAD * np.median(np.abs(medians - typical)), sure)
+    distance = np.divide(np.abs(medians - typical), scale, out=np.zeros_like(scale), where=scale > 0.0)
+    return [
+        OutlyingStage(str(s), name, series.unit, float(m), typical, float(d))
+        for s, m, d in zip(stages, medians, distance, strict=True)
+        if d > FAR
+    ]

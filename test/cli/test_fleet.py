@@ -1,0 +1,44 @@
+"""`piezo fleet` on one folder: rows, status, what is up to date, first-day errors."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+pytest.importorskip("distributed")
+pytest.importorskip("pyarrow")
+
+from piezo_hysteresis.fleet.table.results import read_results
+
+
+def test_a_folder_of_recordings(piezo, folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "lab" / "stage_x" / "2026-11-03")
+    model = "config/published_stage.yaml"
+    command = ("fleet", tmp_path / "lab", "-o", tmp_path / "results", "--task", "validate", "--model", model)
+    first = piezo(*command, "--workers", 1)
+    assert first.status == 0, first.err
+    assert "1 done" in first.out
+    assert "dashboard at http://127.0.0.1:" in first.err
+    (row,) = read_results(tmp_path / "results").to_pylist()
+    assert (row["stage"], row["month"], row["task"], row["status"]) == ("stage_x", "2026-11", "validate", "done")
+    again = piezo(*command)
+    assert again.status == 0
+    assert "1 of them with a row that is up to date" in again.out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--task", "validate"), "expected a model"),
+        (("--model", "config/published_stage.yaml"), "expected no model"),
+        (("--time-limit", "0"), "--time-limit"),
+        (("--workers", "0"), "--workers"),
+        (("--name", "("), "regular expression"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(piezo, folder, tmp_path, words, message):
+    outcome = piezo("fleet", folder, "-o", tmp_path / "results", *words)
+    assert outcome.status == 2
+    assert message in outcome.err
+    assert not (tmp_path / "results").exists()

@@ -1,0 +1,57 @@
+"""Work ends at its limit, wherever it is, and nothing that comes after it is hit."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from piezo_hysteresis.fleet import time_limit
+from piezo_hysteresis.fleet.time_limit import RecordingTimeSpent, within
+
+
+def test_work_that_catches_every_error_is_broken_off():
+    def stubborn():
+        while True:
+            try:
+                time.sleep(0.001)
+            except Exception:
+                continue
+
+    with pytest.raises(RecordingTimeSpent), within(0.05):
+        stubborn()
+
+
+def test_work_within_the_limit_is_left_alone():
+    with within(60.0):
+        total = sum(range(1000))
+    with within(float("inf")):
+        total += 1
+    assert total == 499501
+
+
+def test_a_limit_that_comes_at_the_end_hits_nothing_else():
+    """The limit falls close to the end of the work, before or after it; afterwards the thread is free of it."""
+    spent = 0
+    for step in range(200):
+        try:
+            with within(2e-3):
+                end = time.monotonic() + 1.9e-3 + 1e-6 * step
+                while time.monotonic() < end:
+                    pass
+        except RecordingTimeSpent:
+            spent += 1
+        for _ in range(200):
+            pass
+    assert 0 <= spent <= 200
+    time.sleep(0.01)
+    assert not [thread for thread in threading.enumerate() if thread.name == "time limit" and thread.is_alive()]
+
+
+def test_a_library_that_does_not_come_back_costs_the_process(monkeypatch):
+    monkeypatch.setattr(time_limit, "GRACE", 0.05)
+    ended = threading.Event()
+    with pytest.raises(RecordingTimeSpent), within(0.02, ended.set):
+        threading.Event().wait(0.5)  # one call that runs on
+    assert ended.is_set()

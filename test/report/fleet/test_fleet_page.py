@@ -1,0 +1,90 @@
+"""The page about many recordings names the stage that differs, and where the model class fails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.report.fleet.fleet_page import fleet_page
+from piezo_hysteresis.report.fleet.history import FleetHistory, ParameterSeries
+from piezo_hysteresis.report.fleet.outliers import outlying_stages
+
+STAGES = [f"s{i}" for i in range(8)]
+EACH = 6
+
+
+def history(shift=0.0, lost=0, spread=0.02) -> FleetHistory:
+    """Eight stages whose A differs by 2 %, the last one by `shift` more; errors of s3 are ten times the others'."""
+    chance = np.random.default_rng(4)
+    stage = np.repeat(STAGES, EACH)
+    n = stage.size
+    own = np.repeat(1.0 + spread * chance.standard_normal(len(STAGES)), EACH)
+    value = own + 0.002 * chance.standard_normal(n) + shift * (stage == "s7")
+    done = np.arange(n) >= lost
+    error = np.where(stage == "s3", 5.0, 0.5) * np.exp(0.1 * chance.standard_normal(n))
+    index = np.flatnonzero(done)
+    return FleetHistory(
+        source="results",
+        task="identify",
+        recording=np.array([f"/lab/{s}/{i}.npz" for i, s in enumerate(stage)]),
+        stage=stage,
+        status=np.where(done, "done", "failed"),
+        verdict=np.where(done, np.where(error > 3, "poor", "described"), ""),
+        reason=np.array(["" if d else f"/lab/x.npz: got {i} columns, expected <2>" for i, d in enumerate(done)]),
+        time=np.tile(np.array([f"2026-{m:02d}-03" for m in range(1, EACH + 1)], "datetime64[us]"), len(STAGES)),
+        error=np.where(done, error, np.nan),
+        floor=np.full(n, 0.03),
+        parameters={
+            "bouc_wen.A": ParameterSeries("1", index, value[index], value[index] - 0.004, value[index] + 0.004)
+        },
+    )
+
+
+def test_the_stage_that_differs_is_named_alone():
+    found = outlying_stages(history(shift=0.3))
+    assert [o.stage for o in found] == ["s7"]
+    assert found[0].value - found[0].typical == pytest.approx(0.3, abs=0.1)
+
+
+def test_no_stage_is_named_where_none_differs():
+    """3.5 robust deviations of eight stages: a false name in few of fifty fleets."""
+    false = 0
+    for seed in range(50):
+        h = history()
+        own = np.repeat(1.0 + 0.02 * np.random.default_rng(seed).standard_normal(len(STAGES)), EACH)
+        series = h.parameters["bouc_wen.A"]
+        object.__setattr__(h, "parameters", {"x": ParameterSeries("1", series.index, own, own - 0.01, own + 0.01)})
+        false += bool(outlying_stages(h))
+    assert false <= 10
+
+
+def test_three_stages_show_no_outlier():
+    h = history(shift=5.0)
+    kept = np.flatnonzero(np.isin(h.stage, ["s0", "s1", "s7"]))
+    series = h.parameters["bouc_wen.A"]
+    few = ParameterSeries("1", kept, series.value[kept], series.lower[kept], series.upper[kept])
+    object.__setattr__(h, "parameters", {"bouc_wen.A": few})
+    assert outlying_stages(h) == ()
+
+
+def test_the_page_says_what_the_numbers_say(tmp_path):
+    page = fleet_page(history(shift=0.3, lost=3))
+    assert "45 of 48 recordings have a result" in page.html
+    assert "s7, the first in bouc_wen.A" in page.html
+    assert "most frequent at s3 (6)" in page.html
+    assert "Without a result: 3 failed" in page.html
+    assert "expected &lt;2&gt;" in page.html
+    assert [d.name for d in page.drawings] == ["parameters_over_time", "errors_over_time", "errors_by_stage"]
+    by_stage = page.drawings[-1].data
+    assert by_stage["stage"][0] == "s3"
+    assert by_stage["median_percent_of_range"][0] == pytest.approx(5.0, rel=0.2)
+    page.save(tmp_path / "page.html")
+    assert len(list((tmp_path / "page_figures").iterdir())) == 9
+
+
+def test_a_page_without_any_result_is_a_page():
+    h = history(lost=48)
+    object.__setattr__(h, "parameters", {})
+    page = fleet_page(h)
+    assert "0 of 48 recordings have a result" in page.html
+    assert page.drawings == ()
