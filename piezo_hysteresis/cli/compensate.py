@@ -64,7 +64,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plan, print and save; returns 0, or 1 where part of the path cannot be had.
+    """Plan, print and save; returns 0, or 1 if a part of the path is not reachable.
 
     Raises
     ------

@@ -46,7 +46,7 @@ class UnreachablePart:
             "max_slew_rate": f"{self.needed_slew:.3g} V/s",
         }[self.limit]
         message = (
-            f"{self.begin:.6g} to {self.end:.6g} s cannot be had: it needs {needed}, beyond {self.limit}; "
+            f"{self.begin:.6g} to {self.end:.6g} s is not reachable: it needs {needed}, beyond {self.limit}; "
             f"the stage would be off by up to {1e9 * abs(self.largest):.0f} nm"
         )
         if self.after_loop:

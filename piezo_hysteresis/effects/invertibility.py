@@ -9,7 +9,7 @@ class Invertibility(StrEnum):
     """Whether a wanted output of an effect can be turned into the input that gives it."""
 
     EXACT = "exact"
-    """To rounding, wherever the wanted output can be had."""
+    """Exact up to rounding, wherever the wanted output is reachable."""
     APPROXIMATE = "approximate"
     """With an error that `Inverse` states."""
     NOT_NEEDED = "not needed"

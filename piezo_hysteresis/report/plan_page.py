@@ -1,4 +1,4 @@
-"""The page about a plan: whether the path can be had, the expected error, the drive."""
+"""The page about a plan: whether the path is reachable, the expected error, and the drive."""
 
 from __future__ import annotations
 

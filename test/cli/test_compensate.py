@@ -1,4 +1,4 @@
-"""``piezo compensate``: from a path in a file to a command in a file, or a refusal that says what can be had."""
+"""``piezo compensate``: from a path in a file to a command in a file, or a refusal that says what is reachable."""
 
 from __future__ import annotations
 

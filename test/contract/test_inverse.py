@@ -78,7 +78,7 @@ def drive() -> np.ndarray:
 
 
 def mismatch(model: Model, inverse: Inverse) -> float:
-    """Largest deviation of run(inverse(y)) from a y that can be had, as a share of the largest |y|."""
+    """Largest deviation of run(inverse(y)) from a reachable y, as a share of the largest |y|."""
     y, _ = model.run(drive(), model.rest(0.0))
     u, _ = inverse.command(y, inverse.rest(0.0))
     reached, _ = model.run(u, model.rest(0.0))

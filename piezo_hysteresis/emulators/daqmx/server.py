@@ -32,7 +32,7 @@ class DaqmxServer:
     Raises
     ------
     StageError
-        If the package ``nidaqmx[grpc]`` is not installed, or the port cannot be had.
+        If the package ``nidaqmx[grpc]`` is not installed, or the port is not available.
     """
 
     def __init__(self, card: Card, host: str = "127.0.0.1", port: int = 0) -> None:

@@ -31,7 +31,7 @@ class Gcs2Server:
     Raises
     ------
     StageError
-        If the port cannot be had.
+        If the port is not available.
 
     Examples
     --------

@@ -26,7 +26,7 @@ Job = Generator[None]
 
 
 class PathError(StageError):
-    """A path that cannot be had."""
+    """A path that is not reachable."""
 
 
 class PathRuns:
@@ -99,7 +99,7 @@ class PathRuns:
         Raises
         ------
         PathError
-            If a part of it cannot be had; nothing has moved.
+            If a part of it is not reachable; nothing has moved.
         StageError
             If the driver refuses or stops it, or samples do not come.
         """

@@ -52,16 +52,16 @@ def described(plan: Plan) -> str:
         f"{plan.voltage.size * plan.sample_period:.3g} s, {plan.voltage.min():.3g} to {plan.voltage.max():.3g} V, "
         f"at most {plan.largest_slew:.3g} V/s, expected error {1e9 * expected.total:.1f} nm rms "
         f"(plan {1e9 * expected.planned:.1f} nm, {stated}), "
-        + ("all of it can be had" if plan.reachability.is_whole else why_not(plan))
+        + ("all of it is reachable" if plan.reachability.is_whole else why_not(plan))
     )
 
 
 def why_not(plan: Plan) -> str:
-    """Why a path is refused, and what could be had instead."""
+    """Why a path is refused, and the nearest reachable path."""
     part, nearest = plan.reachability.parts[0], plan.reachability.nearest
     ways = []
     if nearest is not None and nearest.offset is not None:
         ways.append(f"moved by {1e6 * nearest.offset:+.4g} µm")
     if nearest is not None and nearest.amplitude is not None:
         ways.append(f"with {100.0 * nearest.amplitude:.4g} % of its amplitude")
-    return f"out of reach: {part}" + (f"; it can be had {' or '.join(ways)}" if ways else "")
+    return f"out of reach: {part}" + (f"; it becomes reachable {' or '.join(ways)}" if ways else "")

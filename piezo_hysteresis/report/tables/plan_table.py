@@ -36,7 +36,7 @@ def plan_table(found: Plan) -> Table:
 
 
 def notes(found: Plan) -> list[str]:
-    """What the reader must know besides: effects that were left out, and what cannot be had."""
+    """Notes on the plan: effects that were left out, and unreachable parts."""
     lines = [
         f"caution: {name} has no inverse and was left out; the error above holds what that costs"
         for name in found.left_out
@@ -46,11 +46,11 @@ def notes(found: Plan) -> list[str]:
 
 
 def refusal(found: Plan) -> list[str]:
-    """What cannot be had, and the nearest path that can; empty where all can."""
+    """The unreachable parts, and the nearest reachable path; empty if the whole path is reachable."""
     parts = found.reachability.parts
     lines = [str(part) for part in parts[:MOST_PARTS]]
     if len(parts) > MOST_PARTS:
-        lines.append(f"{len(parts) - MOST_PARTS} more parts like these cannot be had")
+        lines.append(f"{len(parts) - MOST_PARTS} more parts like these are not reachable")
     nearest = found.reachability.nearest
     if nearest is None:
         return lines
@@ -61,7 +61,10 @@ def refusal(found: Plan) -> list[str]:
         ways.append(f"with {100.0 * nearest.amplitude:.4g} % of its amplitude about its middle")
     if nearest.band is not None:
         ways.append(f"without content above {nearest.band:.3g} Hz")
-    return [*lines, f"the path can be had {', or '.join(ways)}" if ways else "no shift or scale makes it reachable"]
+    return [
+        *lines,
+        f"the path becomes reachable {', or '.join(ways)}" if ways else "no shift or scale makes it reachable",
+    ]
 
 
 def answer(found: Plan) -> dict[str, Any]:
