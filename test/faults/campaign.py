@@ -94,7 +94,7 @@ class Campaign:
         self.lab, self.axis = lab, kind(lab)
         self.root = lab.folder / "runs"
         self.statuses = lab.listen(DiagnosticStatus, "status", LATCHED)
-        self._ended_phases, self._at_end = 0, lambda phase: None
+        self._begun, self._ended_phases, self._at_end = 0, 0, lambda phase: None
         lab.node.create_subscription(DiagnosticStatus, "command_status", self._on_command_status, COMMAND_STATUS)
         self.start_driver()
         self.start_node()
@@ -130,6 +130,7 @@ class Campaign:
             return self.state() == "running"
 
         self.lab.wait(runs, "an identification that runs", 120.0)
+        self._begun = int(self.samples.newest.index[-1])
 
     def await_phase(self, number, above):
         """Wait until a phase is played and the voltage is above a value [V]."""
@@ -176,12 +177,10 @@ class Campaign:
 
     def check_kept(self, folder, heard):
         """What was heard of a recording longer than a moment before its writer was struck is in it, every block."""
-        begins = self.recorded(folder)
-        assert begins
         last = int(heard.newest.index[-1]) - round(ON_THEIR_WAY * self.axis.speed / PERIOD)
-        blocks = [block for block in heard.blocks if min(begins) <= block.index[0] and block.index[-1] < last]
-        wanted = {int(block.index[0]) for block in blocks}
-        assert wanted <= begins, f"{len(wanted - begins)} of {len(wanted)} blocks are missing"
+        wanted = {int(b.index[0]) for b in heard.blocks if self._begun <= b.index[0] and b.index[-1] < last}
+        missing = wanted - self.recorded(folder)
+        assert not missing, f"{len(missing)} of {len(wanted)} blocks are missing"
 
     def check(self):
         """Every recording can be read, no voltage was outside the limits, and both processes live."""
