@@ -1,7 +1,7 @@
 """Identification: waveforms, the delay, the linear dynamics, the hysteresis, and a joint fit of all in free run.
 
-What is played: `DriveLimits`, the shapes of `excitation`, a `Protocol` of phases. What is found, step by step:
-`identify_delay`, `identify_arx`, `fit_hysteresis`, the published `three_steps`. What a user calls: `identify`.
+`DriveLimits`, the waveforms of `excitation` and a `Protocol` of phases define what is played. `identify_delay`,
+`identify_arx` and `fit_hysteresis` are the published steps, and `three_steps` runs all of them. Users call `identify`.
 """
 
 from __future__ import annotations

@@ -13,12 +13,12 @@ from ..errors import IdentificationError
 Array = NDArray[np.float64]
 
 RIDGE = 1e-6
-"""Share of the diagonal that is added to it, for bands that the drives leave out."""
+"""Regularisation for frequency bands that the drives do not excite, as a share of the diagonal."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Regression:
-    """What one record contributes.
+    """Contribution of one record to the equations.
 
     Parameters
     ----------
@@ -27,9 +27,9 @@ class Regression:
     y : (n, p) array
         Measured displacements [m].
     first : int
-        First row that is fitted.
+        Index of the first row that is fitted.
     weight : float
-        Factor of its squared errors.
+        Weight of the squared errors of this record.
     """
 
     x: Array
@@ -39,26 +39,26 @@ class Regression:
 
 
 def impulse_responses(regressions: Iterable[Regression], length: int) -> tuple[Array, Array]:
-    """Impulse responses h and zeros c with y(k) ≈ c + Σₗ h(l) x(k − l); the zero is free in every record.
+    """Impulse responses h and zeros c with y(k) ≈ c + Σₗ h(l) x(k − l); every record has its own zero.
 
     Parameters
     ----------
     regressions : iterable of Regression
-        All with the same numbers of columns.
+        Contributions with equal numbers of columns.
     length : int
         Number of lags, 1 or more.
 
     Returns
     -------
     h : (p, length, f) ndarray
-        The oldest sample first.
+        Impulse responses, the oldest sample first.
     c : (p,) ndarray
         Weighted mean of the zeros of the records [m].
 
     Raises
     ------
     IdentificationError
-        If the records hold fewer samples than unknowns, or do not determine them.
+        If the records contain fewer samples than unknowns, or do not determine the unknowns.
     """
     from scipy.linalg import LinAlgError, solve
 
@@ -105,7 +105,7 @@ def impulse_responses(regressions: Iterable[Regression], length: int) -> tuple[A
         h = solve(flat, target, assume_a="pos", overwrite_a=True)
     except LinAlgError:
         raise IdentificationError(
-            "the drives do not determine the responses: got drives that repeat one another or stand still, "
+            "the drives do not determine the responses: got drives that are constant or depend on one another, "
             "expected independent noise or multisines on all of them"
         ) from None
     zeros = np.average(level - mean @ h, axis=0, weights=size)

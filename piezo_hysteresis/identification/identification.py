@@ -21,17 +21,17 @@ from .steps.three_steps import ThreeSteps
 from .structure.structure_choice import StructureChoice
 
 CORRELATED = 0.95
-"""Correlation from which two numbers are reported to be hard to separate."""
+"""Correlation from which two parameters are reported as hard to separate."""
 
 
 def undetermined(fit: Fit) -> tuple[str, ...]:
-    """Numbers that a fit left at a bound, those that are off there apart: a play without weight is none."""
+    """Parameters that a fit left at a bound, except those that are off there, such as a play without weight."""
     return tuple(n for n in fit.at_bounds if fit.model.row(n).off != fit.values[n])
 
 
 @dataclass(frozen=True, slots=True)
 class PhaseError:
-    """Free-run error of one record, its own offset removed.
+    """Free-run error of one record, without its mean.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class PhaseError:
     percent : float
         `rms` in per cent of the range of the experiment.
     is_fitted : bool
-        False for data that were held out.
+        False for held-out data.
     """
 
     phase: str
@@ -52,14 +52,14 @@ class PhaseError:
 
 
 def phase_errors(model: Model, experiment: Experiment, roles: Roles) -> tuple[PhaseError, ...]:
-    """Free-run errors of the records that were fitted, then of those held out.
+    """Free-run errors of the fitted records, followed by those of the held-out records.
 
     Parameters
     ----------
     model : Model
     experiment : Experiment
     roles : Roles
-        Which records were fitted.
+        Purpose of every record.
     """
     errors = residuals(model, experiment.records, Nuisance(offset=True))
     rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
@@ -76,17 +76,17 @@ class Identification:
     Parameters
     ----------
     model : Model
-        The identified chain, sensor offset included.
+        Identified model, including the sensor offset.
     fit : Fit
-        The joint fit, with covariance and bounds hit.
+        Joint fit, with its covariance and the bounds that it reached.
     delay : Delay or None
-        Step 1; None where no step was recorded.
+        Result of step 1; None if no step was recorded.
     dynamics : Dynamics or None
-        ARX from w, the start of the joint fit; None where the data show a lag only.
+        ARX model from w, the start of the joint fit; None if the data only show a lag.
     published : ThreeSteps or None
-        What the three published steps alone reach; None where their phases are missing.
+        Result of the three published steps alone; None if their phases are missing.
     orders : tuple of OrderError
-        Error against order.
+        Error of every model order that was compared.
     comparisons : tuple of InputComparison
         G from v and from w at each noise amplitude.
     phases : tuple of PhaseError
@@ -94,7 +94,7 @@ class Identification:
     notices : tuple of Notice
         Warnings as data.
     structure : StructureChoice or None
-        How the structure was chosen; None where it was not.
+        Choice of the structure; None if none was made.
     """
 
     model: Model
@@ -110,12 +110,12 @@ class Identification:
 
     @property
     def judged(self) -> tuple[PhaseError, ...]:
-        """Errors of the records held out, or of the fitted ones where none is."""
+        """Errors of the held-out records, or of the fitted ones if there are none."""
         return tuple(p for p in self.phases if not p.is_fitted) or self.phases
 
     @property
     def free_run_error(self) -> float:
-        """RMS over the judged records, each counting the same [m]."""
+        """RMS free-run error over the tested records, with equal weights [m]."""
         return float(np.sqrt(np.mean([p.rms**2 for p in self.judged])))
 
     @property
@@ -125,7 +125,7 @@ class Identification:
 
     @property
     def correlated(self) -> tuple[tuple[str, str, float], ...]:
-        """Pairs of hysteresis numbers whose estimates move together: names and correlation."""
+        """Pairs of hysteresis parameters with strongly correlated estimates: names and correlation."""
         names = [n for n in self.fit.names if not n.startswith(f"{Arx.name}.")]
         pairs = [(a, b, self.fit.correlation(a, b)) for i, a in enumerate(names) for b in names[:i]]
         return tuple(pair for pair in pairs if abs(pair[2]) > CORRELATED)
@@ -133,8 +133,8 @@ class Identification:
     def response(self, frequency: Samples) -> tuple[np.ndarray, Samples]:
         """G at `frequency` [Hz] and its relative standard error, both of shape (k,).
 
-        The error is that of the complex value, carried over from the covariance of the coefficients; these alone mean
-        nothing, poles and zeros of a high order nearly cancel.
+        The error of the complex value follows from the covariance of the coefficients. The coefficients alone have no
+        meaning, because poles and zeros of a high order nearly cancel.
         """
         arx = self.model[Arx.name]
         assert isinstance(arx, Arx)

@@ -1,7 +1,7 @@
 """`identify`: identifies a model from the phases that an experiment contains.
 
-The published three steps give the start; then everything is fitted jointly in free run, the dynamics inside, with G(1)
-held as the gauge between hysteresis and dynamics.
+The three published steps give the start values. Then all parameters, including the dynamics, are fitted jointly in
+free run. G(1) is held, because only the product of the gains of hysteresis and dynamics is determined.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from .steps.three_steps import ThreeSteps, behind_the_gauge, three_steps
 from .structure.structure_choice import StructureChoice, choose_structure
 
 ADEQUATE = 3e-4
-"""Share of the range below which a residual does not decide: no lab needs better."""
+"""Smallest noise floor that is used, as a share of the range."""
 AT_THE_FLOOR = 1.5
-"""Mean square of residual over floor up to which a fit has nothing left to gain, whatever its last step was."""
+"""Mean square of residual over floor below which a fit counts as converged, whatever its last step was."""
 FEWEST_SAMPLES = 32
-"""Shortest record that can show a loop."""
+"""Number of samples of the shortest record that can show a loop."""
 HIGHEST_ORDER = 10
-"""Highest order of the comparison."""
+"""Highest model order of the comparison."""
 
 
 @on_one_core
@@ -71,18 +71,18 @@ def identify(
     displacement_scale : float, optional
         Displacement at normalised output 1 [m]; default the range of the displacement.
     gain : float
-        G(1), the gauge: w times this is the settled output.
+        G(1): the settled output is w times this gain.
     orders : (int, int) or None
-        na and nb of the ARX; None chooses the lowest order that is as good as any.
+        na and nb of the ARX model; None chooses the lowest order that is as good as any other.
     hysteresis : type of HysteresisOperator
-        Which operator; `PublishedBoucWen` for data that Eq. (7) made.
+        Hysteresis operator; `PublishedBoucWen` for data that were computed by Eq. (7).
     memory : bool
-        Take plays instead of the Bouc-Wen state where they predict better what was left out; without broadband records
-        choose all of the structure so, creep, square, level and mode included.
+        Use plays instead of the state of the operator if cross-validation prefers them. Without broadband records the
+        whole structure is chosen in this way, including creep, square, level dependence and mode.
     held_out : collection of str
-        Names of phases that are not fitted but judge the result.
+        Names of phases that are not fitted; the model is tested on them.
     progress : callable, optional
-        Called with a word and the fraction done.
+        Called with the name of the step and the fraction done.
 
     Returns
     -------
@@ -98,8 +98,8 @@ def identify(
 
     Notes
     -----
-    Every record counts the same in the joint fit, its residual measured against the larger of its sensor noise and
-    0.03 % of the range.
+    Every record has the same weight in the joint fit. Its residual is divided by its noise floor: the sensor noise, but
+    at least 0.03 % of the range.
     """
     report = progress or (lambda word, fraction: None)
     experiment, conditioning_notices = known_from_within(experiment)
@@ -148,7 +148,7 @@ def identify(
 
         joint, dynamics, more_notices = fit_behind(start, samples)
         if delay is None:
-            # A better hysteresis shows the onset better.
+            # a better hysteresis gives a more accurate onset
             again = delay_of(hysteresis_signals(joint.model, records, roles.broadband))
             if again != samples:
                 samples = again

@@ -17,9 +17,9 @@ from .axes_equations import Regression, impulse_responses
 Array = NDArray[np.float64]
 
 LENGTH = 250
-"""Taps of every response."""
+"""Number of taps of every impulse response."""
 PASSES = 3
-"""The linear pass, and two with hysteresis; another one gains about 1 % of the error."""
+"""Number of passes: a linear one and two with hysteresis; a further one reduces the error by about 1 %."""
 RADII = (0.05, 0.2, 0.8)
 """Half widths of the play operators, in units of the rms elongation."""
 MEMORY = 0.05
@@ -33,13 +33,13 @@ class AxisError:
     Parameters
     ----------
     phase : str
-        Of the record.
+        Phase of the record.
     displacement : str
         Name of the channel.
     rms : float
-        Error about its mean [m].
+        RMS error about its mean [m].
     percent : float
-        Of the peak-to-peak displacement in the same samples.
+        RMS error in per cent of the peak-to-peak displacement of the same samples.
     """
 
     phase: str
@@ -49,7 +49,7 @@ class AxisError:
 
 
 def fitted_from(record: Record, settling: int) -> int:
-    """First sample that counts: 0 where the record begins at 0 V, behind the settling elsewhere."""
+    """First sample that counts: 0 if the record begins at 0 V, otherwise the first one after the settling."""
     return settling if record.truncated or record.continues else 0
 
 
@@ -72,14 +72,14 @@ def identify_axes(
     radii : sequence of float
         Half widths of the plays in units of the rms elongation.
     passes : int
-        1 for no hysteresis.
+        Number of passes; 1 for a model without hysteresis.
     progress : callable, optional
-        Receives a line before every pass.
+        Called with a line of text before every pass.
 
     Returns
     -------
     AxesModel
-        Simulated from the voltages alone.
+        Model that computes all displacements from the voltages alone.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def identify_axes(
 
 
 def axes_errors(model: AxesModel, records: Sequence[Record]) -> list[AxisError]:
-    """Free-run error of every displacement of every record, behind the settling where a record begins in mid-run.
+    """Free-run error of every displacement of every record; without the settling, if a record begins in mid-run.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Matrix products on one core: for small matrices, the threads of BLAS mostly wait for one another."""
+"""Matrix products on one core, because for small matrices the threads of BLAS mostly wait for each other."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ def _libraries() -> ThreadpoolController:
 
 
 def on_one_core(function: Callable[P, R]) -> Callable[P, R]:
-    """The function, with one thread for BLAS while it runs; as many as before when it ends.
+    """Decorator: BLAS uses one thread while the function runs, and as many as before when it has ended.
 
-    On a machine with other work to do, waiting threads take several times the time that the products take.
+    On a busy machine the waiting of the threads takes several times longer than the products.
 
     Parameters
     ----------
     function : callable
-        One that fits.
+        The function to run, for example a fit.
     """
 
     @wraps(function)

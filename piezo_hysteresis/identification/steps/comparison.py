@@ -1,7 +1,7 @@
-"""`InputComparison`: ARX from v against ARX from w, at each amplitude of the noise.
+"""`InputComparison`: compares the ARX model from v with that from w, at each amplitude of the noise.
 
-They differ on every stage with hysteresis: under noise the gain of a loop at low frequency falls towards that of its
-polynomial. Behind the hysteresis G should be the same at every amplitude.
+They differ on every stage with hysteresis: under noise, the low-frequency gain of a loop falls towards that of its
+polynomial. From w, after the hysteresis, G should be the same at every amplitude.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from .regressors import Signals
 from .three_steps import voltage_signals
 
 LOW, HIGH = 20.0, 500.0
-"""Frequencies [Hz] between which the shape of G is compared."""
+"""Frequencies at which the gains of G are compared [Hz]."""
 TOLERANCE = 0.05
-"""Relative difference from which it is reported."""
+"""Relative difference from which an amplitude dependence is reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,22 +68,22 @@ def compare_inputs(
     Parameters
     ----------
     model : Model
-        With its hysteresis fitted.
+        Model with a fitted hysteresis.
     records : sequence of Record
         The experiment, in order.
     noise : collection of int
         Indices of the noise records, at the model's sample period.
     delay : int
-        d, samples.
+        Delay d [samples].
     orders : (int, int)
         na and nb.
 
     Returns
     -------
     comparisons : tuple of InputComparison
-        In rising order of amplitude; records within 20 % of one another count as one amplitude.
+        Comparisons in rising order of amplitude; records whose amplitudes differ by less than 20 % count as one.
     notices : tuple of Notice
-        ``amplitude_dependent`` where two amplitudes of the noise disagree behind the hysteresis.
+        ``amplitude_dependent``, if G from w differs between two amplitudes of the noise.
     """
     rms = {i: float(np.std(excited_part(records[i]).voltage)) for i in noise}
     groups: list[list[int]] = []

@@ -13,9 +13,9 @@ from ...record import Notice, Record
 from .step_response import StepResponse, step_response
 
 SURE = 5.0
-"""Standard deviations beyond which a sample alone is response, not noise."""
+"""A sample that exceeds this many standard deviations of the noise belongs to the response."""
 LIKELY = 2.0
-"""Standard deviations that suffice where the samples behind it point to the same onset."""
+"""Standard deviations that suffice if the samples after it extrapolate to the same onset."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +40,14 @@ class Onset:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Delay:
-    """Delay of the stage, judged at several sample times.
+    """Delay of the stage, estimated at several sample times.
 
     Parameters
     ----------
     samples : int
         Delay d of Eq. (4) at the finest sample period.
     onsets : tuple of Onset
-        The answer at each sample time, finest first.
+        Onset at each sample time, the finest first.
     response : StepResponse
         Averaged step response at the finest sample period.
     notices : tuple of Notice
@@ -71,7 +71,7 @@ class Delay:
 
     @property
     def is_resolved(self) -> bool:
-        """False where the response is already half done at its first sample: the delay is below one sample."""
+        """False if the response has reached half its height at its first sample: the delay is below one sample."""
         return all(n.kind != "delay_unresolved" for n in self.notices)
 
     def __str__(self) -> str:
@@ -83,7 +83,7 @@ class Delay:
 
 
 def _onset(response: StepResponse) -> tuple[int, float, float, list[str]]:
-    """First responding sample, its interval in samples, and what makes it doubtful."""
+    """First responding sample, its interval in samples, and the kinds of notices about its uncertainty."""
     mean = response.mean * np.sign(response.mean[np.argmax(np.abs(response.mean))])
     threshold = float(scipy.stats.t.isf(scipy.stats.norm.sf(SURE), response.freedom))
     beyond = mean > threshold * response.deviation
@@ -97,7 +97,7 @@ def _onset(response: StepResponse) -> tuple[int, float, float, list[str]]:
     doubtful_notices = []
     earliest = onset - 1
     while onset > 0 and onset + 1 < mean.size:
-        # A stage with mass starts as the square of time: its root is a line that ends at the onset.
+        # the response of a mass starts as the square of time, so its root is a straight line that begins at the onset
         first, second = np.sqrt(mean[onset]), np.sqrt(max(mean[onset + 1], mean[onset]))
         start = onset - first / max(second - first, 1e-300)
         expected = mean[onset] * (max(onset - 1 - start, 0.0) / (onset - start)) ** 2
@@ -117,8 +117,8 @@ def _onset(response: StepResponse) -> tuple[int, float, float, list[str]]:
 def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 3, 5)) -> Delay:
     """Delay from the onset of the step response, at the finest sample period and at multiples of it.
 
-    The onset is the first sample beyond five standard deviations of the averaged response. A sample below that, but
-    beyond two, is the onset where the quadratic start of the response behind it points there too.
+    The onset is the first sample beyond five standard deviations of the averaged response. A sample beyond two standard
+    deviations is the onset if the quadratic start of the response extrapolates to the same sample.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 
     Returns
     -------
     Delay
-        Delay in samples, the answer at each sample time and what makes it doubtful.
+        Delay in samples, the onset at each sample time, and notices about its uncertainty.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 
 
     Notes
     -----
-    Paper, Sec. 3.2. The cost of a fit does not give the delay: neighbouring integers tie, b1 being small.
+    Paper, Sec. 3.2. The cost of a fit does not determine the delay: b1 is small, so neighbouring integers fit equally.
     """
     records = tuple(records)
     if not records:
