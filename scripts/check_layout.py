@@ -28,7 +28,7 @@ MOST_LINES = 250
 LONGER = {
     "piezo_hysteresis/discrepancy/passes.py": 260,
     "piezo_hysteresis/discrepancy/search/single_record.py": 260,
-    "piezo_hysteresis/model/model.py": 280,
+    "piezo_hysteresis/model/model.py": 300,
     "piezo_hysteresis/record.py": 270,
     "piezo_hysteresis/online/predictor.py": 280,
 }

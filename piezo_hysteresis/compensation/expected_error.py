@@ -63,12 +63,7 @@ def parameter_error(model: Model, voltage: Array) -> float | None:
 
     None where the model states no covariance of its numbers.
     """
-    known = model.covariance
-    if known is None:
+    if model.covariance is None:
         return None
-    record, total = Record(voltage, np.zeros_like(voltage), model.sample_period), 0.0
-    matrix, place = known.matrix, {name: k for k, name in enumerate(known.names)}
-    for _, _, _, names, slopes in model.linearise([record], known.names):
-        at = [place[name] for name in names]
-        total += float(np.einsum("ki,kl,li->", slopes, matrix[np.ix_(at, at)], slopes, optimize=True))
-    return float(np.sqrt(max(total, 0.0) / voltage.size))
+    (found,) = model.standard_errors([Record(voltage, np.zeros_like(voltage), model.sample_period)])
+    return float(np.sqrt(np.mean(found**2)))

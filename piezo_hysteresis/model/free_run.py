@@ -93,6 +93,24 @@ def linearised_run(
                 yield index, part, y, names, slopes
 
 
+def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
+    """Standard error of the displacement of every record [m]; what `Model.standard_errors` returns."""
+    known = model.covariance
+    if known is None:
+        raise ModelError(
+            "standard errors: got a model without the covariance of its numbers, expected one that was fitted; "
+            "identify it again, its model file then states them"
+        )
+    records = list(records)
+    found = [np.empty(record.size) for record in records]
+    matrix, place = known.matrix, {name: k for k, name in enumerate(known.names)}
+    for index, part, _, names, slopes in model.linearise(records, known.names):
+        at = [place[name] for name in names]
+        variance = np.einsum("ki,kl,li->i", slopes, matrix[np.ix_(at, at)], slopes, optimize=True)
+        found[index][part] = np.sqrt(np.maximum(variance, 0.0))
+    return found
+
+
 def _in_one_go(records: Iterable[Record], sample_period: float) -> Iterator[tuple[int | None, Record]]:
     """The records with their index, and without one the holds between those that continue: creep goes on there."""
     before: Record | None = None

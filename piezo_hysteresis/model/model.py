@@ -17,7 +17,7 @@ from ..parameter import Parameter
 from ..record import Record
 from .chain import Chain, ChainState, Channels
 from .chain_order import in_chain_order
-from .free_run import free_run, linearised_run, simulated
+from .free_run import free_run, linearised_run, simulated, standard_errors
 from .named_numbers import numbers_of, with_numbers
 from .parameter_covariance import ParameterCovariance
 from .sample_periods import require_not_shorter, stated_period
@@ -249,6 +249,19 @@ class Model:
             If the first record continues one that is not given: it was simulated from rest, and is wrong at first.
         """
         return simulated(self, records, phase, sample_period)
+
+    def standard_errors(self, records: Iterable[Record]) -> list[Array]:
+        """Standard error (n,) [m] of the displacement of every record, from the covariance of the fitted numbers.
+
+        A prediction band of 95 % is `simulate` ± 1.96 of it. It holds what the data leave open of the numbers, to first
+        order, and neither the noise of the sensor nor effects that the model does not have.
+
+        Raises
+        ------
+        ModelError
+            If the model states no covariance.
+        """
+        return standard_errors(self, records)
 
     def free_run(self, records: Iterable[Record]) -> list[Array]:
         """As `simulate`, of any records, without a word about where the first one begins."""

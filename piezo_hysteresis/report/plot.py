@@ -27,7 +27,8 @@ def plot(
     ----------
     what : Record, Experiment, Model, Identification or Diagnosis
         Records are drawn against time and as loops; a model or an identification against an experiment, with the
-        residual; a diagnosis as the gap before and after.
+        residual and the 95 % band that the covariance of the model gives the prediction; a
+        diagnosis as the gap before and after.
     experiment : Experiment, optional
         What a model or an identification is compared with; the state is carried from phase to phase.
 
@@ -53,4 +54,4 @@ def plot(
     model = what.model if isinstance(what, Identification) else what
     if experiment is None:
         raise RecordError("plot: got a model alone, expected an experiment too; give plot(model, experiment)")
-    return time_series(compare(experiment, {"model": model}, {"model": zero_per_phase(model)}))
+    return time_series(compare(experiment, {"model": model}, {"model": zero_per_phase(model)}, with_band=True))

@@ -19,6 +19,7 @@ from piezo_hysteresis.model.model_parameters import from_parameters, hash_number
 from piezo_hysteresis.model.parameter_covariance import ParameterCovariance
 from piezo_hysteresis.model.parameter_file import parameters
 from piezo_hysteresis.parameter import Parameter
+from piezo_hysteresis.record import Record
 
 MODEL = Model((BoucWen(), Arx(a=[-0.5], b=[1e-05, 0.5]), Offset(y0=3e-9)), 2e-5, displacement_scale=1e-6)
 PUBLISHED = Path(__file__).parents[2] / "config" / "published_stage.yaml"
@@ -136,6 +137,25 @@ def test_the_covariance_of_the_numbers_is_kept() -> None:
     ):
         with pytest.raises(ModelError, match=message):
             loads(dumps(stated).replace(old, new))
+
+
+def test_the_standard_error_is_the_spread_of_models_drawn_from_the_covariance() -> None:
+    rng = np.random.default_rng(2)
+    names = ("bouc_wen.p2", "bouc_wen.beta", "offset.y0")
+    root = np.diag([1e-3, 1e-2, 2e-10]) @ np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    stated = replace(MODEL, covariance=ParameterCovariance.of(names, root @ root.T))
+    drive = 2.0 - 2.0 * np.cos(2 * np.pi * np.arange(400) / 200)
+    first = Record(drive, np.zeros(400), 2e-5)
+    records = [first, Record(drive, np.zeros(400), 2e-5, start_time=first.duration, continues=True)]
+    middle = np.array([MODEL.values()[name] for name in names])
+    drawn = [
+        np.concatenate(MODEL.with_values(dict(zip(names, numbers, strict=True))).simulate(records))
+        for numbers in middle + rng.normal(size=(800, 3)) @ root.T
+    ]
+    stated_errors = np.concatenate(stated.standard_errors(records))
+    np.testing.assert_allclose(stated_errors, np.std(drawn, axis=0), rtol=0.1)
+    with pytest.raises(ModelError, match="without the covariance"):
+        MODEL.standard_errors(records)
 
 
 def test_a_lost_empty_array_is_noticed() -> None:

@@ -34,6 +34,8 @@ class ModelComparison:
         Noise of every record at its own sample period [m].
     floors : (r,) ndarray
         Residual of every record below which nothing is left to explain [m].
+    bands : tuple of (n,) ndarray, optional
+        Half of the 95 % prediction band of the model that is reported, per record [m]; None where it was not asked for.
     """
 
     experiment: Experiment
@@ -41,6 +43,7 @@ class ModelComparison:
     errors: Mapping[str, Errors]
     noise: Array
     floors: Array
+    bands: tuple[Array, ...] | None = None
 
     @property
     def floor(self) -> float:
@@ -82,6 +85,7 @@ def compare(
     models: Mapping[str, Model] | None = None,
     nuisances: Mapping[str, Nuisance] | None = None,
     record_floors: Sequence[float] | None = None,
+    with_band: bool = False,
 ) -> ModelComparison:
     """Simulate every model over the experiment.
 
@@ -95,11 +99,18 @@ def compare(
         Label to what is free per record, as for `errors`; for the others one zero of the sensor is free.
     record_floors : sequence of float, optional
         Floor of every record [m] where a diagnosis has found it.
+    with_band : bool
+        Whether the 95 % prediction band of the last model is computed, where the model states a covariance.
     """
     models, nuisances = dict(models or {}), nuisances or {}
     records = experiment.records
     noise = noise_floors(records)
+    last = list(models.values())[-1] if models else None
+    bands = None
+    if with_band and last is not None and last.covariance is not None:
+        bands = tuple(1.96 * sigma for sigma in last.standard_errors(records))
     return ModelComparison(
+        bands=bands,
         experiment=experiment,
         models=models,
         errors={label: errors(model, experiment, nuisances.get(label)) for label, model in models.items()},

@@ -11,6 +11,7 @@ from scipy.signal import find_peaks
 
 from ...discrepancy.residual.residual import drive_frequency
 from ...record import Record
+from ..palette import BLUE
 from .comparison import ModelComparison
 from .drawing import Drawing
 from .style import BEFORE, FLOOR, MEASURED, PREDICTED, RESIDUAL, canvas, handles_of, legend_above, styled
@@ -24,6 +25,12 @@ PANELS = 12
 """Most phases drawn."""
 TURNS = 16
 """Turning points of the drive that one panel can show."""
+
+BAND = (
+    " The band is what the data leave open of the parameters, 95 %: a residual that leaves the band by more than the "
+    "noise belongs to an effect that the model does not have."
+)
+"""Sentence of the caption where a prediction band is drawn."""
 
 
 def window(record: Record, residual: Array | None) -> slice:
@@ -93,6 +100,18 @@ def time_series(comparison: ModelComparison) -> Drawing:
             e = now.residuals[index][part]
             e_at = thinned(e, 700)
             bottom.plot(scale * time[e_at], 1e9 * e[e_at], label="residual", **RESIDUAL)
+            if comparison.bands is not None:
+                half = 1e9 * comparison.bands[index][part]
+                bottom.fill_between(
+                    scale * time[at],
+                    -half[at],
+                    half[at],
+                    color=BLUE,
+                    alpha=0.35,
+                    zorder=3,
+                    label="95 % of the prediction",
+                )
+                data[f"prediction_95_m_{record.phase}"] = 1e-9 * half[at]
             for sign in (-2.0, 2.0):
                 bottom.axhline(sign * 1e9 * comparison.floors[index], **FLOOR)
             data |= {f"predicted_m_{record.phase}": predicted[at], f"residual_time_s_{record.phase}": time[e_at]}
@@ -122,6 +141,7 @@ def time_series(comparison: ModelComparison) -> Drawing:
             "Displacement, and below it the residual (measured minus predicted). Fast phases are shown "
             "around their largest residual. A phase that begins in an unknown state is not shown. Of "
             "repeated phases, the one with the largest error is shown; of the sines, the slowest and the fastest."
+            + ("" if comparison.bands is None else BAND)
         ),
         f"Displacement against time for the phases {names}; {words}.",
         figure,
