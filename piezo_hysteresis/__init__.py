@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .model.model_file import load, save
     from .online.predictor import Predictor
     from .record import Experiment, Record
-    from .recording import read
+    from .recording import from_columns, read, to_columns
     from .report.plot import plot
 
 __version__ = "0.1.0"
@@ -35,11 +35,13 @@ _ROOMS = {
     "Predictor": "online.predictor",
     "Record": "record",
     "diagnose": "discrepancy",
+    "from_columns": "recording",
     "identify": "identification",
     "load": "model.model_file",
     "plot": "report.plot",
     "read": "recording",
     "save": "model.model_file",
+    "to_columns": "recording",
 }
 """Public names of the package and the module that each is loaded from when it is first used."""
 
@@ -50,11 +52,13 @@ __all__ = [
     "Predictor",
     "Record",
     "diagnose",
+    "from_columns",
     "identify",
     "load",
     "plot",
     "read",
     "save",
+    "to_columns",
 ]
 
 

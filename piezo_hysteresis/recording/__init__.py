@@ -40,6 +40,7 @@ from .bag.bag_writer import BagWriter
 from .bag.rosbag2 import Rosbag2, recorded_model
 from .checks.initial_condition_check import departures, is_within_its_loop
 from .checks.quality import inspect
+from .columns import TableColumns, experiment_from, to_columns
 from .formats.csv import Csv
 from .formats.gcs_array import GcsArrayFormat
 from .formats.known_formats import FORMATS, Format, WritableFormat
@@ -50,7 +51,7 @@ from .table.read_options import Column, ReadOptions
 
 __all__ = [
     "FORMATS", "Bag", "BagWriter", "Csv", "Format", "GcsArrayFormat", "Mat", "Npz", "ReadOptions", "Rosbag2",
-    "inspect", "read", "recorded_model", "write",
+    "from_columns", "inspect", "read", "recorded_model", "to_columns", "write",
 ]  # fmt: skip
 
 
@@ -116,9 +117,51 @@ def read(
     return experiment.noting(*notices, *inspect(experiment))
 
 
+def from_columns(
+    columns: TableColumns,
+    *,
+    names: Mapping[str, Column] | None = None,
+    units: Mapping[str, str | float] | None = None,
+    sample_period: float | None = None,
+    initial_voltage: float | None = None,
+) -> Experiment:
+    """An experiment from arrays in memory: a pandas DataFrame, an xarray Dataset, a dict of arrays.
+
+    Parameters
+    ----------
+    columns : mapping of str to (n,) array_like
+        Titled as the columns of a CSV file, e.g. ``time_s``, ``voltage_V``, ``displacement_m``, ``phase``.
+    names, units, sample_period, initial_voltage
+        What the titles do not say: as `columns`, `units`, … of `read`.
+
+    Returns
+    -------
+    Experiment
+        In SI units, checked as `read` checks a file.
+
+    Raises
+    ------
+    RecordingError
+        If voltage or displacement is missing, or the columns differ in length.
+
+    Examples
+    --------
+    >>> columns = {"time_s": [0.0, 0.1, 0.2], "voltage_V": [0.0, 1.0, 0.0], "displacement_um": [0.0, 2.0, 0.5]}
+    >>> from_columns(columns)[0].displacement.tolist()
+    [0.0, 2e-06, 5e-07]
+    """
+    options = ReadOptions(None, names or {}, units or {}, sample_period, initial_voltage)
+    experiment = _checked(experiment_from(columns, options), options)
+    return experiment.noting(*inspect(experiment))
+
+
 def _one(place: Path, chosen: Format, options: ReadOptions) -> Experiment:
-    """The experiment of one path, what its records claim about their beginning checked."""
-    experiment = chosen.read(place, options)
+    """The experiment of one path."""
+    return _checked(chosen.read(place, options), options)
+
+
+def _checked(experiment: Experiment, options: ReadOptions) -> Experiment:
+    """What the records claim about their beginning checked."""
     records = experiment.records
     if records[0].continues:  # what it continues is not here
         records = (replace(records[0], continues=False, truncated=True), *records[1:])
