@@ -60,7 +60,7 @@ class ModelError(PiezoError, ValueError):
 
 
 class IdentificationError(PiezoError, RuntimeError):
-    """The data do not determine what was asked for."""
+    """The data do not determine the requested result."""
 
 
 class StageError(PiezoError, OSError):

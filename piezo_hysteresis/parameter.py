@@ -145,7 +145,7 @@ class Setting:
 
     @property
     def is_number(self) -> bool:
-        """True for a number of something; a switch is none."""
+        """True for a count; False for a switch."""
         return type(self.value) is int
 
     def check(self, value: object, prefix: str = "") -> str | bool | int:

@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _inverse(model: Model, args: argparse.Namespace) -> tuple[Inverse | None, str]:
-    """The inverse, or why there is none."""
+    """The inverse, or the reason why the model has none."""
     if args.no_inverse:
         return None, ""
     limits = Limits(args.voltage_min, args.voltage_max, args.max_slew_rate).resolved

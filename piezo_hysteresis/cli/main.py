@@ -33,7 +33,7 @@ COMMANDS = {
     "follow": "show in one line what a node does, until it has finished; needs ROS 2",
     "effects": "list the catalogue of physical effects",
 }
-"""Subcommand to what it does; each lives in a file of its own, loaded only when it is asked for."""
+"""Subcommands with a short description; the file of a subcommand is loaded only when it is called."""
 
 DONE, NOT_IDENTIFIABLE, BAD_INPUT, INTERRUPTED, BROKEN_PIPE = 0, 1, 2, 130, 141
 """Exit codes of `piezo`."""

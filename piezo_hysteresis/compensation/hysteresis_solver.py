@@ -79,7 +79,7 @@ def slope_at(kind, p, poly, c, radii, h, v, plays, s):
 
 @inlined
 def solve(kind, p, periods, poly, c, radii, h, last, plays, wanted, now, orientation, low, high):
-    """v in [low, high] with w(v) = wanted; the nearer end where there is none. `now` is w at `last`."""
+    """v in [low, high] with w(v) = wanted; if there is none, the nearer end. `now` is w at `last`."""
     gap = wanted - now
     enough = ROUNDING * (abs(wanted) + abs(now))
     if abs(gap) <= enough:

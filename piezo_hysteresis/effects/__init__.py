@@ -77,7 +77,7 @@ CHAIN: tuple[type[Effect], ...] = (
 """Every effect, in the order in which it acts."""
 
 HYSTERESIS: type[HysteresisOperator] = BoucWen
-"""The hysteresis that is identified unless another one is asked for."""
+"""The hysteresis that is identified by default."""
 
 MEMORY: type[HysteresisMemory] = HysteresisMemory
 """What takes the place of an operator's state where the stage remembers its turning points."""

@@ -21,7 +21,7 @@ PREFIX = "model."
 """Where a model lives among the parameters of a node."""
 
 COVARIANCE = "covariance."
-"""Where the covariance of the numbers lives below the prefix."""
+"""Name of the covariance of the parameters, below the prefix."""
 
 SCALES = {
     "sample_period": ("s", "period at which the discrete dynamics hold"),

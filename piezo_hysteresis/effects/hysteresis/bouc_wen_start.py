@@ -24,7 +24,7 @@ LOSSES = np.geomspace(0.3, 100.0, 14)
 RATIOS = np.linspace(-0.9, 0.9, 7)
 """Grid of γ·sgn(A)/β; |γ| ≤ β keeps the loop bounded."""
 VALLEYS = 3
-"""Places of the grid from which the search goes downhill, at most."""
+"""Largest number of grid points from which a local search starts."""
 DEEP = 10.0
 """Cost, relative to that of the best place, up to which another one is tried."""
 
@@ -55,7 +55,7 @@ class _Search:
         self.target = self._stack([loop.w for loop in self.loops])
 
     def _stack(self, columns: Sequence[Array]) -> Array:
-        """Records one below the other, each freed of its own offset and weighted."""
+        """All records in one array, each without its mean and with its weight."""
         return np.concatenate([self.roots[i] * (columns[i] - columns[i].mean(axis=0)) for i in self.used])
 
     def solve(self, beta: float, ratio: float) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Creep by a power of time, of which logarithmic creep is the limit: a law of its own, with one number more."""
+"""Creep by a power of time. Logarithmic creep is its limit; this law has one more parameter."""
 
 from __future__ import annotations
 

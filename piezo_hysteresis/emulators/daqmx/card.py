@@ -91,7 +91,7 @@ class Card:
         return self._buffer.size * self._stage.sample_period / self._speed if self.is_running else 0.0
 
     def coerced(self, rate: float) -> float:
-        """The rate that the clock can have when one is asked for [Hz]."""
+        """The rate that the clock sets for a requested rate [Hz]."""
         possible = _TIMEBASE / max(round(_TIMEBASE / rate), 1)
         return possible / 2 if self.faults.lasts("wrong_clock") else possible
 

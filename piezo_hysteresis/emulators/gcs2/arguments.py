@@ -12,7 +12,7 @@ AXIS, CHANNEL = "1", 1
 """The one axis of the emulated controller, and its channel."""
 
 Command = Callable[[list[str]], list[str] | None]
-"""Takes the arguments; returns the lines of the answer, None where there is none."""
+"""Takes the arguments; returns the lines of the answer, or None if the command has no answer."""
 
 
 def groups(arguments: list[str], size: int) -> list[list[str]]:
@@ -23,14 +23,14 @@ def groups(arguments: list[str], size: int) -> list[list[str]]:
 
 
 def axes(arguments: list[str]) -> list[str]:
-    """Axes asked for; all where none is named."""
+    """Requested axes; all axes if none is named."""
     if any(axis != AXIS for axis in arguments):
         raise Refusal(ILLEGAL_AXIS)
     return arguments or [AXIS]
 
 
 def channels(arguments: list[str]) -> list[int]:
-    """Output channels or generators asked for; all where none is named."""
+    """Requested output channels or generators; all if none is named."""
     if any(int(channel) != CHANNEL for channel in arguments):
         raise Refusal(ILLEGAL_AXIS)
     return [CHANNEL]

@@ -14,7 +14,7 @@ from .controller import BYTES, Controller, Reply
 _CODE_PAGE = "cp1252"
 """Character set of GCS."""
 _LONGEST_LINE = 1 << 20
-"""Bytes of a line at most."""
+"""Largest length of a line [byte]."""
 
 
 class Gcs2Server:

@@ -21,7 +21,7 @@ SUDDEN = 10.0
 LARGE = 0.05
 """Share of the range of the drive that it spans."""
 FEWEST = 8
-"""Samples behind it at least."""
+"""Smallest number of samples after the step."""
 WEIGHT = 1 / 16
 """Weight of a jump beside that of the record it begins."""
 

@@ -20,14 +20,14 @@ from ...record import Notice, Samples
 from .regressors import Signals, triangle
 
 _ALL = slice(None)
-"""Every regressor."""
+"""Selects every regressor."""
 LARGEST_POLE = 0.99999
-"""Radius to which poles on or just outside the unit circle are drawn back."""
+"""Radius to which poles on or just outside the unit circle are moved."""
 DRAWN_IN = 0.9999
-"""Radius of the largest pole where rounding does not allow that."""
+"""Largest radius of a pole if rounding errors do not allow the radius above."""
 
 PATIENCE, GAINS = 3, 0.99
-"""Iterations without a gain after which no more are made, and the share of the error that a gain leaves at most."""
+"""Number of iterations without improvement that end the search, and error ratio that counts as an improvement."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,11 +41,11 @@ class Dynamics:
     sample_period : float
         Sample period [s].
     one_step_error : float
-        RMS of y minus its prediction from measured y one sample before; what ARX makes small [unit of y].
+        RMS of y minus its prediction from the measured y up to one sample before; ARX minimises it [unit of y].
     free_run_error : float
-        RMS of y minus the simulation from the input alone; what counts [unit of y].
+        RMS of y minus the simulation from the input alone; models are compared by it [unit of y].
     notices : tuple of Notice
-        ``unstable_reflected`` where poles were mirrored into the unit circle.
+        ``unstable_reflected``, if poles were mirrored into the unit circle.
     """
 
     arx: Arx
@@ -78,7 +78,7 @@ class Dynamics:
 
 
 def solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> tuple[Samples, float]:
-    """Least squares from the triangle: coefficients of some regressors, and the norm of what is left."""
+    """Least squares from the triangular factor: coefficients of some regressors, and the norm of the residual."""
     regressors = r[:, :-1][:, columns]
     scale = np.linalg.norm(regressors, axis=0)
     scale[scale == 0.0] = 1.0
@@ -102,7 +102,7 @@ def reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
 
 
 def settling(a: Samples, b: Samples, delay: int) -> Arx | None:
-    """The ARX of these coefficients; None where it does not settle."""
+    """The ARX model with these coefficients; None if it does not settle."""
     try:
         arx = Arx(a=tuple(a.tolist()), b=tuple(b.tolist()), delay=delay)
     except ParameterError:
@@ -111,7 +111,7 @@ def settling(a: Samples, b: Samples, delay: int) -> Arx | None:
 
 
 def in_free_run(model: Dynamics, signals: Signals) -> Dynamics:
-    """The model with its free-run error on the signals, every record freed of its offset."""
+    """The model with its free-run error on the signals, every record without its mean."""
     squares, count = 0.0, 0
     for u, y in signals:
         error = y - model.simulate(u)
@@ -136,7 +136,7 @@ def identify_arx(
     orders : (int, int)
         na and nb.
     iterations : int
-        Steiglitz-McBride iterations at most after plain least squares; 0 is the paper.
+        Largest number of Steiglitz-McBride iterations after plain least squares; 0 as in the paper.
 
     Returns
     -------
@@ -196,9 +196,9 @@ def delay_of(signals: Signals, longest: int = 16, order: int = 8, sure: float = 
     signals : sequence of (u, y)
         Input and output of every record.
     longest : int
-        Longest delay sought.
+        Longest delay that is considered.
     order : int
-        na, and coefficients of B(z) behind the longest delay.
+        na, and the number of coefficients of B(z) after the longest delay.
     sure : float
         Standard errors beyond which a coefficient counts.
     """

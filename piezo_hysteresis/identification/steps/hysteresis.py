@@ -1,6 +1,6 @@
-"""Step 3: the hysteresis by nonlinear least squares, from a start that needs no guess (paper, Sec. 3.4).
+"""Step 3: the hysteresis by nonlinear least squares, with computed start values (paper, Sec. 3.4).
 
-Which numbers there are and where the search for them begins, the effect in the role of the hysteresis says.
+The operator in the role of the hysteresis defines the parameters and computes their start values.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from ..records.conditioning import select
 
 
 def loop_of(record: Record, model: Model, weight: float = 1.0) -> Loop:
-    """What the hysteresis did in a slow record: v = u/voltage_scale, w(t) = y(t + lag)/gain.
+    """Input and output of the hysteresis in a slow record: v = u/voltage_scale, w(t) = y(t + lag)/gain.
 
     Parameters
     ----------
     record : Record
-        So slow that the dynamics are a gain and a lag, e.g. the 1 Hz triangle.
+        Record in which the dynamics are only a gain and a lag, e.g. the 1 Hz triangle.
     model : Model
-        Its scales and its `Arx`, whose dc gain and group delay count; the paper takes K and d alone.
+        Its scales, and the dc gain and group delay of its `Arx`, are used; the paper uses K and d only.
     weight : float
         Weight in the search.
     """
@@ -49,7 +49,7 @@ def hysteresis_numbers(model: Model) -> list[str]:
 
 
 def fit_hysteresis(model: Model, records: Sequence[Record], loops: Collection[int]) -> Fit:
-    """Step 3: the numbers of the hysteresis, with the dynamics as they are and a free offset per record.
+    """Step 3: fit the hysteresis parameters, with fixed dynamics and a free offset per record.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def fit_hysteresis(model: Model, records: Sequence[Record], loops: Collection[in
     Returns
     -------
     Fit
-        Of the numbers of the hysteresis, from all samples.
+        Fit of the hysteresis parameters to all samples.
     """
     kept, floors = select(records, [1.0] * len(records), loops)
     loops_ = [loop_of(r, model, float(np.isfinite(f))) for r, f in zip(kept, floors, strict=True)]

@@ -3,7 +3,7 @@
 Both fit loops of one amplitude equally well, but they predict different loops for another amplitude. A Bouc-Wen state
 has no memory of turning points, so a loop of one amplitude determines little about the next. Play operators with
 weights that are not negative (a Prandtl-Ishlinskii operator) keep all smaller loops inside the largest one. Blocks that
-were left out of the fit decide; the first block contains the way from rest.
+were left out of the fit decide; the first block contains the initial loading from rest.
 """
 
 from __future__ import annotations

@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 FACTORS = (4, 16)
 """Ratios of the full rate to the lower ones."""
 SHORTEST = 50
-"""Samples of a record at the lower rate at least."""
+"""Smallest number of samples of a record at the lower rate."""
 SAMPLES = 60_000
-"""Samples that are fitted at most."""
+"""Largest number of samples that are fitted."""
 SIMULATIONS, CONVERGED = 20, 1e-3
 """Simulations of a fit at most, and the relative decrease of the squared error at which it ends."""
 INDEPENDENT = 1e-13
@@ -38,7 +38,7 @@ AWAY = 1e3
 def identify_modes(
     signals: Signals, delay: int, sample_period: float, orders: tuple[int, int], iterations: int
 ) -> Dynamics:
-    """The best sum of modes, begun at several lower rates.
+    """The best sum of modes, with start values from several lower sampling rates.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def identify_modes(
     orders : (int, int)
         na and nb, equal and even.
     iterations : int
-        Steiglitz-McBride iterations at most at a lower rate.
+        Largest number of Steiglitz-McBride iterations at a lower rate.
 
     Raises
     ------

@@ -22,7 +22,7 @@ FIELDS = {"time": "f8", "voltage": "f8", "displacement": "f8", "index": "u4", "p
 """Point of `samples`: time [s from the stamp], voltage [V], displacement [m], running index, phase number."""
 
 _REQUIRED = {"voltage": "f8", "displacement": "f8"}
-"""Fields without which a block is none."""
+"""Fields that every block needs."""
 
 _OPTIONAL = {name: FIELDS[name] for name in ("time", "index", "phase")}
 """Fields that a block need not have."""

@@ -17,13 +17,13 @@ LATE = 3e-3
 _SWING = 0.2
 """Least swing of a turning point, share of the range."""
 _WINDOWS = 24
-"""Turning points that are used, about."""
+"""Approximate number of turning points that are used."""
 _POINTS = 96
 """Points around every turning point."""
 _EXCERPT = 1 << 20
 """Samples that are looked at."""
 _FEWEST = 6
-"""Samples on each side of a turning point at least."""
+"""Smallest number of samples on each side of a turning point."""
 _FEWEST_TURNS = 2
 """One turning point alone may look like a lead by the way its loop bends."""
 _EXPLAINED = 0.999

@@ -12,7 +12,7 @@ from ...errors import RecordError
 from ...record import Notice, Record, Samples
 
 SHORTEST_SHARE = 1 / 64
-"""A piece between two holes is kept when it is at least this share of the phase."""
+"""A piece between two gaps is kept if it is at least this share of the phase."""
 
 
 LARGEST = 1e30

@@ -20,7 +20,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of a file."""
 
 _LARGEST_EXPANSION = 1100
-"""Bytes that one compressed byte can hold at most."""
+"""Largest number of bytes that one compressed byte can contain."""
 
 LARGEST_CHUNK = 1 << 26
 """Bytes that are unpacked at once from a compressed array."""

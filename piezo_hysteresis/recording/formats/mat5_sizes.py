@@ -22,7 +22,7 @@ _INT32 = 5
 _LARGEST_EXPANSION = 1100
 """Largest size of an element over that of its compressed form."""
 _DEEPEST = 20
-"""Structures within structures at most."""
+"""Largest depth of nested structures."""
 
 
 def check_sizes(path: Path) -> None:

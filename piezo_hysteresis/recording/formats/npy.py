@@ -1,4 +1,4 @@
-"""`NpyArrays`: the columns of a NumPy array in a file of its own."""
+"""`NpyArrays`: the columns of a NumPy array in an ``.npy`` file."""
 
 from __future__ import annotations
 

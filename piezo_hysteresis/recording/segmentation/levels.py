@@ -14,9 +14,9 @@ LARGEST_NOISE = 0.02
 """Voltages closer than this share of the range are one level."""
 
 _BLOCKS = 20_000
-"""Blocks into which the drive is cut, about."""
+"""Approximate number of blocks into which the drive is cut."""
 _SHORTEST = 4
-"""Samples of a block at least."""
+"""Smallest number of samples in a block."""
 _NOISE_WIDTH = 20.0
 """Noise widths within which voltages are one level."""
 _PEAK = 0.5

@@ -16,7 +16,7 @@ from .waveform import phase_name, turning_points
 _JUMP = 0.05
 """Length of the movements over that of the levels up to which the movements are jumps."""
 _MOST = 100
-"""Phases that are proposed at most."""
+"""Largest number of proposed phases."""
 
 
 def labelled(

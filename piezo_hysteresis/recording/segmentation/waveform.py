@@ -22,7 +22,7 @@ _OTHER_POWER = 0.005
 _PERIODIC = 0.9
 """Autocorrelation from which a drive repeats itself."""
 _STILL = 0.01
-"""Median step of a drive of levels at most, share of the range."""
+"""Largest median step of a drive that consists of levels, as a share of its range."""
 
 
 def phase_name(voltage: Samples, sample_period: float) -> str:

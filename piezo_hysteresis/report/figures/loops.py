@@ -19,7 +19,7 @@ from .thinning import thinned
 Array = NDArray[np.float64]
 
 CLOSED = 0.25
-"""Distance of the ends of a loop, over its height, beyond which it is none."""
+"""A curve is no loop if its ends are farther apart than this share of its height."""
 PANELS = 6
 """Most loops in one figure."""
 

@@ -16,10 +16,10 @@ from tornado.web import RequestHandler
 from ...errors import ParameterError
 
 SHORTEST_TOKEN = 16
-"""Characters of a token at least."""
+"""Smallest number of characters of a token."""
 
 _LONGEST_TOKEN = 1000
-"""Characters of a token at most."""
+"""Largest number of characters of a token."""
 
 _DELAY = 1.0
 """Time that a wrong token takes [s], against guessing."""

@@ -15,9 +15,9 @@ from .setup import DaqmxSetup
 from .tasks import DaqmxError, Tasks
 
 _RAMP_PERIOD = 1e-3
-"""Time between the samples of a ramp outside a stream, at most [s]."""
+"""Longest time between the samples of a ramp outside a stream [s]."""
 _READ_BACK_ERROR = 2e-3
-"""Error of an output that the card reads back itself, at most [V]."""
+"""Largest error of an output that the card reads back itself [V]."""
 _CLIPPED = 0.998
 """Share of the range of the sensor from which on it counts as clipped."""
 

@@ -13,7 +13,7 @@ from ..description import Samples
 from .setup import DaqmxSetup
 
 _RATE_TOLERANCE = 1e-4
-"""Relative difference up to which the rate of the card is the one asked for."""
+"""Relative difference up to which the rate of the card counts as the requested one."""
 
 _OPTIONS = (
     ("grpc.max_receive_message_length", -1),

@@ -190,7 +190,7 @@ class Axis:
             self.client.command(text)
 
     def start(self) -> None:
-        """Start the generator, and with it the recorder; the last look at whether a stop has been asked for."""
+        """Start the generator, and with it the recorder, unless a stop has been requested."""
         self.waves.require_not_interrupted()
         self.client.command(f"WGO {self.setup.generator} 1")
 

@@ -29,7 +29,7 @@ GENERATOR_ACTIVE = 73
 NO_WAVE_SELECTED = 75
 """No wave table is connected to the generator."""
 TOO_FEW_RECORDED = 77
-"""The recorder holds fewer samples than asked for."""
+"""The recorder contains fewer samples than requested."""
 SERVO_IS_ON = 79
 """An open-loop move was refused because the servo is on."""
 

@@ -69,7 +69,7 @@ class Plant:
         return self._voltage
 
     def configure(self, sample_period: float, voltage: float) -> None:
-        """Sample at another period [s] from now on; the stage settles at `voltage` [V], its time goes on."""
+        """Change the sample period [s]; the stage settles at `voltage` [V], and its time continues."""
         self._open(sample_period, voltage, self.time)
 
     def _open(self, sample_period: float, voltage: float, time: float) -> None:
