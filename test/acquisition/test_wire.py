@@ -71,7 +71,7 @@ def test_a_stop_in_mid_waveform(wired, word):
     assert not s.failures
     time.sleep(0.05)
     s.wait(lambda: s.acquisition.playback.is_safe, "rest")
-    assert any(e.kind is EventKind.STOPPED for d in s.deliveries for e in d.events)
+    s.wait(lambda: any(e.kind is EventKind.STOPPED for d in list(s.deliveries) for e in d.events), "the report of it")
 
 
 def test_a_stop_during_an_upload_starts_nothing(wired):
