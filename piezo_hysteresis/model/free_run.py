@@ -112,7 +112,7 @@ def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
 
 
 def _in_one_go(records: Iterable[Record], sample_period: float) -> Iterator[tuple[int | None, Record]]:
-    """The records with their index, and without one the holds between continuing records, during which creep goes on."""
+    """Records with their index, and without one the holds between continuing records, in which creep goes on."""
     before: Record | None = None
     for index, record in enumerate(records):
         if before is not None and record.continues:
