@@ -18,7 +18,18 @@ from benchmarks.figures import Figures, machine, show, write
 
 SPEED = ("kernels", "simulation", "identification", "growth", "start", "streaming", "diagnosis")
 """What runs where nothing is named."""
-QUALITY = ("changes", "compensation", "export", "fleet", "recovery", "table_1", "real_recordings", "reading", "mirror")
+QUALITY = (
+    "changes",
+    "compensation",
+    "export",
+    "fleet",
+    "rates",
+    "recovery",
+    "table_1",
+    "real_recordings",
+    "reading",
+    "mirror",
+)
 """What takes minutes or needs data, by name only."""
 
 

@@ -127,7 +127,8 @@ def diagnose_few(
     progress("gap", 0.9)
     chosen = sorted(aside or fitted)
     free = Nuisance(offset=True), replace(final.nuisance, offset=True)
-    models = baseline.model, final.model
+    first = model or baseline.model  # the gap of a given model is that of the model as it was given
+    models = first, final.model
     gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), free, bool(aside))
     missing = missing_excitation([records[i] for i in used])
     verdict, reason = _verdict(selection, steps, before, gap, len(used), missing)
@@ -136,7 +137,7 @@ def diagnose_few(
         verdict=verdict,
         reason=reason,
         model=stating(delivered, gap.live, stroke(records)),
-        baseline=stating(baseline.model, gap.before, stroke(records)),
+        baseline=stating(first, gap.before, stroke(records)),
         selection=selection,
         fit=final.fit,
         where=where,

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-import numpy as np
-
 from ...effects import Arx
 from ...model.model import Model
 from ...record import Record
 from .linear_part import free_numbers
-from .piece_fit import PieceFit, cost_of, linearised
+from .piece_fit import at_its_cost, linearised
 from .pieces import Kind, pieces_of
 from .scores import ModelStructure, judge
 
@@ -42,8 +40,7 @@ def score_left_out(
     names = [n for n in free_numbers(model) if not _is_of_high_order(model, n)] if adjusts else []
     pieces = pieces_of(records, fitted)
     matrices, weights = linearised(model, pieces, floors, names)
-    cost = cost_of(np.tensordot(weights, matrices, 1), len(names))
-    return next(judge(PieceFit(model, tuple(names), matrices, weights, cost, True, 1), pieces, (WHOLE,))).score
+    return next(judge(at_its_cost(model, names, matrices, weights), pieces, (WHOLE,))).score
 
 
 def has_several_drives(records: Sequence[Record], fitted: Collection[int]) -> bool:

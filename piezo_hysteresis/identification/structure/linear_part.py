@@ -116,6 +116,8 @@ def _with_mode(
 
 def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> Iterator[PieceFit]:
     """Fits with a mode that no step shows; each adjusts either its frequency, or its share at the highest frequency."""
+    if len({p.rate for p in pieces if p.kind is Kind.LOOP}) < 2:
+        return  # at one rate the gain does not rise with anything
     loops = [p.record for p in pieces if p.kind is Kind.LOOP]
     fastest = max((excitation_content(r).bandwidth for r in loops), default=0.0)
     top = RESOLVED / min(p.record.sample_period for p in pieces)

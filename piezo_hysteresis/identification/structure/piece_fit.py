@@ -1,9 +1,9 @@
-"""A joint fit to pieces of records, with one sensor zero for all pieces of a record."""
+"""A joint fit to pieces of records, with one sensor zero, which wanders, for all pieces of a record."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from ..fit.bounded_step import bounded_step
 from ..fit.fit import gauge
 from ..fit.normal_equations import grams
 from .pieces import WEIGHTS, RecordPiece
+from .prior import WAVES, prior_of, slow_rows
 
 Array = NDArray[np.float64]
 
@@ -42,9 +43,9 @@ class PieceFit:
         Model with the fitted values.
     names : tuple of str
         Free numbers.
-    matrices : (p, q + r + 1, q + r + 1) ndarray
+    matrices : (p, q + s + 1, q + s + 1) ndarray
         Inner products of every piece, divided by its number of samples and its squared noise floor: sensitivities of
-        the q parameters, the zeros of the r records, and the residual.
+        the q parameters, the s zeros and waves of the records, and the residual.
     weights : (p,) ndarray
         Weights of the pieces; their sum is 1.
     cost : float
@@ -64,22 +65,37 @@ class PieceFit:
     iterations: int
 
     @property
-    def total(self) -> Array:
-        """Weighted sum of the matrices."""
-        return np.asarray(np.tensordot(self.weights, self.matrices, 1))
+    def prior(self) -> Array:
+        """What is known before, in the form of the matrices."""
+        return prior_of(self.model, self.names, self.matrices.shape[1] - 1 - len(self.names))
 
     @property
-    def zeros(self) -> Array:
-        """Fitted sensor zeros of the records [m], shape (r,)."""
+    def total(self) -> Array:
+        """Weighted sum of the matrices, and what is known before."""
+        return np.asarray(np.tensordot(self.weights, self.matrices, 1) + self.prior)
+
+    @property
+    def slow(self) -> Array:
+        """Zeros of the records at their best [m], then the waves of their wander, shape (s,)."""
         total, numbers = self.total, len(self.names)
         matrix, cross = total[numbers:-1, numbers:-1], total[numbers:-1, -1]
         return np.asarray(np.linalg.lstsq(matrix, cross, rcond=None)[0])
 
     @property
+    def records(self) -> int:
+        """Number of the records that count."""
+        return (self.matrices.shape[1] - 1 - len(self.names)) // (1 + WAVES)
+
+    @property
+    def zeros(self) -> Array:
+        """Zeros of the records at their best [m], shape (r,)."""
+        return self.slow[: self.records]
+
+    @property
     def squares(self) -> Array:
         """R² of every piece, shape (p,)."""
-        zeros, own = self.zeros, slice(len(self.names), -1)
-        return np.array([m[-1, -1] - 2.0 * zeros @ m[own, -1] + zeros @ m[own, own] @ zeros for m in self.matrices])
+        slow, own = self.slow, slice(len(self.names), -1)
+        return np.array([m[-1, -1] - 2.0 * slow @ m[own, -1] + slow @ m[own, own] @ slow for m in self.matrices])
 
     def box(self) -> tuple[Array, Array]:
         """Distance of every parameter to its lower and upper bound; zeros are not bounded."""
@@ -99,8 +115,8 @@ def linearised(
 ) -> tuple[Array, Array]:
     """Matrices and weights of the pieces that count, as in `PieceFit`."""
     origins = sorted({p.origin for p in pieces if WEIGHTS[p.kind] > 0.0})
-    zeros = [np.array([np.full(p.record.size, float(p.origin == o)) for o in origins]) for p in pieces]
-    found = grams(model, [p.record for p in pieces], names, None, zeros)
+    slow = slow_rows(pieces, origins, model.displacement_scale)
+    found = grams(model, [p.record for p in pieces], names, None, slow)
     counted = [i for i, p in enumerate(pieces) if WEIGHTS[p.kind] > 0.0]
     weights = np.array([WEIGHTS[pieces[i].kind] for i in counted])
     for origin in origins:
@@ -110,10 +126,11 @@ def linearised(
     return matrices, weights / weights.sum()
 
 
-def cost_of(total: Array, numbers: int) -> float:
-    """Weighted mean of R² with fitted zeros."""
-    zeros, cross = total[numbers:-1, numbers:-1], total[numbers:-1, -1]
-    return float(total[-1, -1] - cross @ np.linalg.lstsq(zeros, cross, rcond=None)[0])
+def at_its_cost(model: Model, names: Sequence[str], matrices: Array, weights: Array, iterations: int = 1) -> PieceFit:
+    """A fit as far as it has come; its cost is the weighted mean of R², zeros and wander at their best."""
+    found = PieceFit(model, tuple(names), matrices, weights, np.inf, False, iterations)
+    total, numbers = found.total, len(found.names)
+    return replace(found, cost=float(total[-1, -1] - total[numbers:-1, -1] @ found.slow))
 
 
 def fit_pieces(
@@ -143,8 +160,7 @@ def fit_pieces(
     """
     names = tuple(names)
     matrices, weights = linearised(model, pieces, floors, names)
-    now = PieceFit(model, names, matrices, weights, np.inf, False, 1)
-    now = PieceFit(model, names, matrices, weights, cost_of(now.total, len(names)), False, 1)
+    now = at_its_cost(model, names, matrices, weights)
     while now.iterations < max_iterations and now.cost > PERFECT:
         better = None
         while better is None and damping < FARTHEST:
@@ -171,10 +187,8 @@ def _step(now: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float],
         matrices, weights = linearised(model, pieces, floors, names)
     except (DivergenceError, ParameterError):
         return None
-    cost = cost_of(np.tensordot(weights, matrices, 1), len(names))
-    if not cost < now.cost:
-        return None
-    return PieceFit(model, names, matrices, weights, cost, False, now.iterations + 1)
+    moved_there = at_its_cost(model, names, matrices, weights, now.iterations + 1)
+    return moved_there if moved_there.cost < now.cost else None
 
 
 def best_step(now: PieceFit, total: Array, damping: float = 0.0) -> Array:

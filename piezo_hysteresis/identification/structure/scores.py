@@ -45,8 +45,8 @@ class ModelStructure:
 
     @property
     def size(self) -> int:
-        """Number of optional parameters."""
-        return int(self.square) + self.creep_rates + 2 * int(self.level)
+        """Number of optional parameters; one rate of creep is none, since every piezo ceramic creeps."""
+        return int(self.square) + abs(self.creep_rates - 1) + 2 * int(self.level)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -145,7 +145,7 @@ def judge(full: PieceFit, pieces: Sequence[RecordPiece], structures: Sequence[Mo
             weights = np.where(mask, 0.0, full.weights)
             if not weights.any():
                 continue
-            step = _solve(np.tensordot(weights, full.matrices, 1), free, fixed, low, high)
+            step = _solve(np.tensordot(weights, full.matrices, 1) + full.prior, free, fixed, low, high)
             logs.append(_logs(full, step, mask, True))
             steps.append(step[: len(full.names)])
         numbers = len(full.names)
@@ -187,7 +187,7 @@ def _solve(total: Array, free: Array, fixed: Array, low: Array, high: Array) -> 
 def _logs(full: PieceFit, step: Array, mask: Mask, zero_free: bool) -> float:
     """Mean ln max(1, R²) of the pieces in `mask`; the zero of a record without fitted pieces is free."""
     numbers, logs = len(full.names), []
-    zeros = np.arange(numbers, step.size)
+    zeros = np.arange(numbers, numbers + full.records)
     rest = full.matrices[~mask].sum(axis=0) if not mask.all() else np.zeros_like(full.matrices[0])
     step = step.copy()
     for z in zeros:

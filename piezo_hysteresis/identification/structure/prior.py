@@ -1,0 +1,110 @@
+"""What is known of a stage before it is recorded: its zero wanders, its creep has about one rate, its plays are smooth.
+
+All of it is Gaussian and enters the normal equations of a fit. Without it, whatever moves slowly within one record is
+taken for slow creep, which drives fast creep to zero and is predicted where it does not return; and a play of one half
+width takes the place of a lag. Decision 23 says how the sizes were chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects import MEMORY, CreepTwoRates
+from ...model.model import Model
+from .pieces import RecordPiece
+
+Array = NDArray[np.float64]
+
+WANDER = 0.003
+"""Standard deviation of what the zero wanders in `WANDER_TIME`, as a share of the displacement scale."""
+WANDER_TIME = 10.0
+"""Time of that wander [s]; its variance grows with the time."""
+WAVES = 6
+"""Waves of the wander of a record (Karhunen-Loève expansion of a random walk)."""
+ONE_RATE = 0.005
+"""Standard deviation of the difference between fast and slow creep [1/decade]."""
+SMOOTH = 0.1
+"""Standard deviation of the second difference of the weights of neighbouring plays, as a share of `LOOP`."""
+BEND = 0.2
+"""Standard deviation of the growth of the weights with the level [1]."""
+LOOP = 0.25
+"""Sum of the weights of a usual piezo, relative to the response."""
+INDEPENDENT = 16
+"""Independent parts of the misfit of all records: a longer record does not outweigh what is known before."""
+
+
+def slow_rows(pieces: Sequence[RecordPiece], origins: Sequence[int], scale: float) -> list[Array]:
+    """Zero and wander of every record in `origins`, for every piece: (r·(1 + `WAVES`), n), zeros first [m].
+
+    Coefficients of the wander have unit variance.
+
+    Parameters
+    ----------
+    pieces : sequence of RecordPiece
+        In order.
+    origins : sequence of int
+        Records that count.
+    scale : float
+        Displacement scale of the model [m].
+    """
+    begin: dict[int, float] = {}
+    end: dict[int, float] = {}
+    for piece in pieces:
+        begin.setdefault(piece.origin, piece.record.start_time)
+        end[piece.origin] = piece.record.start_time + piece.record.duration
+    frequency = (np.arange(WAVES) + 0.5) * np.pi
+    found = []
+    for piece in pieces:
+        whole = end[piece.origin] - begin[piece.origin]
+        time = piece.record.start_time - begin[piece.origin] + piece.record.sample_period * np.arange(piece.record.size)
+        size = WANDER * scale * np.sqrt(2.0 * whole / WANDER_TIME) / frequency
+        waves = size[:, None] * np.sin(frequency[:, None] * time / whole)
+        mine = np.array([float(piece.origin == origin) for origin in origins])
+        zeros = mine[:, None] * np.ones(time.size)
+        found.append(np.vstack((zeros, np.kron(mine[:, None], waves))))
+    return found
+
+
+def prior_of(model: Model, names: Sequence[str], slow: int) -> Array:
+    """The normal equations of what is known before, of q numbers, zeros and wander: (q + slow + 1, q + slow + 1).
+
+    Parameters
+    ----------
+    model : Model
+        Where it is linearised.
+    names : sequence of str
+        Numbers that are free.
+    slow : int
+        Zeros and waves of all records.
+    """
+    numbers, records = len(names), slow // (1 + WAVES)
+    waves = np.zeros((slow - records, numbers + slow + 1))
+    waves[:, numbers + records : -1] = np.eye(slow - records)
+    rows = [waves]
+    fast, late = (f"{CreepTwoRates.name}.{n}" for n in ("gamma_fast", "gamma_slow"))
+    if fast in names and late in names:
+        rows.append(_row(model, names, [(fast, 1.0), (late, -1.0)], ONE_RATE, slow))
+    if MEMORY.name in model and f"{MEMORY.name}.c[0]" in names:
+        count = model[MEMORY.name].array("c").size
+        weights = [f"{MEMORY.name}.c[{j}]" for j in range(count)]
+        padded = [None, *weights, None]  # narrower and wider plays than these have no weight
+        for around in zip(padded, weights, padded[2:], strict=False):
+            terms = [(n, f) for n, f in zip(around, (1.0, -2.0, 1.0), strict=True) if n is not None]
+            rows.append(_row(model, names, terms, SMOOTH * LOOP, slow))
+    bends = [n for n in names if n.partition(".")[0] == MEMORY.level_term.name]
+    rows += [_row(model, names, [(n, 1.0)], BEND, slow) for n in bends]
+    whole = np.vstack(rows)
+    return np.asarray(whole.T @ whole / INDEPENDENT)
+
+
+def _row(model: Model, names: Sequence[str], terms: Sequence[tuple[str, float]], sigma: float, slow: int) -> Array:
+    """A sum of numbers that is zero within `sigma`, linearised where the model stands: (1, q + slow + 1)."""
+    row = np.zeros((1, len(names) + slow + 1))
+    values = model.values()
+    for name, factor in terms:
+        row[0, names.index(name)] = factor
+        row[0, -1] -= factor * values[name]
+    return row / sigma

@@ -1,0 +1,71 @@
+"""What is known before a fit: the zero wanders like a random walk, creep has one rate, weights are smooth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.effects import Arx, BoucWen, CreepTwoRates, HysteresisMemory, LevelDependentMemory
+from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.structure.pieces import pieces_of
+from piezo_hysteresis.identification.structure.prior import WANDER, WANDER_TIME, WAVES, prior_of, slow_rows
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.record import Experiment
+
+PERIOD = 5e-3
+STAGE = Nanopositioner(mode=2000.0, zeta=0.3, pole=13e-3, delay=3e-3, noise=5e-4)
+
+
+def creeping(model: Model) -> tuple[float, float]:
+    values = model.values()
+    one = values.get("creep.gamma", 0.0)
+    return values.get("creep_two_rates.gamma_fast", one), values.get("creep_two_rates.gamma_slow", one)
+
+
+def test_the_wander_has_the_variance_of_a_random_walk():
+    record = STAGE.play(growing_sine(1.0, PERIOD, (0.5, 1.0), cycles=5), PERIOD)
+    pieces = pieces_of([record], [0])
+    rows = np.hstack(slow_rows(pieces, [0], 2e-5))
+    assert rows.shape == (1 + WAVES, record.size)
+    np.testing.assert_array_equal(rows[0], 1.0)
+    variance = (rows[1:] ** 2).sum(axis=0)
+    expected = (2e-5 * WANDER) ** 2 * record.time / WANDER_TIME
+    late = slice(record.size // 3, None)  # six waves do not hold the fastest wander
+    np.testing.assert_allclose(variance[late], expected[late], rtol=0.2)
+    assert np.abs(np.diff(rows)).max() < 0.01 * np.abs(rows[1:]).max()  # the cuts between pieces do not show
+
+
+def test_smooth_weights_and_one_rate_cost_nothing_and_others_do():
+    smooth = 0.02 * np.exp(-0.5 * ((np.arange(16) - 8.0) / 3.0) ** 2)
+    model = Model(
+        (
+            BoucWen(A=0.0),
+            HysteresisMemory(c=tuple(smooth.tolist())),
+            LevelDependentMemory(),
+            CreepTwoRates(gamma_fast=0.01, gamma_slow=0.01),
+            Arx(b=(1.0,)),
+        ),
+        PERIOD,
+    )
+    names = [n for n in model.values() if n.startswith(("hysteresis_memory.c", "level", "creep_two_rates.gamma"))]
+
+    def cost(changed: Model) -> float:
+        return float(prior_of(changed, names, 1 + WAVES)[-1, -1])
+
+    assert cost(model) < 0.01
+    spike = model.with_values({"hysteresis_memory.c[0]": 0.08})
+    two = model.with_values({"creep_two_rates.gamma_fast": 0.0, "creep_two_rates.gamma_slow": 0.02})
+    bent = model.with_values({"level_dependent_memory.k_narrow": 0.5})
+    assert min(cost(spike), cost(two), cost(bent)) > 0.3
+
+
+@pytest.mark.parametrize("share", [0.004, -0.004])
+def test_a_drift_of_one_record_is_not_taken_for_creep(share):
+    drive = growing_sine(1.0, PERIOD, (1.0,), cycles=25, hold=0.0)
+    record = STAGE.play(drive, PERIOD)
+    drift = share * STAGE.stroke * (1.0 - np.exp(-record.time / 8.0))
+    drifting = replace(record, displacement=record.displacement + drift)
+    fast, slow = creeping(identify(Experiment((drifting,)), memory=True).model)
+    assert fast > 0.5 * STAGE.creep_fast  # it was 0: all creep went where the drift is
+    assert slow < 1.5 * STAGE.creep_slow
