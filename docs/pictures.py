@@ -1,7 +1,8 @@
 """Pictures of docs/tour.md, made from the code they show; `make docs` runs this.
 
 Those of the demo come from what `make demo` has left in a folder: ``python docs/pictures.py --demo demo`` (chromium).
-Those of docs/gap.md take a diagnosis, about a minute: ``python docs/pictures.py gap``.
+Those of docs/gap.md take a diagnosis, about a minute: ``python docs/pictures.py gap``; the one of the live diagnosis:
+``python docs/pictures.py live``.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 import gap_pictures
 import matplotlib as mpl
 import numpy as np
+from live_pictures import draw_live
 from matplotlib.figure import Figure
 
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
@@ -74,7 +76,7 @@ def main() -> None:
     """Draw all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--demo", type=Path, metavar="FOLDER", help="only those of the demo that wrote this folder")
-    parser.add_argument("page", nargs="?", choices=("gap",), help="only the pictures of this page")
+    parser.add_argument("page", nargs="?", choices=("gap", "live"), help="only the pictures of this page")
     options = parser.parse_args()
     IMAGES.mkdir(exist_ok=True)
     if options.demo is not None:
@@ -82,6 +84,9 @@ def main() -> None:
         return
     if options.page == "gap":
         gap_pictures.main(IMAGES)
+        return
+    if options.page == "live":
+        draw_live(IMAGES)
         return
     with mpl.rc_context(SETTINGS):
         what_a_stage_does().savefig(IMAGES / "what_a_stage_does.png", dpi=110, metadata={"Software": None})

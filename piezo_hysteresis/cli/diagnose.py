@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..discrepancy import diagnose
+from ..discrepancy import Diagnosis, diagnose
+from ..discrepancy.choice.live_diagnosis import LiveDiagnosis
+from ..errors import IdentificationError, ParameterError
 from ..model import model_file
 from ..report.figures.comparison import compare_diagnosis
 from ..report.json_file import write_json
@@ -13,7 +15,8 @@ from ..report.page import page
 from ..report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
 from ..report.verdict import answer_verdict
 from .options import reading_options
-from .options.destination import add_results, require_new_results
+from .options.destination import add_results, require_new_file, require_new_results
+from .options.stage_option import add_stage_arguments, diagnose_stage
 from .terminal import console, progress, show, show_notices
 
 USUAL_TIME = "5 s to 2 min"
@@ -23,9 +26,14 @@ USUAL_TIME = "5 s to 2 min"
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
     parser = subparsers.add_parser("diagnose", description=__doc__)
-    reading_options.add_arguments(parser)
+    reading_options.add_arguments(parser, needs_experiment=False)
     parser.add_argument("--model", metavar="FILE", help="model file to start from; default: identify a model first")
-    parser.add_argument("-o", "--output", metavar="FILE", help="write the extended model to this file")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="write the extended model to this file; with --stage: folder of the experiment",
+    )
     parser.add_argument(
         "--time",
         type=float,
@@ -38,6 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         action="store_true",
         help="do not look for the explicit step of Eq. (7), which only simulated data can hold",
     )
+    add_stage_arguments(parser)
     add_results(parser, report="write the HTML page, and its figures beside it", json="write the answer as JSON")
     parser.set_defaults(run=run)
 
@@ -50,21 +59,16 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         On bad input, or data that do not even determine a baseline.
     """
-    require_new_results(args)
-    start = None if args.model is None else model_file.load(args.model)
-    experiment = reading_options.read(args)
-    with progress("diagnose", f"{experiment.size} samples; this usually takes {USUAL_TIME}") as report_progress:
-        found = diagnose(
-            experiment,
-            start,
-            progress=report_progress,
-            explicit_step=not args.no_explicit_step,
-            time_limit=args.time,
-        )
+    live = None if args.stage is None else _of_stage(args)
+    found = _of_recording(args) if live is None else live.found
+    if found is None:
+        raise IdentificationError("diagnose --stage: nothing was played, expected at least the first phases")
     path = ""
-    if args.output is not None and found.model is not None:
+    if live is None and args.output is not None and found.model is not None:
         path = str(model_file.save(found.model, args.output))
     answer = found.answer(path)
+    if live is not None:
+        answer["live"] = live.answer()
     if args.json is not None:
         write_json(args.json, answer)
     if args.report is not None:
@@ -83,3 +87,27 @@ def run(args: argparse.Namespace) -> int:
         if written:
             out.print(f"wrote {written}")
     return 0
+
+
+def _of_stage(args: argparse.Namespace) -> LiveDiagnosis:
+    if args.experiment or args.model is not None:
+        raise ParameterError("diagnose: got --stage beside a recording or a model, expected --stage alone")
+    for option, path in (("--report", args.report), ("--json", args.json)):
+        require_new_file(option, path, args.force)
+    return diagnose_stage(args)
+
+
+def _of_recording(args: argparse.Namespace) -> Diagnosis:
+    if not args.experiment:
+        raise ParameterError("diagnose: got no recording, expected one or several, or --stage FILE")
+    require_new_results(args)
+    start = None if args.model is None else model_file.load(args.model)
+    experiment = reading_options.read(args)
+    with progress("diagnose", f"{experiment.size} samples; this usually takes {USUAL_TIME}") as report_progress:
+        return diagnose(
+            experiment,
+            start,
+            progress=report_progress,
+            explicit_step=not args.no_explicit_step,
+            time_limit=args.time,
+        )

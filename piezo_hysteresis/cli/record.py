@@ -47,10 +47,7 @@ def run(args: argparse.Namespace) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the stage is made safe
     session = DriverSession(settings, values, f"a recording with {args.stage.resolve()}")
     try:
-        force = session.in_force()
-        names = ("voltage_min", "voltage_max", "safe_voltage", "max_slew_rate", "ramp_rate")
-        limits = DriveLimits(session.sample_period, **{name: float(force[name]) for name in names})
-        protocol = PROTOCOLS[args.protocol](limits, args.seed)
+        protocol = PROTOCOLS[args.protocol](drive_limits(session), args.seed)
         console().print(f"{session.limits.name}\n{args.protocol}: {protocol.summary}")
         played = 0.0
         durations = iter([phase.duration for phase in protocol])
@@ -82,17 +79,34 @@ def read_stage(path: Path) -> tuple[DriverSettings, dict[str, Any]]:
     parameters = given.get("ros__parameters") if isinstance(given, Mapping) else None
     if not isinstance(parameters, Mapping):
         raise ParameterError(f"{path}: got no '/**: ros__parameters:', expected a parameter file of the driver")
-    flat = _flat(parameters)
+    return checked_settings(_flat(parameters), path)
+
+
+def checked_settings(given: Mapping[str, Any], path: Path) -> tuple[DriverSettings, dict[str, Any]]:
+    """Settings of a driver and values of its back end, from names with points between their parts.
+
+    Raises
+    ------
+    ParameterError
+        On a name that is no parameter of the driver, or a value that is not acceptable.
+    """
     rows = {row.name: row for row in DRIVER} | {
         f"{word}.{row.name}": row for word, back_end in BACK_ENDS.items() for row in back_end.rows
     }
-    unknown = sorted(set(flat) - set(rows))
+    unknown = sorted(set(given) - set(rows))
     if unknown:
         raise ParameterError(f"{path}: {unknown[0]} is no parameter of the driver; docs/ros.md lists them")
-    checked = {name: row.check(flat.get(name, row.value), "") for name, row in rows.items()}
+    checked = {name: row.check(given.get(name, row.value), "") for name, row in rows.items()}
     settings = DriverSettings.from_values(checked)
     word = f"{settings.stage}."
     return settings, {name.removeprefix(word): value for name, value in checked.items() if name.startswith(word)}
+
+
+def drive_limits(session: DriverSession) -> DriveLimits:
+    """Limits of an opened stage."""
+    force = session.in_force()
+    names = ("voltage_min", "voltage_max", "safe_voltage", "max_slew_rate", "ramp_rate")
+    return DriveLimits(session.sample_period, **{name: float(force[name]) for name in names})
 
 
 def _flat(parameters: Mapping[Any, Any], prefix: str = "") -> dict[str, Any]:

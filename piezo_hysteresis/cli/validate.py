@@ -142,7 +142,7 @@ def _test_table(tests: list[dict[str, Any]]) -> Table:
 
 
 def _draw(comparison: ModelComparison, folder: Path) -> None:
-    from ..report.figures.gap import gap
+    from ..report.figures.diagnosis.gap import gap
     from ..report.figures.time_series import time_series
     from ..report.figures.whiteness import whiteness
 

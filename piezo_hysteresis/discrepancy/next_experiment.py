@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,13 +97,32 @@ def separations(first: Model, second: Model, training_data: TrainingData) -> dic
     dict of str to float
         By phase name the expected squared distance, in floors² per second of stage time.
     """
+    drives = menu(training_data, first)
+    found = distances(first, second, training_data, drives)
+    return {name: found[name] / record.duration for name, record in drives.items()}
+
+
+def distances(
+    first: Model, second: Model, training_data: TrainingData, drives: Mapping[str, Record]
+) -> dict[str, float]:
+    """Mean squared distance of two fitted models on every drive, beyond what the first can still adjust, in floors².
+
+    Parameters
+    ----------
+    first, second : Model
+        Fitted, one with each effect.
+    training_data : TrainingData
+        What has been recorded: it binds the common parameters.
+    drives : mapping of str to Record
+        From rest; their displacement is not used.
+    """
     free = free_numbers(first, training_data)
     directions = gauge(first, free)
     known = weighted_sum(grams(first, training_data.records, free, training_data.nuisance), training_data.floors)
     prior = directions.T @ known[:-1, :-1] @ directions
     floor = float(np.min(training_data.floors))
-    powers = {}
-    for name, record in menu(training_data, first).items():
+    found = {}
+    for name, record in drives.items():
         (difference,) = (a - b for a, b in zip(second.simulate(record), first.simulate(record), strict=True))
         (gram,) = grams(first, [record], free, training_data.nuisance, [difference[None, :]])
         total = gram.matrix[:-1, :-1] / (gram.size * floor * floor)
@@ -111,8 +131,8 @@ def separations(first: Model, second: Model, training_data: TrainingData) -> dic
         inner = prior + directions.T @ total[:q, :q] @ directions
         scale = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
         solved = np.linalg.lstsq(inner * np.outer(scale, scale), scale * cross, rcond=1e-9)[0] * scale
-        powers[name] = float(total[q, q] - cross @ solved) / record.duration
-    return powers
+        found[name] = max(0.0, float(total[q, q] - cross @ solved))
+    return found
 
 
 def propose(first: Model, second: Model, names: tuple[str, str], training_data: TrainingData) -> NextExperiment:

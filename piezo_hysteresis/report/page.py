@@ -13,8 +13,9 @@ from .document import document
 from .figures.bode import bode
 from .figures.comparison import ModelComparison
 from .figures.creep import creep
+from .figures.diagnosis.gap import gap
+from .figures.diagnosis.probabilities import probabilities
 from .figures.drawing import Drawing
-from .figures.gap import gap
 from .figures.loops import loops_by_amplitude, loops_by_frequency
 from .figures.residual_maps import residual_maps
 from .figures.spectrum import residual_spectrum
@@ -24,6 +25,7 @@ from .figures.whiteness import whiteness
 from .tables.answer_tables import effect_table, gap_table, rejection_table, where_table
 from .tables.error_table import error_table, frequency_table
 from .tables.parameter_table import correlation_table, parameter_table
+from .tables.probability_table import probability_table
 from .tables.quality_table import notice_table, record_table
 from .tables.table import Table
 from .verdict import verdict
@@ -100,6 +102,8 @@ def page(
     drawn: dict[str, list[Drawing]] = {}
     count = sum(len(figures) for figures in SECTIONS.values())
     done = 0
+    if answer is not None and "live" in answer:
+        drawn["Diagnosis"] = [probabilities(answer["live"])]
     for heading, figures in SECTIONS.items():
         for figure in figures:
             if progress is not None:
@@ -126,6 +130,7 @@ def _tables(comparison: ModelComparison, fit: Fit | None, answer: Mapping[str, A
             gap_table(answer),
             where_table(answer),
             rejection_table(answer),
+            probability_table(answer["live"]) if "live" in answer else None,
         ]
     if comparison.model is not None:
         tables["Parameters"] = [parameter_table(comparison.model, fit)]

@@ -9,8 +9,8 @@ from ..identification.identification import Identification
 from ..model.model import Model
 from ..record import Experiment, Record
 from .figures.comparison import compare, compare_diagnosis
+from .figures.diagnosis.gap import gap
 from .figures.drawing import Drawing
-from .figures.gap import gap
 from .figures.preview import preview
 from .figures.time_series import time_series
 

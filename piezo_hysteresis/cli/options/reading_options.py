@@ -15,12 +15,12 @@ from ...record import Experiment
 T = TypeVar("T")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser, needs_experiment: bool = True) -> None:
     """Declare the experiment and what the file may not say about itself."""
     parser.add_argument(
         "experiment",
         metavar="EXPERIMENT",
-        nargs="+",
+        nargs="+" if needs_experiment else "*",
         help="one or several recordings: bag, folder of .npz, .csv, .mat, …",
     )
     add_reading_group(parser)

@@ -181,7 +181,8 @@ def _turn(
         most = max(0.0, before.cost - other.score.cost)
         gains = f"it gains at most {most:.2f} in mean ln R²" if most >= NO_GAIN else "it does not reduce the error"
         rejected.append(Rejection(other.name, f"in cross-validation {gains}"))
-    return Step(before, best, accepted, tuple(rivals), tuple(rejected), renewed)
+    tried = (*refits, *_others(screened, refits))
+    return Step(before, best, accepted, tuple(rivals), tuple(rejected), tried, renewed)
 
 
 def _best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:

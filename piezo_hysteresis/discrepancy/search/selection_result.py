@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model.model import Model
-from .candidates import FittedCandidate
+from .candidates import Candidate, FittedCandidate
 from .cross_validation import Score
 from .refit import Fitted
 
@@ -39,6 +39,8 @@ class Step:
         Refits that cross-validation cannot distinguish from the best.
     rejected : tuple of Rejection
         All others.
+    tried : tuple of Candidate
+        Every effect of this turn with its score: refitted, or linearised at its start where it was too far behind.
     renewed : Fitted or None
         The model without the effect, better than before only by what the search found on its way.
     """
@@ -48,6 +50,7 @@ class Step:
     accepted: bool
     rivals: tuple[FittedCandidate, ...]
     rejected: tuple[Rejection, ...]
+    tried: tuple[Candidate, ...] = ()
     renewed: Fitted | None = None
 
     @property

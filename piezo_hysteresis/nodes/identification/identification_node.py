@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 from uuid import uuid4
 
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
-from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from ...acquisition.stage_lock import StageLock
+from ...discrepancy.choice.tiers import whole_plan
 from ...effects import HYSTERESIS, Arx, Offset
-from ...errors import ParameterError, PiezoError, reason_of
+from ...errors import PiezoError, reason_of
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import Protocol
 from ...model.model import Model
 from ...model.model_file import dumps, loads, save
-from ...model.model_parameters import PREFIX
 from ...recording.segmentation.decimation import save_decimation
-from ..runtime.fit_process import FitProcess, Job
+from ..runtime.fit_process import FitProcess, Job, Outcome
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.job_actions import JobActions, by_service
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
-from ..topics import QOS_OVERRIDES
 from .driver_client import DriverClient
 from .experiment_folder import ExperimentFolder
 from .fit_jobs import diagnosis, identification
-from .protocol_runner import Progress, run_protocol
+from .live_process import LiveSettings
+from .live_protocols import LiveProtocols
+from .parameter_check import ParameterCheck
+from .protocol_runner import Progress, run_protocol, run_protocols
 from .served_model import ServedModel
 from .settings import IDENTIFICATION, PROTOCOLS
 from .status import ENDED, IdentificationStatus
@@ -61,7 +61,7 @@ class IdentificationNode(GuardedNode):
             self._served.resume({name: p.value for name, p in self._parameter_overrides.items()})
         except PiezoError as error:
             self._status.failed(f"no model from the parameters: {error}")
-        self.add_on_set_parameters_callback(self._check)
+        self.add_on_set_parameters_callback(ParameterCheck(self._folder, self.has_parameter))
         for name, callback in (
             ("plan", self._on_plan),
             ("identify", self._on_identify),
@@ -89,7 +89,7 @@ class IdentificationNode(GuardedNode):
             response.message = f"no limits: {self._driver.missing or 'the driver does not answer any more'}"
             return response
         try:
-            protocol = self._protocol(self._driver.limits)
+            protocol = self._planned(self._driver.limits)
         except PiezoError as error:
             response.message = str(error)
             return response
@@ -97,19 +97,25 @@ class IdentificationNode(GuardedNode):
         return response
 
     def _on_identify(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._on_drive(response, self._identify)
+
+    def _on_drive(self, response: Trigger.Response, job: Callable[[Path], Generator[Progress]]) -> Trigger.Response:
+        """Begin a job that moves the stage, unless it is known already that it cannot."""
         if self._driver.stopped:
             response.message = self._driver.stopped
             return response
         path = self._folder.new()
         if self._driver.is_fresh and self._driver.limits is not None:
             try:
-                self._protocol(self._driver.limits)
+                self._planned(self._driver.limits)
             except PiezoError as error:
                 response.message = str(error)
                 return response
-        return self._begin(response, self._identify(path), f"recording to {path}")
+        return self._begin(response, job(path), f"recording to {path}")
 
     def _on_diagnose(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if read(self, IDENTIFICATION)["live"]:
+            return self._on_drive(response, self._diagnose_live)
         path = self._folder.chosen(self._value("experiment"))
         if path is None:
             response.message = f"no experiment in {self._folder.root}; set 'experiment', or identify first"
@@ -176,8 +182,7 @@ class IdentificationNode(GuardedNode):
             return planned[0]
 
         self._moves = True
-        self._status.experiment = str(path)
-        self._status.owner = self._driver.owner
+        self._status.experiment, self._status.owner, self._status.likely = str(path), self._driver.owner, ""
         yield from run_protocol(self, self._driver, plan, path)
         save_decimation(path, {phase.name: phase.stored_every for phase in planned[0]})
         self._folder.last = path
@@ -194,9 +199,25 @@ class IdentificationNode(GuardedNode):
                 yield Progress("fitting", word, fraction)
         finally:
             process.close()
+        self._accept(outcome, path, job.__name__)
+
+    def _diagnose_live(self, path: Path) -> Generator[Progress]:
+        self._moves = True
+        self._status.experiment, self._status.owner, self._status.likely = str(path), self._driver.owner, ""
+        settings = LiveSettings.from_values(read(self, IDENTIFICATION))
+        protocols = LiveProtocols(path, settings, self._status.set_likely)
+        try:
+            yield from run_protocols(self, self._driver, protocols.following, path)
+        finally:
+            protocols.close()
+        self._folder.last, self._moves, self._status.owner = path, False, ""
+        self._accept(protocols.outcome, path, diagnosis.__name__)
+
+    def _accept(self, outcome: Outcome, path: Path, name: str) -> None:
+        """Serve, send and save the model of a job that is done."""
         found = loads(outcome.model)
         self._served.serve(found)
-        save(found, (path if path.is_dir() else path.parent) / f"{job.__name__}.yaml")
+        save(found, (path if path.is_dir() else path.parent) / f"{name}.yaml")
         for line in outcome.summary.splitlines():
             self.get_logger().info(line)
         self._status.done(outcome.verdict)
@@ -205,30 +226,13 @@ class IdentificationNode(GuardedNode):
         values = read(self, IDENTIFICATION)
         return PROTOCOLS[values["protocol"]](limits, values["seed"])
 
+    def _planned(self, limits: DriveLimits) -> Protocol:
+        """What ~/plan describes: the protocol, or with live all that a live diagnosis plays in its fixed order."""
+        values = read(self, IDENTIFICATION)
+        return whole_plan(limits, values["seed"]) if values["live"] else self._protocol(limits)
+
     def _value(self, name: str) -> str:
         return str(self.get_parameter(name).value)
-
-    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
-        rows = {row.name: row for row in IDENTIFICATION}
-        try:
-            for parameter in parameters:
-                if parameter.name in rows:
-                    rows[parameter.name].check(parameter.value)
-                    self._check_place(parameter)
-                elif parameter.name.startswith(QOS_OVERRIDES):
-                    continue  # declared when a recording subscribes, which is after the start
-                elif not (parameter.name.startswith(PREFIX) or self.has_parameter(parameter.name)):
-                    raise ParameterError(f"{parameter.name} is no parameter of this node, expected {', '.join(rows)}")
-        except PiezoError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
-
-    def _check_place(self, parameter: Parameter) -> None:
-        """Others shall not choose where this node writes: a diagnosis leaves files beside its recording."""
-        if parameter.name in ("driver", "experiment_root"):
-            raise ParameterError(f"{parameter.name} is read at start; give it then")
-        if parameter.name == "experiment" and parameter.value:
-            self._folder.check(parameter.value)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

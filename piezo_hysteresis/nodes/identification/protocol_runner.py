@@ -31,7 +31,7 @@ class Progress:
     Parameters
     ----------
     state : str
-        ``waiting``, ``running`` or ``fitting``.
+        ``waiting``, ``running``, ``deciding`` or ``fitting``.
     reason : str
         One line.
     fraction : float
@@ -46,10 +46,36 @@ class Progress:
     phase: str = ""
 
 
+Following = Callable[[DriveLimits], Generator[Progress, None, Protocol | None]]
+"""Finds out what is played next within the limits, and says meanwhile how far it has come; None at the end."""
+
+
 def run_protocol(
     node: GuardedNode, driver: DriverClient, plan: Callable[[DriveLimits], Protocol], path: Path
 ) -> Generator[Progress]:
-    """Play and record a protocol; to be resumed at short intervals until it ends.
+    """Play and record a protocol, as `run_protocols` does.
+
+    Parameters
+    ----------
+    node, driver, path
+        As for `run_protocols`.
+    plan : callable
+        Makes the protocol for the limits of the driver.
+    """
+    planned: list[Protocol] = []
+
+    def once(limits: DriveLimits) -> Generator[Progress, None, Protocol | None]:
+        if planned:
+            return None
+        planned.append(plan(limits))
+        yield Progress("waiting", "for the stage")
+        return planned[0]
+
+    yield from run_protocols(node, driver, once, path)
+
+
+def run_protocols(node: GuardedNode, driver: DriverClient, following: Following, path: Path) -> Generator[Progress]:
+    """Play and record one protocol after the other into one bag; to be resumed at short intervals until it ends.
 
     Closing the iterator aborts: the driver is asked to go to its safe voltage, then the recording is finished. So does
     every failure.
@@ -60,8 +86,8 @@ def run_protocol(
         The identification node.
     driver : DriverClient
         The stage.
-    plan : callable
-        Makes the protocol for the limits of the driver.
+    following : callable
+        Finds out what is played next. The stage rests at its safe voltage meanwhile, and stays claimed.
     path : Path
         Folder of the bag.
 
@@ -72,16 +98,18 @@ def run_protocol(
     RecordingError
         If the bag cannot be written.
     IdentificationError
-        If the protocol does not fit the limits.
+        If a protocol does not fit the limits.
     """
     yield from _until(lambda: driver.limits is not None, lambda: driver.missing)
     assert driver.limits is not None
     if driver.stopped:
         raise StageError(driver.stopped)
-    protocol = plan(driver.limits)
+    protocol = yield from following(driver.limits)
+    if protocol is None:
+        return
     recorder = BagRecorder(node, path)
     try:
-        for progress in _all_phases(driver, recorder, protocol, path):
+        for progress in _all_protocols(driver, recorder, protocol, following, path):
             if recorder.failure is not None:
                 raise recorder.failure
             yield progress
@@ -94,6 +122,15 @@ def run_protocol(
     recorder.close()
 
 
+def _all_protocols(
+    driver: DriverClient, recorder: BagRecorder, protocol: Protocol | None, following: Following, path: Path
+) -> Generator[Progress]:
+    yield from _claim(driver, recorder)
+    while protocol is not None:
+        yield from _all_phases(driver, recorder, protocol, path)
+        protocol = yield from following(protocol.limits)
+
+
 def _close_after(error: BaseException, recorder: BagRecorder) -> None:
     """End the recording of a protocol that failed; if that fails too, both errors are reported."""
     try:
@@ -103,7 +140,8 @@ def _close_after(error: BaseException, recorder: BagRecorder) -> None:
         raise RecordingError(both) from error
 
 
-def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol, path: Path) -> Generator[Progress]:
+def _claim(driver: DriverClient, recorder: BagRecorder) -> Generator[Progress]:
+    """Wait until the samples are recorded, claim the stage, and have it at its safe voltage."""
     seen = recorder.counts
     yield from _until(
         lambda: not driver.missing and seen["samples"] > 0 and seen["phase"] > 0,
@@ -115,6 +153,9 @@ def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol,
     if not driver.is_safe:
         driver.stop()
         yield from _until(lambda: driver.is_safe, lambda: "the safe voltage")
+
+
+def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol, path: Path) -> Generator[Progress]:
     done = 0.0
     for number, phase in enumerate(protocol, 1):
         progress = Progress(

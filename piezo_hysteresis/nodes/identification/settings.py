@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ...discrepancy.choice.live_diagnosis import ERROR_RATE, LONGEST
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import Protocol, paper, rich, short
-from ...parameter import Row, Setting
+from ...parameter import Parameter, Row, Setting
 
 PROTOCOLS: dict[str, Callable[[DriveLimits, int], Protocol]] = {"paper": paper, "short": short, "rich": rich}
 """Words of the parameter `protocol`."""
@@ -16,6 +17,9 @@ IDENTIFICATION: tuple[Row, ...] = (
     Setting("seed", 0, "seed of the random waveforms of the protocol", lower=0, upper=2**31 - 1),
     Setting("driver", "driver_node", "name of the driver node in the same namespace; read at start"),
     Setting("experiment", "", "recording for ~/diagnose, inside experiment_root; empty: the last one"),
+    Setting("live", False, "true: ~/diagnose drives the stage until it is sure; false: it reads a recording"),
+    Parameter("error_rate", "α", "1", ERROR_RATE, 1e-6, 0.49, "wrong answers accepted with live", "gap finder"),
+    Parameter("stage_time", "T_max", "s", LONGEST, 15.0, 1e5, "longest time of driving with live", "gap finder"),
     Setting(
         "experiment_root", "", "folder of the recordings, read at start; empty: ~/.ros/piezo_hysteresis/<namespace>"
     ),

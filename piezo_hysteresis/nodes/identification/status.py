@@ -33,6 +33,8 @@ class IdentificationStatus:
         As whom the stage is claimed while it is driven.
     goal : str
         Identifier of the job under way or ended last; the answer of the service that began it ends with it.
+    likely : str
+        The likeliest explanations of a live diagnosis with their probabilities.
     listener : callable
         Called with every status that is new.
     """
@@ -42,7 +44,7 @@ class IdentificationStatus:
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: identification"
         self._publisher = advertise(node, "status")
         self._diagnostics = advertise(node, DIAGNOSTICS)
-        self.experiment = self.owner = self.goal = ""
+        self.experiment = self.owner = self.goal = self.likely = ""
         self.listener: Callable[[DiagnosticStatus], None] = lambda status: None
         self._shown: DiagnosticStatus | None = None
         self._logged = ("", "")
@@ -60,6 +62,11 @@ class IdentificationStatus:
             self._logged = stage
             self._node.get_logger().info(f"{progress.state}: {progress.phase or progress.reason}")
         self._show(DiagnosticStatus.OK, progress.state, progress.reason, progress.phase, progress.fraction)
+
+    def set_likely(self, likely: str) -> None:
+        """Show with everything that follows how likely the explanations are."""
+        self._node.get_logger().info(f"likely: {likely}")
+        self.likely = likely
 
     def done(self, verdict: str) -> None:
         """Report the result."""
@@ -87,6 +94,7 @@ class IdentificationStatus:
             experiment=self.experiment,
             owner=self.owner,
             goal=self.goal,
+            likely=self.likely,
         )
         if status != self._shown:
             self._shown = status

@@ -94,7 +94,7 @@ class FitProcess:
         self._results.close()
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """Also where the node is killed: a fit without anybody to take it would go on for minutes."""
     parent = multiprocessing.parent_process()
     if parent is not None:
@@ -103,7 +103,7 @@ def _end_with_parent() -> None:
 
 
 def _work(answers: Connection, job: Job, path: Path, model: str) -> None:
-    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the node, which ends this process
     try:
         answers.send(job(path, model, lambda word, fraction: answers.send((word, fraction))))

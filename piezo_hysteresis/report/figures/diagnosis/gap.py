@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..palette import BLUE, GREY, ORANGE
-from .comparison import ModelComparison
-from .drawing import Drawing
-from .style import canvas, handles_of, legend_above, plain_log, styled
+from ...palette import BLUE, GREY, ORANGE
+from ..comparison import ModelComparison
+from ..drawing import Drawing
+from ..style import canvas, handles_of, legend_above, plain_log, styled
 
 
 @styled

@@ -1,0 +1,137 @@
+"""``piezo diagnose --stage``: the gap finder plays what it needs to a stage, and stops when the answer is sure."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from ... import recording
+from ...acquisition.phase_recorder import record_phases
+from ...acquisition.session import DriverSession
+from ...discrepancy.choice.live_diagnosis import ERROR_RATE, LONGEST, LiveDiagnosis, begin
+from ...errors import ParameterError
+from ...identification.protocol.protocol import Protocol
+from ...record import Experiment, Record
+from ...report.tables.probability_table import probability_table
+from ...stage.back_ends import BACK_ENDS
+from ...yaml_file import read_yaml
+from ..record import checked_settings, drive_limits, read_stage
+from ..terminal import console, progress, show
+from .destination import require_new_experiment
+
+FASTEST = 1000.0
+"""Speed of a stage that is given by a file of plant parameters alone; 1 is real time."""
+
+
+def add_stage_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--stage``, ``--error-rate``, ``--stage-time`` and ``--seed``."""
+    group = parser.add_argument_group("diagnosis of a stage that is driven meanwhile, instead of a recording")
+    group.add_argument(
+        "--stage",
+        metavar="FILE",
+        help="play to this stage: plant parameters of a simulated one, or a parameter file of the driver",
+    )
+    group.add_argument(
+        "--error-rate",
+        type=float,
+        default=ERROR_RATE,
+        metavar="P",
+        help=f"probability of a wrong answer at which it stops (default: {ERROR_RATE:g})",
+    )
+    group.add_argument(
+        "--stage-time",
+        type=float,
+        default=LONGEST,
+        metavar="S",
+        help=f"longest time for which the stage is driven [s] (default: {LONGEST:g})",
+    )
+    group.add_argument("--seed", type=int, default=0, help="of everything random in the phases (default: 0)")
+
+
+def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
+    """Play, record and decide, until the answer is sure; the recording is written whatever happens.
+
+    Parameters
+    ----------
+    args : Namespace
+        Of ``piezo diagnose``.
+
+    Raises
+    ------
+    PiezoError
+        On a file, a stage, limits or a folder that are not acceptable; the stage is at its safe voltage then.
+    """
+    if args.output is None:
+        raise ParameterError("diagnose --stage: got no -o, expected the folder of the experiment to write")
+    require_new_experiment("-o", args.output)
+    session = _open(Path(args.stage).expanduser())
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the stage is made safe
+    records: list[Record] = []
+    try:
+        live = begin(
+            drive_limits(session),
+            error_rate=args.error_rate,
+            longest=args.stage_time,
+            seed=args.seed,
+            explicit_step=not args.no_explicit_step,
+        )
+        _show_plan(session, live)
+        started = time.monotonic()
+        with progress("diagnose") as report_progress:
+            while live.due:
+                report_progress(f"playing {live.due_name}", live.time / live.longest)
+                before = _clock(session, records, started)
+                records += _played(session, live, records, before)
+                live = live.advanced(Experiment(tuple(records)), report_progress)
+                console().print(f"{live.updates[-1].time:6.1f} s: {live.updates[-1].sentence()}", highlight=False)
+    finally:
+        session.close()
+        if records:
+            recording.write(Experiment(tuple(records)), args.output)
+            console().print(f"wrote {len(records)} phases to {args.output}")
+    show(probability_table(live.answer()))
+    return live
+
+
+def _open(path: Path) -> DriverSession:
+    """A session with the stage of a parameter file of the driver, or with a simulated one of plant parameters."""
+    content = read_yaml(path)
+    if isinstance(content, Mapping) and "/**" in content:
+        settings, values = read_stage(path)
+    else:
+        given = {"stage": "simulated", "simulated.plant_file": str(path), "real_time_factor": FASTEST}
+        settings, values = checked_settings(given, path)
+    return DriverSession(settings, values, f"a recording with {path.resolve()}")
+
+
+def _show_plan(session: DriverSession, live: LiveDiagnosis) -> None:
+    """What may be played, before anything moves."""
+    out = console()
+    whole = Protocol("plan", live.limits, tuple(p for tier in live.plan for p in tier.phases))
+    out.print(f"{session.limits.name}\nplan: {whole.summary}", highlight=False)
+    for number, tier in enumerate(live.plan, 1):
+        names = ", ".join(dict.fromkeys(p.name for p in tier.phases))
+        out.print(f"  {number}. {tier.name}: {tier.duration:.1f} s ({names})", highlight=False)
+    out.print(
+        f"  It stops as soon as the answer is sure at an error rate of {100 * live.error_rate:g} %. Further drives "
+        f"inside the same limits may follow where rivals remain, up to {live.longest:g} s in all.",
+        highlight=False,
+    )
+
+
+def _played(session: DriverSession, live: LiveDiagnosis, before: list[Record], start: float) -> list[Record]:
+    """Records of the phases that are due, on the clock of the experiment."""
+    played = record_phases(session, ((p.name, p.voltage, p.stored_every) for p in live.due))
+    return [replace(r, start_time=r.start_time + start, continues=r.continues or bool(before)) for r in played]
+
+
+def _clock(session: DriverSession, records: list[Record], started: float) -> float:
+    """Time at which the next phase begins [s]: a simulated stage stands still while nothing is played."""
+    if not records:
+        return 0.0
+    end = records[-1].start_time + records[-1].duration
+    return time.monotonic() - started if BACK_ENDS[session.settings.stage].is_device else end

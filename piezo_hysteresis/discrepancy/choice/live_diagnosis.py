@@ -1,0 +1,222 @@
+"""`LiveDiagnosis`: after every tier it updates what is likely, and either stops or says what is played next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from ...effects import CATALOGUE, Effect
+from ...errors import ParameterError
+from ...identification.fit.fit import Progress
+from ...identification.protocol.drive_limits import DriveLimits
+from ...identification.protocol.protocol import ProtocolPhase
+from ...record import Experiment
+from ..diagnose import diagnose
+from ..diagnosis import Diagnosis, Verdict
+from .probabilities import NONE_OF_THESE, NOTHING, probabilities
+from .rivals import missing_log_odds, rivals_of
+from .tiers import SLOW_FAMILIES, Tier, spare_drives, tiers
+from .time_to_decide import Separation, best_drive
+from .update import End, Update, percent
+
+ERROR_RATE = 0.005
+"""Probability of a wrong answer that a user accepts, unless stated otherwise."""
+LONGEST = 600.0
+"""Stage time after which the answer is what it is [s]."""
+MOST_RIVALS = 3
+"""Rivals between which a drive is chosen; with more of them the fixed order goes on."""
+
+
+MOST_CHOSEN = 4
+"""Drives that are chosen one after the other at most; expected to decide and not doing so, the prediction is wrong."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LiveDiagnosis:
+    """State of a diagnosis that chooses its own phases; `advanced` returns the next one.
+
+    Parameters
+    ----------
+    limits : DriveLimits
+        Of the stage; every phase stays inside them.
+    plan : tuple of Tier
+        The fixed order, cheap tiers first.
+    error_rate : float
+        Probability of a wrong answer that is accepted, between 0 and 0.5.
+    longest : float
+        Stage time that may be used [s].
+    seed : int
+        Of everything random in the phases.
+    explicit_step : bool
+        As for `diagnose`.
+    effects : tuple of Effect classes
+        The library to choose from.
+    chooses : bool
+        Whether drives are chosen where rivals are left; else the fixed order goes on.
+    due : tuple of ProtocolPhase
+        To be played next; empty at the end.
+    due_name : str
+        What they are, in a few words.
+    tier : int
+        Number of tiers that were played or are due.
+    chosen : int
+        Number of drives that were chosen one after the other since the last tier.
+    time : float
+        Stage time so far [s].
+    updates : tuple of Update
+        After every decision.
+    found : Diagnosis or None
+        The last diagnosis.
+    separation : Separation or None
+        What the best drive would tell about rivals, where that was asked last.
+    end : End or None
+        Why it has ended; None while it goes on.
+    """
+
+    limits: DriveLimits
+    plan: tuple[Tier, ...]
+    error_rate: float = ERROR_RATE
+    longest: float = LONGEST
+    seed: int = 0
+    explicit_step: bool = True
+    effects: tuple[type[Effect], ...] = CATALOGUE
+    chooses: bool = True
+    due: tuple[ProtocolPhase, ...] = ()
+    due_name: str = ""
+    tier: int = 0
+    chosen: int = 0
+    time: float = 0.0
+    updates: tuple[Update, ...] = ()
+    found: Diagnosis | None = None
+    separation: Separation | None = None
+    end: End | None = field(default=None)
+
+    def advanced(self, experiment: Experiment, progress: Progress | None = None) -> LiveDiagnosis:
+        """The state after the phases that were due have been played.
+
+        Parameters
+        ----------
+        experiment : Experiment
+            Everything recorded so far.
+        progress : callable, optional
+            Called with a word and the fraction done.
+
+        Raises
+        ------
+        PiezoError
+            As `diagnose` does.
+        """
+        found = diagnose(experiment, effects=self.effects, progress=progress, explicit_step=self.explicit_step)
+        time = self.time + sum(p.duration for p in self.due)
+        unplayed = self._untested()
+        told = probabilities(found, {e.public_name() for e in self.effects}, unplayed)
+        update = Update(time, self.due_name, told)
+        after = replace(self, time=time, updates=(*self.updates, update), found=found, separation=None)
+        return after._decided()
+
+    @property
+    def answer_is_sure(self) -> bool:
+        """Whether the likeliest explanation reaches 1 − error rate, and the rules of the diagnosis agree with it."""
+        if not self.updates or self.found is None:
+            return False
+        update = self.updates[-1]
+        if update.probabilities[update.likeliest] < 1.0 - self.error_rate:
+            return False
+        if update.likeliest == NOTHING:
+            return self.found.verdict is Verdict.NOTHING_MISSING
+        if update.likeliest == NONE_OF_THESE:
+            return self.found.verdict is Verdict.UNKNOWN and not self._left()
+        return self.found.verdict is Verdict.NAMED and " + ".join(self.found.names) == update.likeliest
+
+    def reason(self) -> str:
+        """Why it ended, in one sentence."""
+        update = self.updates[-1]
+        likeliest = update.likeliest.replace("_", " ")
+        share = percent(update.probabilities[update.likeliest])
+        if self.end is End.SURE:
+            return f"Stopped after {update.time:.1f} s: {likeliest} has a probability of {share}."
+        if self.end is End.UNDECIDABLE and self.separation is not None:
+            return f"Undecidable within the limits and {self.longest:g} s of stage time. {self.separation.sentence()}"
+        return f"Everything was played ({update.time:.1f} s), and no explanation is sure: {update.sentence()}."
+
+    def answer(self) -> dict[str, Any]:
+        """For machines: the part ``live`` of ``answer.json``."""
+        return {
+            "end": None if self.end is None else str(self.end),
+            "reason": self.reason(),
+            "stage_time_s": round(self.time, 6),
+            "error_rate": self.error_rate,
+            "probabilities": [
+                {"time_s": round(u.time, 6), "played": u.played, "probabilities": u.probabilities} for u in self.updates
+            ],
+            "untested": sorted(self._untested()),
+            "undecidable": None
+            if self.end is not End.UNDECIDABLE or self.separation is None
+            else {
+                "rivals": list(self.separation.rivals),
+                "drive": self.separation.drive,
+                "repeats": self.separation.repeats,
+                "duration_s": self.separation.duration,
+                "expected_z": self.separation.expected_z,
+                "needed_z": self.separation.needed_z,
+            },
+        }
+
+    def _left(self) -> tuple[Tier, ...]:
+        """Tiers that were not played and fit into the time."""
+        left = self.plan[self.tier :]
+        return left if left and left[0].duration <= self.longest - self.time else ()
+
+    def _untested(self) -> set[str]:
+        """Effects that only phases still to come can show."""
+        if self.tier >= len(self.plan):
+            return set()
+        return {e.public_name() for e in self.effects if e.family in SLOW_FAMILIES}
+
+    def _decided(self) -> LiveDiagnosis:
+        if self.answer_is_sure:
+            return replace(self, due=(), due_name="", end=End.SURE)
+        found, likely = self.found, self.updates[-1].probabilities
+        left = self._left()
+        rivals = rivals_of(found, likely, self.error_rate)
+        separation = None
+        if self.chooses and 2 <= len(rivals) <= MOST_RIVALS and self.chosen < (1 if left else MOST_CHOSEN):
+            drives = (*(p for tier in left for p in tier.phases), *spare_drives(self.limits, self.seed))
+            chosen = best_drive(rivals, drives, missing_log_odds(likely, self.error_rate), self.longest - self.time)
+            if chosen is not None:
+                phases, separation = chosen
+                if separation.decides and (not left or separation.duration <= left[0].duration):
+                    name = f"{separation.drive}, to separate {' from '.join(separation.rivals)}"
+                    return replace(self, due=phases, due_name=name, separation=separation, chosen=self.chosen + 1)
+        if left:
+            first = left[0]
+            return replace(
+                self, due=first.phases, due_name=first.name, tier=self.tier + 1, chosen=0, separation=separation
+            )
+        end = End.EXHAUSTED if separation is None or separation.decides else End.UNDECIDABLE
+        return replace(self, due=(), due_name="", separation=separation, end=end)
+
+
+def begin(limits: DriveLimits, *, seed: int = 0, **choices: Any) -> LiveDiagnosis:
+    """A live diagnosis before anything has moved; its first tier is due.
+
+    Parameters
+    ----------
+    limits, seed, **choices
+        As for `LiveDiagnosis`: ``error_rate``, ``longest``, ``explicit_step``, ``effects``, ``chooses``.
+
+    Raises
+    ------
+    ParameterError
+        If the error rate is not between 0 and 0.5, or the first tier does not fit into the time.
+    """
+    plan = tiers(limits, seed)
+    first = plan[0]
+    live = LiveDiagnosis(limits, plan, seed=seed, due=first.phases, due_name=first.name, tier=1, **choices)
+    if not 0.0 < live.error_rate < 0.5:
+        raise ParameterError(f"error rate: got {live.error_rate:g}, expected more than 0 and less than 0.5")
+    if not live.longest >= first.duration:
+        raise ParameterError(
+            f"stage time: got {live.longest:g} s, expected at least the {first.duration:.1f} s of the first phases"
+        )
+    return live

@@ -1,0 +1,139 @@
+"""How likely every explanation is: each candidate, nothing, and none of these. They sum to one.
+
+The evidence is the likelihood of records that were left out of the fit (criterion C of docs/gap.md). What one record
+contributes is limited, so that no record decides alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from ..diagnosis import Diagnosis, Verdict
+from ..form_uncertainty import PIECES
+from ..search.cross_validation import ADEQUATE, Score
+from ..search.selection_result import Step
+from ..verdict import FAR, NAMED, NAMED_FAR
+
+Array = NDArray[np.float64]
+
+NOTHING, NONE_OF_THESE = "nothing", "none of these"
+"""The two explanations that are no effect of the catalogue."""
+PRIOR_NOTHING, PRIOR_NONE = 0.4, 0.1
+"""Probability before any data that nothing is missing, and that what is missing is not in the catalogue."""
+ONE_RECORD = 4.0
+"""Most that one record adds to the log-odds of two explanations: at an error rate of 0.5 % no record decides alone."""
+
+
+def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collection[str] = ()) -> dict[str, float]:
+    """Probability of every explanation after the records of a diagnosis.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        Of the records so far.
+    effects : collection of str
+        Public names of the catalogue.
+    unplayed : collection of str
+        Effects that the phases so far could not show: they stay as likely as before where nothing is seen.
+
+    Returns
+    -------
+    dict of str to float
+        Several effects together are one explanation, ``"creep + backlash"``. The values sum to one.
+    """
+    prior = {NOTHING: PRIOR_NOTHING, NONE_OF_THESE: PRIOR_NONE}
+    prior |= dict.fromkeys(sorted(effects), (1.0 - PRIOR_NOTHING - PRIOR_NONE) / max(len(effects), 1))
+    selection = found.selection
+    if selection is None:
+        return _to_one(prior)
+    if not selection.steps:
+        seen = {name: p for name, p in prior.items() if name == NOTHING or name in unplayed}
+        if found.verdict is Verdict.NOTHING_MISSING:
+            return _to_one(seen)
+        return _to_one(seen | {NONE_OF_THESE: PRIOR_NONE})
+    total: dict[str, float] = {}
+    weight, so_far = 1.0, tuple[str, ...]()
+    for step in selection.steps:
+        last = step is selection.steps[-1]
+        if not step.accepted and not (last and not so_far):
+            continue
+        shares = turn_probabilities(step, prior, selection.null)
+        kept = step.best.effect.public_name() if step.accepted else None
+        for name, share in shares.items():
+            if name != kept:
+                label = " + ".join((*so_far, name)) if name in effects else NONE_OF_THESE
+                label = (" + ".join(so_far) or NOTHING) if name == NOTHING else label
+                total[label] = total.get(label, 0.0) + weight * share
+        if kept is not None:
+            weight *= shares[kept]
+            so_far = (*so_far, kept)
+    if so_far:
+        label = " + ".join(so_far) if found.verdict is Verdict.NAMED else NONE_OF_THESE
+        total[label] = total.get(label, 0.0) + weight
+    return _to_one(total)
+
+
+def turn_probabilities(step: Step, prior: Mapping[str, float], null: float) -> dict[str, float]:
+    """Probability of every explanation in one turn of the search.
+
+    Parameters
+    ----------
+    step : Step
+        The turn, with every candidate that was tried.
+    prior : mapping of str to float
+        Before the data; the candidates and the two others.
+    null : float
+        V of a perfect model.
+    """
+    scores: dict[str, Score] = {NOTHING: tolerant(step.before), NONE_OF_THESE: part_explained(step.before, null)}
+    for candidate in step.tried:
+        name = candidate.effect.public_name()
+        if name not in scores or candidate.score.cost < scores[name].cost:
+            scores[name] = candidate.score
+    equals = set(step.confusable_with)
+    best = min(scores, key=lambda name: scores[name].cost)
+    logs = {}
+    for name, score in scores.items():
+        distance = log_odds(scores[best], score)
+        if name in equals:
+            distance = min(distance, scatter_odds(scores[best], score))
+        logs[name] = np.log(prior.get(name, min(prior.values()))) - distance
+    top = max(logs.values())
+    return _to_one({name: float(np.exp(value - top)) for name, value in logs.items()})
+
+
+def log_odds(best: Score, other: Score) -> float:
+    """Log-odds of the records for the first of two explanations, Σ min(4, m/2 (C_other − C_best)) over the records."""
+    leads = 0.5 * PIECES * (other.logs - best.logs)
+    return max(0.0, float(np.sum(np.clip(leads, -ONE_RECORD, ONE_RECORD))))
+
+
+def scatter_odds(best: Score, other: Score) -> float:
+    """Log-odds that the mean lead is no chance of which records were taken: Student's t, with records as units."""
+    lead, error = best.better_than(other)
+    if not np.isfinite(error):
+        return 0.0
+    wrong = float(student.sf(lead / max(error, 1e-12), best.ratios.size - 1))
+    return max(0.0, float(np.log1p(-wrong) - np.log(max(wrong, 1e-300))))
+
+
+def tolerant(score: Score) -> Score:
+    """The model as it is, where an error up to the adequacy limit counts as none."""
+    return Score(score.ratios / np.sqrt(ADEQUATE), score.step)
+
+
+def part_explained(before: Score, null: float) -> Score:
+    """What a wrong name may explain by chance: the share of the gap from which an effect is named, in every record."""
+    share = NAMED if before.excess <= FAR else NAMED_FAR
+    gap = np.maximum(before.ratios**2 - null, 0.0)
+    return Score(np.sqrt(null + (1.0 - share) ** 2 * gap), before.step)
+
+
+def _to_one(weights: Mapping[str, float]) -> dict[str, float]:
+    total = sum(weights.values())
+    shares = {name: weight / total for name, weight in weights.items()}
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))

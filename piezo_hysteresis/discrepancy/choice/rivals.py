@@ -1,0 +1,59 @@
+"""Rivals: the fitted explanations that are too likely to be left out, and what is missing to decide between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..diagnosis import Diagnosis
+from ..search.candidates import FittedCandidate
+from .probabilities import NONE_OF_THESE, NOTHING
+
+
+def missing_log_odds(probabilities: Mapping[str, float], error_rate: float) -> float:
+    """Log-odds between the two likeliest explanations that are missing for a sure answer.
+
+    Parameters
+    ----------
+    probabilities : mapping of str to float
+        Of every explanation.
+    error_rate : float
+        Probability of a wrong answer that is accepted.
+
+    Examples
+    --------
+    >>> round(missing_log_odds({"creep": 0.5, "thermal_drift": 0.5}, 0.005), 2)
+    5.29
+    """
+    first, second, *_ = (*sorted(probabilities.values(), reverse=True), 0.0)
+    wanted = np.log((1.0 - error_rate) / error_rate)
+    return float(max(wanted - np.log(first / max(second, 1e-300)), 0.0))
+
+
+def rivals_of(found: Diagnosis | None, probabilities: Mapping[str, float], error_rate: float) -> list[FittedCandidate]:
+    """The best fit of every effect in question, best first.
+
+    Empty where "nothing" or "none of these" is in question too: no drive is chosen against what cannot be simulated.
+
+    Parameters
+    ----------
+    found : Diagnosis or None
+        The last one.
+    probabilities, error_rate
+        As for `missing_log_odds`.
+    """
+    if found is None or found.selection is None or not found.selection.steps:
+        return []
+    likely = {name for name, p in probabilities.items() if p >= error_rate}
+    if likely & {NOTHING, NONE_OF_THESE}:
+        return []
+    last = {name.split(" + ")[-1] for name in likely}
+    steps = found.selection.steps
+    step = next((s for s in steps if len(last & {c.effect.public_name() for c in s.tried}) > 1), steps[0])
+    fitted: dict[str, FittedCandidate] = {}
+    for candidate in step.tried:
+        name = candidate.effect.public_name()
+        if isinstance(candidate, FittedCandidate) and name in last:
+            fitted.setdefault(name, candidate)
+    return list(fitted.values())

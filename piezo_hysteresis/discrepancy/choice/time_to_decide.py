@@ -1,0 +1,146 @@
+"""The next drive where two or three rivals remain: the one with the shortest expected time to decide between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from ...identification.protocol.protocol import ProtocolPhase
+from ...record import Record
+from ..form_uncertainty import PIECES
+from ..next_experiment import distances
+from ..search.candidates import FittedCandidate
+from .probabilities import ONE_RECORD
+
+REPEATS = (1, 2, 4, 8)
+"""How often a drive may be repeated before the next decision."""
+
+
+@dataclass(frozen=True, slots=True)
+class Separation:
+    """What the best drive within the limits would tell about two rivals.
+
+    Parameters
+    ----------
+    rivals : (str, str)
+        The pair that is hardest to separate.
+    drive : str
+        Phase name of the drive.
+    repeats : int
+        How often it is played.
+    duration : float
+        Stage time of all repeats [s].
+    expected_z : float
+        Expected separation in standard deviations, √(2 Λ) of the expected log-odds Λ.
+    needed_z : float
+        The one that the error rate asks for, from what is known so far.
+    """
+
+    rivals: tuple[str, str]
+    drive: str
+    repeats: int
+    duration: float
+    expected_z: float
+    needed_z: float
+
+    @property
+    def decides(self) -> bool:
+        """Whether the drive is expected to decide."""
+        return self.expected_z >= self.needed_z
+
+    def sentence(self) -> str:
+        """For the user."""
+        names = " and ".join(name.replace("_", " ") for name in self.rivals)
+        return (
+            f"The best drive for {names} is '{self.drive}', played {self.repeats} times in {self.duration:.1f} s: "
+            f"expected separation z = {self.expected_z:.1f}, needed {self.needed_z:.1f}."
+        )
+
+
+def z_of(log_odds: float) -> float:
+    """Separation in standard deviations that gives these log-odds on average: the mean log-odds of it are z²/2."""
+    return float(np.sqrt(2.0 * max(log_odds, 0.0)))
+
+
+def expected_log_odds(distance: float, excess: float, repeats: int) -> float:
+    """Log-odds that a drive is expected to add.
+
+    Λ = r min(4, m/2 ln(1 + d²/V)): d² the mean squared distance of the rivals in floors², V = max(1, R²) the noise and
+    the form uncertainty in floors², r the number of repeats.
+
+    Parameters
+    ----------
+    distance : float
+        d², at least 0.
+    excess : float
+        Mean R² of the better rival on the records so far.
+    repeats : int
+        Records of the drive.
+
+    Examples
+    --------
+    >>> expected_log_odds(0.0, 1.0, 8)
+    0.0
+    >>> expected_log_odds(1e6, 1.0, 2)  # no record decides alone
+    8.0
+    """
+    return float(repeats * min(ONE_RECORD, 0.5 * PIECES * np.log1p(distance / max(1.0, excess))))
+
+
+def best_drive(
+    rivals: Sequence[FittedCandidate],
+    drives: Sequence[ProtocolPhase],
+    missing: float,
+    time_left: float,
+) -> tuple[tuple[ProtocolPhase, ...], Separation] | None:
+    """The drive and its repeats with the shortest time to decide; None where no drive fits into the time.
+
+    Every pair of rivals has to be decided, so that a drive counts by the pair that it separates least. Where no drive
+    decides, the one that separates most is returned, and its separation says so.
+
+    Parameters
+    ----------
+    rivals : sequence of FittedCandidate
+        Two or three, best first.
+    drives : sequence of ProtocolPhase
+        To choose from, inside the limits.
+    missing : float
+        Log-odds that are still missing for the least decided pair.
+    time_left : float
+        Stage time [s].
+    """
+    records = {str(k): _as_record(phase) for k, phase in enumerate(drives)}
+    pairs = list(combinations(rivals, 2))
+    by_pair = [distances(a.fit.model, b.fit.model, a.training_data, records) for a, b in pairs]
+    options = []
+    for k, phase in enumerate(drives):
+        for repeats in REPEATS:
+            if repeats * phase.duration > time_left:
+                break
+            told = [
+                expected_log_odds(found[str(k)], a.score.excess, repeats)
+                for (a, _), found in zip(pairs, by_pair, strict=True)
+            ]
+            worst = int(np.argmin(told))
+            names = (pairs[worst][0].effect.public_name(), pairs[worst][1].effect.public_name())
+            found_one = Separation(
+                names, phase.name, repeats, repeats * phase.duration, z_of(told[worst]), z_of(missing)
+            )
+            options.append((found_one, phase))
+    if not options:
+        return None
+    deciding = [option for option in options if option[0].decides]
+    if deciding:
+        separation, phase = min(deciding, key=lambda option: option[0].duration)
+    else:
+        separation, phase = max(options, key=lambda option: option[0].expected_z)
+    return (phase,) * separation.repeats, separation
+
+
+def _as_record(phase: ProtocolPhase) -> Record:
+    """The drive as it will be stored; what it will measure is not known yet."""
+    record = Record(phase.voltage, np.zeros(phase.voltage.size), phase.sample_period, phase.name)
+    return record.decimate(phase.stored_every) if 1 < phase.stored_every <= record.size else record

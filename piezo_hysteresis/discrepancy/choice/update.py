@@ -1,0 +1,52 @@
+"""`Update`: what is likely after some phases. `End`: why a live diagnosis has ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class End(StrEnum):
+    """Why a live diagnosis has ended."""
+
+    SURE = "sure"
+    UNDECIDABLE = "undecidable"
+    EXHAUSTED = "exhausted"
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """What is likely after some phases.
+
+    Parameters
+    ----------
+    time : float
+        Stage time so far [s].
+    played : str
+        What was played last.
+    probabilities : dict of str to float
+        By explanation, the likeliest first; they sum to one.
+    """
+
+    time: float
+    played: str
+    probabilities: dict[str, float]
+
+    @property
+    def likeliest(self) -> str:
+        """The explanation with the highest probability."""
+        return next(iter(self.probabilities))
+
+    def sentence(self) -> str:
+        """For status lines: the three likeliest."""
+        three = list(self.probabilities.items())[:3]
+        return ", ".join(f"{name} {percent(p)}" for name, p in three)
+
+
+def percent(probability: float) -> str:
+    """A probability in %; one that is nearly 1 is not rounded up to it.
+
+    >>> percent(0.25), percent(0.99999)
+    ('25.0 %', '> 99.9 %')
+    """
+    return f"{100.0 * probability:.1f} %" if probability < 0.9995 else "> 99.9 %"

@@ -1,0 +1,186 @@
+"""`LiveProcess`: the decisions of a live diagnosis in a process of its own, so that the node answers. No ROS."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from ...discrepancy.choice.live_diagnosis import LiveDiagnosis, begin
+from ...errors import IdentificationError, PiezoError, RecordingError
+from ...identification.protocol.drive_limits import DriveLimits
+from ...identification.protocol.protocol import ProtocolPhase
+from ...model.model_file import dumps
+from ...record import Experiment, Record
+from ...recording import read
+from ...report.json_file import write_json
+from ..runtime.fit_process import Outcome, Report, end_with_parent
+
+PATIENCE = 20.0
+"""Longest wait until what was recorded has reached the file [s]."""
+_INTERVAL = 0.3
+"""Time between two looks at the file [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LiveSettings:
+    """What a user decides about a live diagnosis; as for `LiveDiagnosis`."""
+
+    error_rate: float
+    longest: float
+    seed: int
+
+    @classmethod
+    def from_values(cls, values: Mapping[str, Any]) -> LiveSettings:
+        """From the parameters of the node."""
+        return cls(values["error_rate"], values["stage_time"], values["seed"])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Due:
+    """What is to be played next, and what is likely so far.
+
+    Parameters
+    ----------
+    name : str
+        What the phases are, in a few words.
+    phases : tuple of ProtocolPhase
+        To be played.
+    likely : str
+        The likeliest explanations with their probabilities; empty before the first phases.
+    """
+
+    name: str
+    phases: tuple[ProtocolPhase, ...]
+    likely: str
+
+
+class LiveProcess:
+    """One live diagnosis; ends with this process.
+
+    Parameters
+    ----------
+    path : Path
+        The recording that grows meanwhile.
+    limits : DriveLimits
+        Of the stage.
+    settings : LiveSettings
+        Of the user.
+
+    Attributes
+    ----------
+    progress : (str, float)
+        What is computed, and the fraction done.
+    """
+
+    def __init__(self, path: Path, limits: DriveLimits, settings: LiveSettings) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, other = context.Pipe()
+        self._process = context.Process(target=_work, args=(other, path, limits, settings), daemon=True)
+        self._process.start()
+        other.close()
+        self.progress: tuple[str, float] = ("starting", 0.0)
+
+    def played(self, phases: Sequence[ProtocolPhase]) -> None:
+        """Say that these phases, the last ones of the recording, were played."""
+        self._connection.send((len(phases), phases[-1].duration))
+
+    def poll(self) -> Due | Outcome | None:
+        """What is due next, or the outcome; None while it is being computed.
+
+        Raises
+        ------
+        IdentificationError
+            With the reason, if the diagnosis failed or its process died.
+        """
+        while self._connection.poll():
+            try:
+                message = self._connection.recv()
+            except EOFError:
+                raise IdentificationError(
+                    f"the diagnosis ended without a result (exit code {self._process.exitcode}); out of memory?"
+                ) from None
+            if isinstance(message, Due | Outcome):
+                return message
+            if isinstance(message, str):
+                raise IdentificationError(message)
+            self.progress = message
+        return None
+
+    def close(self) -> None:
+        """End the diagnosis, finished or not."""
+        self._process.terminate()
+        self._process.join()
+        self._connection.close()
+
+
+def _work(connection: Connection, path: Path, limits: DriveLimits, settings: LiveSettings) -> None:
+    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the node, which ends this process
+    try:
+        connection.send(_decide(connection, path, limits, settings))
+    except PiezoError as error:
+        connection.send(str(error))
+    except Exception as error:
+        connection.send(f"fault of the diagnosis: {error!r}; the traceback is in the log")
+        raise
+
+
+def _decide(connection: Connection, path: Path, limits: DriveLimits, settings: LiveSettings) -> Outcome:
+    live = begin(limits, error_rate=settings.error_rate, longest=settings.longest, seed=settings.seed)
+
+    def report(word: str, fraction: float) -> None:
+        connection.send((word, fraction))
+
+    phases = 0
+    while live.due:
+        likely = live.updates[-1].sentence() if live.updates else ""
+        connection.send(Due(live.due_name, live.due, likely))
+        count, last = connection.recv()
+        phases += count
+        live = live.advanced(_recorded(path, phases, last, report), report)
+    return _outcome(live, path)
+
+
+def _recorded(path: Path, phases: int, last: float, report: Report) -> Experiment:
+    """The recording once it holds all phases that were played.
+
+    Raises
+    ------
+    RecordingError
+        If the last samples do not reach the file.
+    """
+    report("reading", 0.0)
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        experiment = read(path)
+        records = experiment.records
+        if len(records) > phases or (len(records) == phases and _is_whole(records[-1], last)):
+            return experiment
+        if time.monotonic() > deadline:
+            raise RecordingError(
+                f"{path}: got {len(records)} phases, expected {phases}, the last of {last:.3g} s; is the disk full?"
+            )
+        time.sleep(_INTERVAL)
+
+
+def _is_whole(record: Record, duration: float) -> bool:
+    """Whether a phase of this duration [s] is complete but for what averaging cuts off."""
+    return record.duration > duration - 1.5 * record.sample_period
+
+
+def _outcome(live: LiveDiagnosis, path: Path) -> Outcome:
+    found = live.found
+    if found is None or found.model is None:
+        raise IdentificationError(live.reason() if found is None else found.reason)
+    answer = found.answer(str(path / "diagnosis.yaml"))
+    answer["live"] = live.answer()
+    write_json(str(path / "answer.json"), answer)
+    summary = "\n".join((live.reason(), found.summary()))
+    return Outcome(dumps(found.model), summary, f"{found.verdict}: {live.reason()} {found.reason}")

@@ -1,0 +1,65 @@
+"""`LiveProtocols`: what a live diagnosis wants to be played, protocol by protocol, until it knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from pathlib import Path
+
+from ...errors import IdentificationError
+from ...identification.protocol.drive_limits import DriveLimits
+from ...identification.protocol.protocol import Protocol
+from ...recording.segmentation.decimation import save_decimation
+from ..runtime.fit_process import Outcome
+from .live_process import LiveProcess, LiveSettings
+from .protocol_runner import Progress
+
+
+class LiveProtocols:
+    """For `run_protocols`: gives what is due next, and takes the outcome at the end.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of the bag that is recorded meanwhile.
+    settings : LiveSettings
+        Of the user.
+    inform : callable
+        Called with the likeliest explanations after every decision.
+    """
+
+    def __init__(self, path: Path, settings: LiveSettings, inform: Callable[[str], None]) -> None:
+        self._path, self._settings, self._inform = path, settings, inform
+        self._process: LiveProcess | None = None
+        self._last: Protocol | None = None
+        self._averaged: dict[str, int] = {}
+        self._found: Outcome | None = None
+
+    @property
+    def outcome(self) -> Outcome:
+        """What was found; IdentificationError before the end."""
+        if self._found is None:
+            raise IdentificationError("the live diagnosis has not ended, expected its outcome")
+        return self._found
+
+    def following(self, limits: DriveLimits) -> Generator[Progress, None, Protocol | None]:
+        """Decide what is played next; None at the end."""
+        if self._process is None:
+            self._process = LiveProcess(self._path, limits, self._settings)
+        elif self._last is not None:
+            self._averaged |= {phase.name: phase.stored_every for phase in self._last}
+            save_decimation(self._path, self._averaged)
+            self._process.played(self._last.phases)
+        while (answer := self._process.poll()) is None:
+            yield Progress("deciding", *self._process.progress)
+        if isinstance(answer, Outcome):
+            self._found = answer
+            return None
+        if answer.likely:
+            self._inform(answer.likely)
+        self._last = Protocol(answer.name, limits, answer.phases)
+        return self._last
+
+    def close(self) -> None:
+        """End the process, whatever it does."""
+        if self._process is not None:
+            self._process.close()

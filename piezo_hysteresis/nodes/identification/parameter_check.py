@@ -1,0 +1,51 @@
+"""`ParameterCheck`: which changes of its parameters the identification node accepts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+
+from ...errors import ParameterError, PiezoError
+from ...model.model_parameters import PREFIX
+from ..topics import QOS_OVERRIDES
+from .experiment_folder import ExperimentFolder
+from .settings import IDENTIFICATION
+
+
+class ParameterCheck:
+    """Called by rclpy before parameters change.
+
+    Parameters
+    ----------
+    folder : ExperimentFolder
+        Inside which recordings have to be.
+    is_declared : callable
+        Whether the node has a parameter of this name.
+    """
+
+    def __init__(self, folder: ExperimentFolder, is_declared: Callable[[str], bool]) -> None:
+        self._folder, self._is_declared = folder, is_declared
+
+    def __call__(self, parameters: list[Parameter]) -> SetParametersResult:
+        rows = {row.name: row for row in IDENTIFICATION}
+        try:
+            for parameter in parameters:
+                if parameter.name in rows:
+                    rows[parameter.name].check(parameter.value)
+                    self._check_place(parameter)
+                elif parameter.name.startswith(QOS_OVERRIDES):
+                    continue  # declared when a recording subscribes, which is after the start
+                elif not (parameter.name.startswith(PREFIX) or self._is_declared(parameter.name)):
+                    raise ParameterError(f"{parameter.name} is no parameter of this node, expected {', '.join(rows)}")
+        except PiezoError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _check_place(self, parameter: Parameter) -> None:
+        """Others shall not choose where this node writes: a diagnosis leaves files beside its recording."""
+        if parameter.name in ("driver", "experiment_root"):
+            raise ParameterError(f"{parameter.name} is read at start; give it then")
+        if parameter.name == "experiment" and parameter.value:
+            self._folder.check(parameter.value)

@@ -1,0 +1,42 @@
+"""How likely every explanation was after each part of a live diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .table import Table
+
+MOST = 6
+"""Explanations shown, the likeliest at any time."""
+
+
+def shown_explanations(live: Mapping[str, Any], most: int = MOST) -> list[str]:
+    """Explanations that were likeliest at any time, best first; `live` as in ``answer.json``."""
+    highest: dict[str, float] = {}
+    for update in live["probabilities"]:
+        for name, p in update["probabilities"].items():
+            highest[name] = max(highest.get(name, 0.0), p)
+    return sorted(highest, key=lambda name: -highest[name])[:most]
+
+
+def probability_table(live: Mapping[str, Any]) -> Table:
+    """One row for each decision.
+
+    Parameters
+    ----------
+    live : mapping
+        The part ``live`` of the answer.
+    """
+    names = shown_explanations(live)
+    rows = tuple(
+        (
+            f"{update['time_s']:.1f}",
+            update["played"],
+            *(f"{100.0 * update['probabilities'].get(name, 0.0):.2f}" for name in names),
+        )
+        for update in live["probabilities"]
+    )
+    header = ("stage time [s]", "played", *(f"{name.replace('_', ' ')} [%]" for name in names))
+    numeric = frozenset({0, *range(2, 2 + len(names))})
+    return Table("Probability of each explanation", header, rows, live["reason"], numeric)

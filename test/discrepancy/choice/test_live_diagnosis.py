@@ -1,0 +1,70 @@
+"""A diagnosis that chooses its own phases and stops when it knows."""
+
+import pytest
+
+from piezo_hysteresis.discrepancy.choice.live_diagnosis import begin
+from piezo_hysteresis.discrepancy.choice.probabilities import NOTHING
+from piezo_hysteresis.discrepancy.choice.update import End
+from piezo_hysteresis.errors import ParameterError
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.record import Experiment
+from piezo_hysteresis.stage.plant import PlantParameters
+from piezo_hysteresis.stage.simulated import SimulatedStage
+
+PERIOD = 1e-4
+"""Of drive and samples [s]."""
+
+
+def driven(hidden, **choices):
+    """A live diagnosis of a simulated stage, and every state of it."""
+    stage = SimulatedStage(PlantParameters().with_values(hidden), seed=3, sample_period=PERIOD)
+    states, records = [begin(DriveLimits(PERIOD), **choices)], []
+    while states[-1].due:
+        for p in states[-1].due:
+            records.append(stage.play(p.voltage, p.name, continues=bool(records), average=p.stored_every))
+        states.append(states[-1].advanced(Experiment(tuple(records))))
+    return states
+
+
+def holds_its_promises(states):
+    """Whether the probabilities sum to one, and "sure" was said at the bound and not before."""
+    for state in states[1:]:
+        told = state.updates[-1].probabilities
+        assert sum(told.values()) == pytest.approx(1.0)
+        assert state.answer_is_sure == (state.end is End.SURE)
+    last = states[-1]
+    if last.end is End.SURE:
+        assert max(last.updates[-1].probabilities.values()) >= 1.0 - last.error_rate
+    assert last.time == pytest.approx(sum(p.duration for s in states for p in s.due))
+    assert last.time <= last.longest
+
+
+def test_a_hidden_effect_is_named_after_the_cheap_phases():
+    states = driven({"environment.hum": 2e-7})
+    holds_its_promises(states)
+    assert states[-1].end is End.SURE
+    assert states[-1].found.names == ("mains_hum",)
+    assert states[-1].time < 40.0
+
+
+def test_nothing_is_said_to_be_missing_only_after_slow_phases_were_played():
+    states = driven({})
+    holds_its_promises(states)
+    assert states[-1].end is End.SURE
+    assert states[-1].updates[-1].likeliest == NOTHING
+    assert states[-1].tier == len(states[-1].plan)
+    assert all(s.updates[-1].probabilities[NOTHING] < 1.0 - s.error_rate for s in states[1:-1])
+    assert states[1].answer()["untested"] == ["creep", "gain_drift", "thermal_drift"]
+
+
+def test_without_time_for_more_the_answer_says_that_it_is_not_sure():
+    states = driven({}, longest=15.0)
+    holds_its_promises(states)
+    assert states[-1].end is End.EXHAUSTED
+    assert "no explanation is sure" in states[-1].reason()
+
+
+@pytest.mark.parametrize("choices", [{"error_rate": 0.0}, {"error_rate": 0.5}, {"longest": 5.0}])
+def test_choices_that_make_no_sense_are_refused(choices):
+    with pytest.raises(ParameterError):
+        begin(DriveLimits(1e-3), **choices)

@@ -1,0 +1,69 @@
+"""`~/diagnose` with `live`: the node drives the stage until it knows, records one experiment, and can be aborted."""
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.runtime.qos import LATCHED
+from piezo_hysteresis.recording import read
+from piezo_hysteresis.report.json_file import read_json
+
+pytestmark = pytest.mark.nodes
+
+NODE = "identification_node"
+DRIVER = {"sample_period": 1e-4, "block_duration": 0.05, "simulated__seed": 1}
+PATIENCE = 400.0
+"""Longest wait for a decision on a busy machine [s]."""
+
+
+class LiveNode:
+    """An identification node with `live`, and its status."""
+
+    def __init__(self, lab, **parameters):
+        self.lab, self.runs = lab, lab.folder / "runs"
+        self.statuses = lab.listen(DiagnosticStatus, "status", LATCHED)
+        lab.start(NODE, experiment_root=str(self.runs), live=True, **parameters)
+        lab.wait(lambda: self.ask("plan").success, "the driver's limits")
+
+    def ask(self, name):
+        return self.lab.call(Trigger, f"{NODE}/{name}")
+
+    def reaches(self, *states, timeout=60.0):
+        def reached():
+            return self.statuses and values_of(self.statuses[-1])["state"] in states
+
+        self.lab.wait(reached, f"state {' or '.join(states)}, not {self.statuses[-1:]}", timeout)
+        return self.statuses[-1]
+
+
+def test_a_stage_is_driven_until_the_node_knows(lab):
+    lab.driver(**DRIVER, real_time_factor=10.0, simulated__environment__hum=2e-7)
+    node = LiveNode(lab)
+    assert "largest slew" in node.ask("plan").message
+    assert not node.runs.exists(), "nothing moves before it is asked for"
+    assert node.ask("diagnose").success
+    status = node.reaches("done", "failed", timeout=PATIENCE)
+    assert values_of(status)["state"] == "done", status.message
+    assert "mains_hum" in values_of(status)["likely"] or "mains hum" in status.message
+    (folder,) = node.runs.iterdir()
+    answer = read_json(folder / "answer.json")
+    assert [e["name"] for e in answer["effects"]] == ["mains_hum"]
+    played = sum(r.duration for r in read(folder).records)
+    assert played == pytest.approx(answer["live"]["stage_time_s"], rel=0.02)
+    assert (folder / "diagnosis.yaml").exists()
+
+
+def test_a_live_diagnosis_that_is_aborted_leaves_the_stage_safe_and_the_recording_readable(lab):
+    lab.driver(**DRIVER, real_time_factor=1.0)
+    voltages = lab.listen(Float64, "voltage")
+    node = LiveNode(lab)
+    assert node.ask("diagnose").success
+    node.reaches("running")
+    lab.wait(lambda: voltages and voltages[-1].data > 1.0, "the stage to move")
+    assert node.ask("abort").success
+    assert values_of(node.reaches("aborted"))["state"] == "aborted"
+    lab.wait(lambda: voltages[-1].data == pytest.approx(0.0, abs=1e-6), "the safe voltage")
+    (folder,) = node.runs.iterdir()
+    assert read(folder).records
