@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from ...blocks.arx import ORDER, recur
 from ...model.chain import Chain, ChainState, ChainTangent
 from ...model.model import Model
 
@@ -131,7 +131,7 @@ class Scores:
         loop = self._weights[order] @ rows if names else np.zeros(y.size)
         first, slow, before = self._last or (float(y[0]), float(y[0]), float(voltage[0]))
         lag = -np.diff(y, prepend=first) / self._period
-        follows, _ = lfilter([1.0 - self._decay], [1.0, -self._decay], y, zi=[self._decay * slow])
+        follows = _low_pass(y, self._decay, slow)
         self._last = (float(y[-1]), float(follows[-1]), float(voltage[-1]))
         speed = np.diff(voltage, prepend=before) / self._period
         self._rows.append(np.vstack((y, loop, lag, follows, np.ones(y.size), residual, voltage, speed)))
@@ -143,6 +143,14 @@ class Scores:
             rest = rows[:, self.block_size :].copy()
             self._rows, self._held = [rest], rest.shape[1]
         return done
+
+
+def _low_pass(x: Array, decay: float, before: float) -> Array:
+    """y_i = (1 − decay) x_i + decay y_(i − 1), shape (n,), after y = `before`."""
+    poles, state, y = np.zeros(ORDER), np.zeros(ORDER), np.empty_like(x)
+    poles[0], state[0] = -decay, before
+    recur(poles, state, (1.0 - decay) * x, 0.0, y)
+    return y
 
 
 def _score(rows: Array, stamp: int) -> ChangeScore:
