@@ -5,6 +5,8 @@ there already is not run again. Blocks marked ``console`` need a ROS 2 installat
 must exist.
 """
 
+import ast
+import importlib
 import os
 import re
 import subprocess
@@ -131,3 +133,14 @@ def test_every_page_is_in_the_site():
     index = (ROOT / "docs" / "index.md").read_text().splitlines()
     pages = {page.stem for page in (ROOT / "docs").glob("*.md")} - {"index"}
     assert pages <= set(index)
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "notebooks").glob("*.md")), ids=name)
+def test_notebooks_use_what_the_package_has(page):
+    cells = re.findall(r"^```{code-cell} python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+    assert len(cells) > 2
+    for cell in cells:
+        for node in ast.walk(ast.parse(cell, str(page))):
+            if isinstance(node, ast.ImportFrom) and node.module.startswith("piezo_hysteresis"):
+                module = importlib.import_module(node.module)
+                assert all(hasattr(module, alias.name) for alias in node.names)
