@@ -98,6 +98,14 @@ def test_a_node_without_ros_ends_in_one_line(node):
     assert line.startswith(f"{node}: got no Python package 'rclpy', expected ROS 2")
 
 
+@pytest.mark.parametrize("node", ["driver", "model", "compensation"])
+def test_a_node_that_runs_beside_a_stage_loads_nothing_heavy(node):
+    heavy = "{'scipy.optimize', 'scipy.signal', 'scipy.stats', 'matplotlib', 'bokeh'}"
+    code = f"import sys, piezo_hysteresis.nodes.{node}.{node}_node; sys.exit(str({heavy} & set(sys.modules) or 0))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == "0"
+
+
 def test_the_command_says_its_version():
     command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "--version"]
     said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=60).stdout
