@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from ..diagnosis import Diagnosis, Verdict
 from ..form_uncertainty import PIECES
@@ -117,7 +117,7 @@ def scatter_odds(best: Score, other: Score) -> float:
     lead, error = best.better_than(other)
     if not np.isfinite(error):
         return 0.0
-    wrong = float(student.sf(lead / max(error, 1e-12), best.ratios.size - 1))
+    wrong = float(scipy.stats.t.sf(lead / max(error, 1e-12), best.ratios.size - 1))
     return max(0.0, float(np.log1p(-wrong) - np.log(max(wrong, 1e-300))))
 
 
