@@ -98,8 +98,8 @@ def test_a_node_without_ros_ends_in_one_line(node):
     assert line.startswith(f"{node}: got no Python package 'rclpy', expected ROS 2")
 
 
-@pytest.mark.parametrize("node", ["driver", "model", "compensation"])
-def test_a_node_that_runs_beside_a_stage_loads_nothing_heavy(node):
+@pytest.mark.parametrize("node", ["driver", "model", "identification", "compensation"])
+def test_a_node_loads_nothing_heavy(node):
     heavy = "{'scipy.optimize', 'scipy.signal', 'scipy.stats', 'matplotlib', 'bokeh'}"
     code = f"import sys, piezo_hysteresis.nodes.{node}.{node}_node; sys.exit(str({heavy} & set(sys.modules) or 0))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
