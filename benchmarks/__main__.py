@@ -19,10 +19,12 @@ from benchmarks.figures import Figures, machine, show, write
 SPEED = ("kernels", "simulation", "identification", "growth", "start", "streaming", "diagnosis")
 """What runs where nothing is named."""
 QUALITY = (
+    "change",
     "changes",
     "compensation",
     "export",
     "fleet",
+    "page",
     "rates",
     "recovery",
     "table_1",

@@ -1,14 +1,15 @@
 """One axis: its driver, the model node that predicts as soon as it has a model; compensation and page where asked."""
 
+import os
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from piezo_hysteresis.nodes.runtime.launch_values import SWITCH, number, parameter_file, replayed, switch
+from piezo_hysteresis.nodes.runtime.launch_values import SWITCH, number, parameter_file, replayed, switch, transports
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
 
 SIGTERM_TIMEOUT = "30"
@@ -35,7 +36,9 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(name, default_value=value, description=text, choices=choices)
         for name, value, text, choices in ARGUMENTS
     ]
-    return LaunchDescription([*arguments, OpaqueFunction(function=nodes)])
+    config = Path(get_package_share_directory("piezo_hysteresis")) / "config"
+    room = [SetEnvironmentVariable(*pair) for pair in transports(os.environ, config).items()]
+    return LaunchDescription([*arguments, *room, OpaqueFunction(function=nodes)])
 
 
 def nodes(context: LaunchContext) -> list[Node]:

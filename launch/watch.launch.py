@@ -1,14 +1,15 @@
 """The live page of axes that are running, or will be: a process that subscribes and calls services."""
 
+import os
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from piezo_hysteresis.nodes.runtime.launch_values import parameter_file, whole_number
+from piezo_hysteresis.nodes.runtime.launch_values import parameter_file, transports, whole_number
 
 ARGUMENTS = (
     ("axes", "", "namespaces to show, with commas between; empty: every axis that publishes samples"),
@@ -21,7 +22,9 @@ ARGUMENTS = (
 
 def generate_launch_description() -> LaunchDescription:
     arguments = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
-    return LaunchDescription([*arguments, OpaqueFunction(function=page)])
+    config = Path(get_package_share_directory("piezo_hysteresis")) / "config"
+    room = [SetEnvironmentVariable(*pair) for pair in transports(os.environ, config).items()]
+    return LaunchDescription([*arguments, *room, OpaqueFunction(function=page)])
 
 
 def page(context: LaunchContext) -> list[Node]:

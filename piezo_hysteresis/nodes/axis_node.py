@@ -19,7 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the three nodes; the exit code is 2 where their parameters make no sense."""
     lives: list[NodeLife] = [
         NodeLife(DriverNode, DriverNode.begin, DriverNode.end),
-        NodeLife(ModelNode),
+        NodeLife(ModelNode, end=ModelNode.end),
         NodeLife(IdentificationNode, end=IdentificationNode.end),
     ]
     return run_together(lives, arguments)

@@ -1,5 +1,7 @@
 """Recalibration of a group on the last minute: closed changes come back, and others are refused with what will do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -127,6 +129,16 @@ def test_another_shape_needs_a_full_identification():
 def test_what_no_number_of_the_model_stands_for_is_refused(groups, reason):
     with pytest.raises(IdentificationError, match=reason):
         group_to_fit(groups)
+
+
+def test_samples_of_the_rest_before_the_drive_are_left_out():
+    _, predictor, recent = stream(1.01 * run(MODEL))
+    displacement, drive_so_far = recent.copy(), predictor.drive
+    short = replace(drive_so_far, slow=np.empty(0), full=drive_so_far.full[-20_000:])
+    late = Minute(short, displacement[-20_000:], predictor.offset).scores(MODEL, predictor.offset)
+    whole = Minute(short, displacement, predictor.offset).scores(MODEL, predictor.offset)
+    assert len(whole) == len(late) == 20_000 // BLOCK
+    np.testing.assert_array_equal(whole[-1].value, late[-1].value)
 
 
 def test_right_after_the_change_there_are_too_few_samples():

@@ -1,11 +1,13 @@
 """What launch arguments mean, and one identification node for a driver."""
 
 import signal
+from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
 from piezo_hysteresis.errors import ParameterError
-from piezo_hysteresis.nodes.runtime.launch_values import parameter_file, switch
+from piezo_hysteresis.nodes.runtime.launch_values import parameter_file, switch, transports
 
 
 @pytest.mark.parametrize(
@@ -48,3 +50,27 @@ def test_one_identification_node_per_driver(lab):
     lab.pause(3.0)
     assert again.is_running
     assert other.is_running
+
+
+@pytest.mark.parametrize("chosen", ["FASTDDS_BUILTIN_TRANSPORTS", "FASTDDS_DEFAULT_PROFILES_FILE"])
+def test_launch_files_give_room_to_readers_unless_the_user_has_chosen_transports(chosen):
+    config = Path(__file__).parents[2] / "config"
+    ((name, file),) = transports({}, config).items()
+    assert name == "FASTDDS_DEFAULT_PROFILES_FILE"
+    assert Path(file).is_file()
+    assert transports({chosen: "SHM"}, config) == {}
+
+
+def test_both_profiles_of_fast_dds_have_the_same_room_and_the_one_of_the_launch_files_reaches_other_machines():
+    config = Path(__file__).parents[2] / "config"
+    space = "{http://www.eprosima.com}"
+    rooms = []
+    for name in ("large_blocks.xml", "launch_transports.xml"):
+        tree = ElementTree.parse(config / name)
+        known = {t.findtext(f"{space}transport_id"): t for t in tree.iter(f"{space}transport_descriptor")}
+        used = [known[t.text] for t in tree.find(f".//{space}userTransports")]
+        kinds = [t.findtext(f"{space}type") for t in used]
+        assert kinds[0] == "SHM"
+        rooms.append({child.tag: child.text for child in used[0] if not child.tag.endswith("transport_id")})
+    assert rooms[0] == rooms[1]
+    assert kinds == ["SHM", "UDPv4"]

@@ -38,15 +38,19 @@ class Minute:
     offset: float
 
     def scores(self, model: Model, offset: float) -> list[ChangeScore]:
-        """Scores of the samples under a model that is `offset` [m] away from the sensor."""
+        """Scores of the samples under a model that is `offset` [m] away from the sensor.
+
+        A drive begins where the stage left its rest; samples from before say nothing.
+        """
         drive, loop = self.drive, loop_heights(model)
-        first = drive.full.size - self.displacement.size
+        displacement = self.displacement[max(0, self.displacement.size - drive.full.size) :]
+        first = drive.full.size - displacement.size
         chain, state, tangent = _brought_up(model, drive, first, loop)
         scores, counted = Scores(chain, state, loop, tangent), list[ChangeScore]()
-        for start in range(0, self.displacement.size, _PIECE):
+        for start in range(0, displacement.size, _PIECE):
             voltage = np.ascontiguousarray(drive.full[first + start : first + start + _PIECE])
             y, state = chain.run(voltage, state)
-            counted += scores.add(voltage, self.displacement[start : start + _PIECE] - y - offset, 0)
+            counted += scores.add(voltage, displacement[start : start + _PIECE] - y - offset, 0)
         return counted
 
 

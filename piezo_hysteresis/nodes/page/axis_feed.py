@@ -55,6 +55,7 @@ class AxisFeed:
             ("change", self._on_change, False),
             ("status", self._on_status, False),
             ("model", self._on_model, False),
+            ("recalibrations", self._on_recalibrations, False),
         ):
             topic = TOPICS[name]
             node.create_subscription(topic.type, f"{self._prefix}/{name}", callback, topic.deep, raw=raw)
@@ -118,6 +119,12 @@ class AxisFeed:
     def _on_status(self, message: DiagnosticStatus) -> None:
         if message.name.endswith(": identification"):
             self.state.report_identification(to_status(message))
+
+    def _on_recalibrations(self, message: String) -> None:
+        try:
+            self.state.report_recalibrations(message.data)
+        except PiezoError as error:
+            self._node.get_logger().warning(f"{self._prefix}: {error}", throttle_duration_sec=1.0)
 
     def _on_model(self, message: String) -> None:
         self.state.follow(message.data)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,6 +19,28 @@ SWITCH: dict[str, bool] = {
     "0": False,
 }
 """Words for yes and no."""
+
+
+CHOSEN = ("FASTDDS_BUILTIN_TRANSPORTS", "FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
+"""Variables by which a user chooses the transports of Fast DDS."""
+
+
+def transports(environment: Mapping[str, str], config: Path) -> dict[str, str]:
+    """Variables for the nodes of a launch file, beside those of `environment`; none where the user has chosen.
+
+    A reader that is killed outright keeps its part of the shared memory until it is found dead, a second later. With
+    room for that second it costs the other readers nothing.
+
+    Parameters
+    ----------
+    environment : mapping
+        Of the launch.
+    config : Path
+        Folder of the configuration files.
+    """
+    if any(environment.get(name) for name in CHOSEN):
+        return {}
+    return {"FASTDDS_DEFAULT_PROFILES_FILE": str(config / "launch_transports.xml")}
 
 
 def switch(name: str, text: str) -> bool:

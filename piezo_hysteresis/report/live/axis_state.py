@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ...discrepancy.changes.recalibration_history import RecalibratedNumber, read_numbers
 from ...errors import PiezoError
 from ...model.model import Model
 from ...model.model_file import loads
@@ -131,6 +132,8 @@ class AxisState:
         What the last diagnosis found; empty before there is one.
     models : tuple of KnownModel
         The newest last.
+    recalibrations : tuple of RecalibratedNumber
+        What the model node has recalibrated, the oldest first.
     refused_model : str
         Why the newest text on `model` is none; empty where it is one.
     """
@@ -146,6 +149,7 @@ class AxisState:
         self.change: Status | None = None
         self.verdict = ""
         self.models: tuple[KnownModel, ...] = ()
+        self.recalibrations: tuple[RecalibratedNumber, ...] = ()
         self.refused_model = ""
         self._active: dict[str, Alarm] = {}
         self._over: deque[Alarm] = deque(maxlen=HISTORY)
@@ -201,6 +205,16 @@ class AxisState:
         self.identification = status
         if status.values.get("state") == "done" and status.message.partition(":")[0] in VERDICTS:
             self.verdict = status.message
+
+    def report_recalibrations(self, text: str) -> None:
+        """Take the history of the model node; a text that is none leaves it as it was.
+
+        Raises
+        ------
+        RecordingError
+            If the text is none.
+        """
+        self.recalibrations = read_numbers(text, "topic 'recalibrations'")
 
     def follow(self, text: str) -> None:
         """Take a model file; one that is not acceptable is reported as such."""

@@ -66,6 +66,12 @@ CONTROLS: tuple[Control, ...] = (
         "Takes the present state of the stage as good. The change watch then compares with it. Drive the stage as in "
         "normal use meanwhile.",
     ),
+    Control(
+        "Recalibrate",
+        "model_node/recalibrate",
+        "Fits the few numbers of the group that has changed to the last minute, and replaces the model.",
+        plan="model_node/plan_recalibration",
+    ),
 )
 """The buttons of an axis, in the order of the page."""
 

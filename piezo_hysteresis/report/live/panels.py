@@ -10,9 +10,8 @@ from html import escape
 import numpy as np
 
 from ...errors import printable
-from ..figures.comparison import ModelComparison
-from ..words import duration, nanometre
-from .axis_state import OK, SILENT, STALE, WARN, Alarm, AxisState, Status
+from ..words import nanometre
+from .axis_state import OK, SILENT, STALE, Alarm, AxisState, Status
 
 LEVELS = ("ok", "warn", "error", "stale")
 """Words of the levels of a status, which are also the names of their styles."""
@@ -46,11 +45,11 @@ def state(axis: AxisState, noise: float | None) -> str:
             ("voltage", "drive voltage", f"{newest.voltage[k]:.3f} V"),
             ("displacement", "displacement", _micrometre(newest.displacement[k])),
             ("prediction", "predicted", _micrometre(newest.prediction[k])),
-            ("residual", "residual", _length(newest.residual[k])),
+            ("residual", "residual", length(newest.residual[k])),
         ]
     numbers += [
-        ("residual_rms", "residual, RMS", _length(axis.residual_rms)),
-        ("noise", "noise of the sensor", _length(noise)),
+        ("residual_rms", "residual, RMS", length(axis.residual_rms)),
+        ("noise", "noise of the sensor", length(noise)),
     ]
     cells = "".join(f"<div><dt>{label}</dt><dd id='{key}'>{text}</dd></div>" for key, label, text in numbers)
     return f"{_driver(axis)}<dl>{cells}</dl>"
@@ -76,15 +75,15 @@ def alarms(axis: AxisState) -> str:
     """What is wrong at present, what was, and the change watch."""
     silent = [s for s in axis.statuses.values() if s.age > SILENT]
     rows = [_alarm_row(alarm) for alarm in axis.alarms if axis.statuses[alarm.name].age <= SILENT]
-    rows += [_row(badge(STALE, "silent"), escape(s.name), f"no report for {s.age:.0f} s") for s in silent]
-    present = _table(rows) if rows else f"<p>{badge(OK)} nothing is reported</p>"
+    rows += [table_row(badge(STALE, "silent"), escape(s.name), f"no report for {s.age:.0f} s") for s in silent]
+    present = table_of(rows) if rows else f"<p>{badge(OK)} nothing is reported</p>"
     past = [_alarm_row(alarm) for alarm in axis.past_alarms]
-    over = f"<details><summary>{len(past)} earlier</summary>{_table(past)}</details>" if past else ""
+    over = f"<details><summary>{len(past)} earlier</summary>{table_of(past)}</details>" if past else ""
     return f"<div id='alarms'>{present}{over}</div>{_change(axis.change)}"
 
 
 def _alarm_row(alarm: Alarm) -> str:
-    return _row(badge(alarm.level), _clock(alarm.began), f"<b>{escape(alarm.name)}</b> {escape(alarm.message)}")
+    return table_row(badge(alarm.level), _clock(alarm.began), f"<b>{escape(alarm.name)}</b> {escape(alarm.message)}")
 
 
 def _change(change: Status | None) -> str:
@@ -100,6 +99,8 @@ def _change(change: Status | None) -> str:
             f"{escape(values['group'])}: {escape(values.get('change', ''))} {unit} "
             f"({escape(values.get('change_low', ''))} to {escape(values.get('change_high', ''))})"
         )
+    if "recalibration" in values:
+        words.append(f"recalibration: {escape(values['recalibration'])}")
     if "onset" in values:
         words.append(f"since {_clock(_number(values['onset']))}")
     return f"<h4>Change watch</h4><p id='change'>{'; '.join(words)}</p>"
@@ -128,19 +129,44 @@ def model(axis: AxisState) -> str:
     """The model in use and the ones before it."""
     refused = f"<p>{badge(2, 'refused')} {escape(axis.refused_model)}</p>" if axis.refused_model else ""
     in_use = _in_use(axis)
+    recalibrated = _recalibrations(axis)
     if axis.model is None:
-        return f"{refused}{in_use}"
+        return f"{refused}{in_use}{recalibrated}"
     rows = []
     for entry in reversed(axis.models):
         chain = ", ".join(effect.name.replace("_", " ") for effect in entry.model.effects)
         date = entry.model.provenance.get("date", "")
         rows.append(
             f"<tr><td>{_clock(entry.received)}</td><td><code>{escape(_short(entry.hash))}</code></td>"
-            f"<td>{_length(entry.free_run_error)}</td><td>{escape(str(date))}</td><td>{escape(chain)}</td></tr>"
+            f"<td>{length(entry.free_run_error)}</td><td>{escape(str(date))}</td><td>{escape(chain)}</td></tr>"
         )
     head = "<tr><th>received</th><th>model</th><th>free-run error</th><th>fitted</th><th>effects</th></tr>"
     table = f"<div class='table'><table>{head}{''.join(rows)}</table></div>"
-    return f"{refused}{in_use}<h4>Models of the identification node</h4>{table}"
+    return f"{refused}{in_use}<h4>Models of the identification node</h4>{table}{recalibrated}"
+
+
+def _recalibrations(axis: AxisState) -> str:
+    """What the model node has fitted anew, the newest first."""
+    if not axis.recalibrations:
+        return ""
+    head = (
+        "<tr><th>recalibrated</th><th>group</th><th>number</th><th>old</th><th>new</th><th>95 % interval</th>"
+        "<th>residual before</th><th>after</th></tr>"
+    )
+    rows = [
+        table_row(
+            escape(n.time.replace("T", " ").replace("Z", " UTC")),
+            escape(n.group),
+            escape(n.parameter),
+            f"{n.old:.6g}",
+            f"{n.new:.6g} {escape(n.unit)}",
+            f"{n.low:.6g} to {n.high:.6g}",
+            length(n.residual_before),
+            length(n.residual_after),
+        )
+        for n in reversed(axis.recalibrations)
+    ]
+    return f"<h4>Recalibrations</h4><div id='recalibrations'>{table_of([head, *rows])}</div>"
 
 
 def _in_use(axis: AxisState) -> str:
@@ -151,7 +177,7 @@ def _in_use(axis: AxisState) -> str:
     if not used:
         return f"<p>{badge(prediction.level, 'prediction')} {escape(prediction.message)}</p>"
     error = axis.free_run_error
-    promise = "" if error is None else f", free-run error {_length(error)}"
+    promise = "" if error is None else f", free-run error {length(error)}"
     return (
         f"<p id='model'>{badge(prediction.level, 'prediction')} {escape(prediction.message)}; "
         f"in use: <code>{escape(_short(used))}</code>{promise}</p>"
@@ -162,52 +188,13 @@ def _short(model_hash: str) -> str:
     return model_hash.removeprefix("sha256:")[:12]
 
 
-def record(comparison: ModelComparison, index: int, words: str) -> str:
-    """One phase of a recording: its size, its noise, and the free-run error of the model.
-
-    Parameters
-    ----------
-    comparison : ModelComparison
-        The recording.
-    index : int
-        Number of the phase.
-    words : str
-        Its size.
-    """
-    now = comparison.now
-    numbers = [("noise of the sensor", _length(float(comparison.noise[index])))]
-    if now is not None:
-        row = now.rows[index]
-        numbers += [("residual, RMS", _length(row.rms)), ("of the range", f"{row.percent:.3g} %")]
-        numbers.append(("largest residual", _length(row.largest)))
-    cells = "".join(f"<div><dt>{label}</dt><dd>{text}</dd></div>" for label, text in numbers)
-    notices = "".join(f"<p>{badge(WARN, 'data')} {escape(n.message)}</p>" for n in comparison.experiment.notices)
-    return f"<p>{escape(words)}</p><dl>{cells}</dl>{notices}"
-
-
-def records(comparison: ModelComparison) -> str:
-    """All phases of a recording."""
-    now = comparison.now
-    rows = [
-        _row(
-            str(k + 1),
-            escape(one.phase),
-            duration(one.duration),
-            duration(one.sample_period),
-            _length(float(comparison.floors[k])),
-            "—" if now is None else _length(now.rows[k].rms),
-        )
-        for k, one in enumerate(comparison.experiment)
-    ]
-    head = "<tr><th></th><th>phase</th><th>duration</th><th>sample period</th><th>floor</th><th>residual, RMS</th></tr>"
-    return _table([head, *rows])
-
-
-def _row(*cells: str) -> str:
+def table_row(*cells: str) -> str:
+    """One row of a table."""
     return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 
-def _table(rows: Iterable[str]) -> str:
+def table_of(rows: Iterable[str]) -> str:
+    """A table that can be moved sideways where it is too wide."""
     return f"<div class='table'><table>{''.join(rows)}</table></div>"
 
 
@@ -233,5 +220,6 @@ def _micrometre(metres: float | None) -> str:
     return "—" if metres is None or not math.isfinite(metres) else f"{1e6 * metres:.4f} µm"
 
 
-def _length(metres: float | None) -> str:
+def length(metres: float | None) -> str:
+    """A length in nanometres; a dash where there is none."""
     return "—" if metres is None or not math.isfinite(metres) else nanometre(metres)

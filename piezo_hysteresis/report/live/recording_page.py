@@ -8,7 +8,7 @@ from bokeh.models import Select
 
 from ..figures.comparison import ModelComparison
 from ..words import duration
-from . import panels
+from . import recording_panels
 from .figures import WindowFigures
 from .layout import Section, lay_out, panel_styles, text_panel
 from .live_page import TICK
@@ -36,7 +36,7 @@ class RecordingPage:
         self._figures = WindowFigures("time since the beginning of the phase [s]")
         styles = panel_styles()
         self._state, self._records = text_panel("state", styles), text_panel("records", styles)
-        self._records.text = panels.records(comparison)
+        self._records.text = recording_panels.records(comparison)
         figures = self._figures
         lay_out(
             document,
@@ -62,7 +62,7 @@ class RecordingPage:
         self._figures.draw_spectrum(self._window, self._noise)
         self._drawn: tuple[float, float] | None = None
         words = f"{record.size} samples every {duration(record.sample_period)}, {duration(record.duration)}"
-        self._state.text = panels.record(self._comparison, index, words)
+        self._state.text = recording_panels.record(self._comparison, index, words)
         self._tick()
 
     def _tick(self) -> None:

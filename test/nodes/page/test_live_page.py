@@ -16,6 +16,7 @@ from piezo_hysteresis.nodes.messages.cloud import from_cloud
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, diagnostic, values_of
 from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES
 
+from ..conftest import opened
 from ..lab import DEEP
 
 pytestmark = pytest.mark.nodes
@@ -23,19 +24,32 @@ pytestmark = pytest.mark.nodes
 ROOT = Path(__file__).parents[3]
 PERIOD = 2e-5
 AXIS = "/stage_x"
-ROOM = {"FASTDDS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "large_blocks.xml")}
-"""Without room for a second of blocks, a reader that is killed costs the others blocks: docs/live_page.md."""
+TRANSPORTS = {
+    "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    "FASTDDS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "launch_transports.xml"),
+}
+"""As the launch files set them, but for this machine only."""
+
+
+@pytest.fixture(scope="module")
+def shared_lab(tmp_path_factory):
+    """A lab on the transports of the launch files."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in TRANSPORTS.items():
+            patch.setenv(name, value)
+        with opened(tmp_path_factory.mktemp("lab")) as lab:
+            yield lab
 
 
 @pytest.fixture(scope="module")
 def nodes(shared_lab, browser):
     """The nodes of an axis that is driven, and the page of it, open."""
     lab = shared_lab
-    lab.driver(namespace=AXIS, environment=ROOM)
-    lab.start("model_node", namespace=AXIS, model_file=str(ROOT / "config" / "published_stage.yaml"), environment=ROOM)
-    lab.start("identification_node", namespace=AXIS, experiment_root=str(lab.folder / "experiments"), environment=ROOM)
+    lab.driver(namespace=AXIS)
+    lab.start("model_node", namespace=AXIS, model_file=str(ROOT / "config" / "published_stage.yaml"))
+    lab.start("identification_node", namespace=AXIS, experiment_root=str(lab.folder / "experiments"))
     lab.others = list(lab.processes)
-    page = lab.start("page_node", port=0, environment=ROOM)
+    page = lab.start("page_node", port=0)
     url = lab.wait(lambda: re.search(r"http://127\.0\.0\.1:\d+/", page.output), "the address of the page").group()
     lab.page = page
     lab.measured = lab.samples(f"{AXIS}/samples")
@@ -140,7 +154,7 @@ def test_a_change_of_the_stage_appears(nodes, browser):
 def test_a_page_that_ends_disturbs_nobody(nodes, browser, ending):
     if not nodes.page.is_running:
         known = nodes.node.get_subscriptions_info_by_topic
-        nodes.page = nodes.start("page_node", port=0, environment=ROOM)
+        nodes.page = nodes.start("page_node", port=0)
         nodes.wait(lambda: "found the axis" in nodes.page.output, "the page's axis")
         nodes.wait(lambda: "page_node" in {i.node_name for i in known(f"{AXIS}/samples")}, "its subscription")
     before = nodes.measured.lost

@@ -1,0 +1,100 @@
+"""The live page of axes whose nodes end, begin again and change: it chooses, follows, reports and recalibrates."""
+
+from __future__ import annotations
+
+import re
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import PointCloud2
+
+from piezo_hysteresis.discrepancy.changes.recalibration_history import FILE, read_numbers
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud
+
+pytestmark = pytest.mark.nodes
+
+ROOT = Path(__file__).parents[3]
+PERIOD = 1e-4
+AXIS, OTHER = "/stage_x", "/stage_y"
+SCALE = "simulated__structure__displacement_scale"
+
+
+@pytest.fixture(scope="module")
+def nodes(shared_lab, browser):
+    """Two axes, the first with a model node, and their page."""
+    lab = shared_lab
+    lab.first = lab.driver(namespace=AXIS, sample_period=PERIOD)
+    lab.kept = lab.folder / "kept"
+    model = {"model_file": str(ROOT / "config" / "published_stage.yaml"), "baseline_time": 20.0}
+    lab.start("model_node", namespace=AXIS, baseline_folder=str(lab.kept), **model)
+    lab.driver(namespace=OTHER, sample_period=PERIOD)
+    page = lab.start("page_node", port=0)
+    url = lab.wait(lambda: re.search(r"http://127\.0\.0\.1:\d+/", page.output), "the address of the page").group()
+    lab.wait(lambda: page.output.count("found the axis") == 2, "both axes")
+    predicted = lab.listen(PointCloud2, f"{AXIS}/predicted_samples")
+    lab.wait(lambda: predicted, "a prediction")
+    browser.open(url)
+    browser.wait(lambda: "idle" in browser.text("phase"), "the phase")
+    return lab
+
+
+def scan(lab, axis, seconds):
+    """Drive an axis for a while; 10 Hz, 0 to 8 V."""
+    time = PERIOD * np.arange(round(seconds / PERIOD))
+    publisher = lab.publisher(PointCloud2, f"{axis}/command")
+    publisher.publish(command_to_cloud(4.0 * (1.0 - np.cos(2 * np.pi * 10.0 * time)), PERIOD, "scan"))
+
+
+def choose(browser, axis):
+    """Choose an axis in the list, as a visitor does."""
+    browser.value(f"Bokeh.documents[0].get_model_by_name('axis').setv({{value: '{axis}'}})")
+
+
+def newest_voltage(browser):
+    return float((browser.text("voltage") or "nan V").split()[0])
+
+
+def test_every_axis_can_be_chosen_and_its_buttons_act_on_it_alone(nodes, browser):
+    scan(nodes, OTHER, 60.0)
+    choose(browser, OTHER)
+    browser.wait(lambda: "scan" in browser.text("phase"), "the scan of the other axis")
+    browser.wait(lambda: max(browser.source("loop").get("voltage") or [0.0], key=abs) > 7.5, "its loop")
+    choose(browser, AXIS)
+    browser.wait(lambda: "idle" in browser.text("phase"), "the axis that rests")
+    browser.wait(lambda: newest_voltage(browser) == 0.0, "its voltage")
+    choose(browser, OTHER)
+    browser.click("Stop")
+    browser.wait(lambda: "stopped" in browser.text("driver"), "the stop of the other axis")
+    choose(browser, AXIS)
+    browser.wait(lambda: "stopped" not in browser.text("driver"), "the first axis, which is not stopped")
+
+
+def test_a_driver_that_starts_again_as_another_stage_raises_an_alarm_and_is_recalibrated(nodes, browser):
+    choose(browser, AXIS)
+    scan(nodes, AXIS, 110.0)
+    browser.wait(lambda: "scan" in browser.text("phase"), "the scan")
+    browser.click("Take baseline …")
+    browser.click("Take baseline")
+    browser.wait(lambda: "no change since" in browser.text("change"), "a baseline")
+
+    nodes.first.signal(signal.SIGKILL)
+    nodes.first.wait()
+    browser.wait(lambda: "no driver" in browser.text("driver"), "the end of the driver")
+    nodes.driver(namespace=AXIS, sample_period=PERIOD, **{SCALE: 1.01e-4})
+    browser.wait(lambda: "idle" in browser.text("phase"), "the new driver, found again")
+    scan(nodes, AXIS, 110.0)
+    browser.wait(lambda: "scan" in browser.text("phase"), "its scan")
+    browser.wait(lambda: "has changed: gain" in browser.text("change"), "the alarm of the watch")
+    browser.wait(lambda: "has changed" in browser.text("alarms"), "the alarm in the list")
+
+    nodes.pause(5.0)
+    browser.click("Recalibrate …")
+    browser.wait(lambda: "gain has changed" in browser.text("question"), "the plan")
+    browser.click("Recalibrate")
+    browser.wait(lambda: "displacement_scale" in browser.text("recalibrations"), "the history")
+    browser.wait(lambda: "no change since" in browser.text("change"), "a silent watch")
+    (number,) = read_numbers((nodes.kept / FILE).read_text(), "file")
+    assert number.new / number.old == pytest.approx(1.01, abs=0.002)
+    assert f"{number.new:.6g}" in browser.text("recalibrations")
