@@ -67,6 +67,8 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
     distributed, dask = package("distributed"), package("dask")
     settings = {
         "distributed.scheduler.allowed-failures": 0,  # `dispatch` decides
+        "distributed.admin.system-monitor.interval": "5s",  # idle workers should cost nothing
+        "distributed.worker.memory.monitor-interval": "1s",
         "distributed.admin.tick.limit": "60s",  # a fit holds the interpreter for a while
         "distributed.deploy.lost-worker-timeout": "120s",  # a busy machine takes long to start a worker again
         "distributed.worker.profile.enabled": False,  # it samples the stack of a fit a hundred times a second

@@ -25,6 +25,10 @@ def test_a_folder_of_recordings(piezo, folder, tmp_path):
     again = piezo(*command)
     assert again.status == 0
     assert "1 of them with a row that is up to date" in again.out
+    page = tmp_path / "fleet.html"
+    drawn = piezo("fleet", "-o", tmp_path / "results", "--task", "validate", "--report", page)
+    assert drawn.status == 0, drawn.err
+    assert "1 of 1 recordings have a result" in page.read_text()
 
 
 @pytest.mark.parametrize(
@@ -35,6 +39,7 @@ def test_a_folder_of_recordings(piezo, folder, tmp_path):
         (("--time-limit", "0"), "--time-limit"),
         (("--workers", "0"), "--workers"),
         (("--name", "("), "regular expression"),
+        (("--report", "/nowhere/page.html"), "--report"),
     ],
 )
 def test_what_makes_no_sense_is_refused(piezo, folder, tmp_path, words, message):

@@ -70,7 +70,7 @@ def parameters_over_time(history: FleetHistory, outliers: Sequence[OutlyingStage
             handles.setdefault(label, drawn)
         axis.set_title(name)
         axis.set_ylabel(f"[{series.unit}]" if series.unit not in ("", "1") else "value")
-        _dates(axis)
+        _dates(axis, time)
     for axis in axes.flat[len(names) :]:
         axis.set_visible(False)
     legend_above(figure, handles)
@@ -109,7 +109,7 @@ def errors_over_time(history: FleetHistory) -> Drawing | None:
     axis.set_yscale("log")
     plain_log(axis.yaxis)
     axis.set_ylabel("free-run error [% of range]")
-    _dates(axis)
+    _dates(axis, history.time)
     legend_above(figure, handles)
     return Drawing(
         "errors_over_time",
@@ -183,7 +183,14 @@ def _thinned(chosen: NDArray[np.intp]) -> NDArray[np.intp]:
     return chosen[:: max(1, -(-chosen.size // POINTS))]
 
 
-def _dates(axis: Any) -> None:
+def _dates(axis: Any, time: NDArray[np.datetime64]) -> None:
+    """Label the time axis with dates; it spans two days at least."""
+    day, known = np.timedelta64(1, "D"), time[~np.isnat(time)]
+    first, last = known.min(), known.max()
+    margin = np.maximum((last - first) // 30, np.timedelta64(0, "D"))
+    if last - first < day:
+        margin = day
+    axis.set_xlim(first - margin, last + margin)
     locator = AutoDateLocator(maxticks=7)
     axis.xaxis.set_major_locator(locator)
     axis.xaxis.set_major_formatter(ConciseDateFormatter(locator))

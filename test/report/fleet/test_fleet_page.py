@@ -88,3 +88,13 @@ def test_a_page_without_any_result_is_a_page():
     page = fleet_page(h)
     assert "0 of 48 recordings have a result" in page.html
     assert page.drawings == ()
+
+
+@pytest.mark.parametrize("spread", [0, 1, 5, 400, 4000])
+def test_any_range_of_dates_has_labels(spread):
+    h = history()
+    days = np.linspace(0, spread, h.size).astype("timedelta64[D]")
+    object.__setattr__(h, "time", (np.datetime64("2026-11-03", "us") + days))
+    for drawing in fleet_page(h).drawings[:2]:
+        axis = drawing.figure.axes[0]
+        assert [label for label in axis.get_xticklabels() if label.get_text()]
