@@ -60,7 +60,7 @@ def _disk() -> Any:
 def _s3(bucket: str, endpoint: str | None, anonymous: bool) -> Any:
     """The S3 client of Arrow behind the interface of fsspec.
 
-    The usual partner of fsspec (s3fs) needs python-dateutil below 3, see docs/decisions/0022.
+    The usual partner of fsspec (s3fs) needs python-dateutil below 3, see docs/decisions/0025.
     """
     wrapper = package("fsspec.implementations.arrow").ArrowFSWrapper
     arrow = package("pyarrow.fs")
