@@ -8,6 +8,7 @@ import pytest
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.effects import Arx, BoucWen, CreepTwoRates, HysteresisMemory, LevelDependentMemory
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.steps.remaining_lag import lag
 from piezo_hysteresis.identification.structure.pieces import pieces_of
 from piezo_hysteresis.identification.structure.prior import WANDER, WANDER_TIME, WAVES, prior_of, slow_rows
 from piezo_hysteresis.model.model import Model
@@ -69,3 +70,13 @@ def test_a_drift_of_one_record_is_not_taken_for_creep(share):
     fast, slow = creeping(identify(Experiment((drifting,)), memory=True).model)
     assert fast > 0.5 * STAGE.creep_fast  # it was 0: all creep went where the drift is
     assert slow < 1.5 * STAGE.creep_slow
+
+
+def test_the_interval_of_a_lag_holds_what_one_rate_leaves_open():
+    """A pole that one slow rate does not show is part of the lag; the interval has to reach it."""
+    stage = Nanopositioner(mode=600.0, pole=1e-4, delay=1e-4)
+    record = stage.play(growing_sine(10.0, 5e-4, (0.4, 1.0)), 5e-4)
+    value, error = lag(identify(Experiment((record,)), memory=True).fit)
+    true = stage.delay + stage.pole + 2.5e-4  # the converter holds every sample
+    assert abs(value - true) < 1.96 * error
+    assert error < 3e-5

@@ -9,12 +9,19 @@ import numpy as np
 from ...effects import Creep
 from ...errors import IdentificationError
 from ..fit.fit import Fit
-from .piece_fit import Array, PieceFit, free_directions
+from .piece_fit import DELAY, POLE, Array, PieceFit, free_directions
 from .pieces import Kind, RecordPiece
+from .prior import INDEPENDENT
 from .scores import FAST, Judged
 
 OPEN = 0.4
 """Difference of scores within which another structure is possible; its parameter changes count as uncertainty."""
+
+BETWEEN_SAMPLES = 0.05
+"""Uncertainty of a delay that stands for a delay and a pole [samples].
+
+On the stages of `python -m benchmarks.rates` it is 0.02 to 0.07.
+"""
 
 
 def spread_of(full: PieceFit, final: PieceFit, chosen: Judged, judged: Sequence[Judged]) -> Array:
@@ -47,7 +54,12 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
     left = found.squares
     for weight, square, matrix, piece in zip(found.weights, left, found.matrices, counted, strict=True):
         meat += weight**2 * square / np.sqrt(piece.record.size) * matrix[:-1, :-1]
-    covariance = (inverse @ meat @ inverse)[:numbers, :numbers]
+    if DELAY in found.names and POLE not in found.names:
+        delay = found.names.index(DELAY)
+        spread = spread.copy()
+        spread[delay, delay] += BETWEEN_SAMPLES**2
+    known_to = max(1.0, found.cost) / INDEPENDENT  # the misfit holds so many independent parts, however long it is
+    covariance = (inverse @ meat @ inverse + known_to * inverse)[:numbers, :numbers]
     origins = sorted({p.origin for p in counted})
     rms = []
     for origin in origins:
