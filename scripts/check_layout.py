@@ -1,3 +1,17 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What `make lint` checks of the layout: names, sizes, docstrings of constants, rooms of contracts, commit subjects.
 
 Every finding is one line; without findings nothing is printed and the exit status is 0.
@@ -6,6 +20,7 @@ Every finding is one line; without findings nothing is printed and the exit stat
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 import tomllib
@@ -33,6 +48,8 @@ LONGER = {
     "piezo_hysteresis/online/predictor.py": 280,
 }
 """Modules that are longer, and how long they may be."""
+HEADER = 14
+"""Lines of the copyright header with the empty line after it, which do not count as lines of a module."""
 LONGEST_SUBJECT = 72
 """Characters of the first line of a commit message."""
 OUTSIDE = {
@@ -54,6 +71,7 @@ def findings() -> Iterator[str]:
     yield from long_files(list(modules))
     yield from bare_constants(modules)
     yield from incomplete_contracts(modules)
+    yield from without_header()
     yield from long_subjects()
 
 
@@ -85,7 +103,7 @@ def long_files(paths: list[Path]) -> Iterator[str]:
     """Modules with too many lines."""
     for path in paths:
         name = str(path.relative_to(ROOT))
-        lines, most = len(path.read_text(encoding="utf-8").splitlines()), LONGER.get(name, MOST_LINES)
+        lines, most = len(path.read_text(encoding="utf-8").splitlines()) - HEADER, LONGER.get(name, MOST_LINES)
         if lines > most:
             yield f"{name} has {lines} lines, expected at most {most}; split it"
 
@@ -119,6 +137,15 @@ def incomplete_contracts(modules: Iterable[Path]) -> Iterator[str]:
         named = {module.rpartition(".")[2] for module in contracts[name]["source_modules"]}
         for room in sorted(rooms - outside - named):
             yield f"pyproject.toml: contract '{name}' does not name {room}, expected every room; add it"
+
+
+def without_header() -> Iterator[str]:
+    """Files of Python or C that do not begin with the copyright header that ament_copyright looks for."""
+    command = ("git", "-C", str(ROOT), "ls-files", "*.py", "*.c", "*.h")
+    for name in subprocess.run(command, capture_output=True, text=True, check=True).stdout.split():
+        text = (ROOT / name).read_text(encoding="utf-8")
+        if text and not re.match(r"(#!.*\n)?(#|//) Copyright \d{4} .*\n.*\n.* Licensed under the Apache License", text):
+            yield f"{name} has no copyright header, expected the one of its neighbours"
 
 
 def long_subjects() -> Iterator[str]:

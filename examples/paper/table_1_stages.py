@@ -1,3 +1,17 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Table 1 on the simulated stages: free-run error of the dynamic model and of MBW alone, on sines held out of the fit.
 
 On the Bouc-Wen stage the dynamic model is as good as the sensor, 0.05 % of the full stroke. On the Prandtl-Ishlinskii
