@@ -129,7 +129,7 @@ def test_preview_is_reported_in_samples_and_seconds() -> None:
 
 
 def test_what_makes_no_sense_is_refused() -> None:
-    with pytest.raises(ModelError, match="no constant"):
+    with pytest.raises(ModelError, match="gain at dc is 0"):
         Inverse(Model((BoucWen(), Arx(b=[1.0, -1.0])), PERIOD))
     with pytest.raises(ModelError, match="static"):
         Inverse(Model((BoucWen(p2=0.0), ARX), PERIOD))

@@ -108,7 +108,7 @@ def test_the_gain_is_zero_where_the_response_makes_convergence_unsure() -> None:
     inside = np.linspace(0.0, 4000.0, 500)
     assert (found.factor(inside) <= 1.0).all()
     unsure = ResponseCheck(frequency, np.ones(6, dtype=complex), np.full(6, 0.8))
-    with pytest.raises(ModelError, match="sure at no frequency"):
+    with pytest.raises(ModelError, match="not certain at any frequency"):
         LearningFilter(PERIOD, check=unsure)
 
 

@@ -122,12 +122,18 @@ def test_what_anyone_may_publish_is_subscribed_by_the_one_who_acts_on_it(nodes):
 
 def test_every_service_is_served_as_documented(nodes):
     documented = {f"/{name}": cells[0] for name, cells in rows("Services")}
-    real = {}
-    for node in ALL_NODES:
-        for name, kinds in nodes.node.get_service_names_and_types_by_node(node, "/"):
-            if kinds[0].startswith("std_srvs"):
-                real[name] = kinds[0].replace("/srv/", "/")
-    assert real == documented
+    nodes.wait(lambda: documented.keys() <= served(nodes).keys(), "every service that is documented")
+    assert served(nodes) == documented
+
+
+def served(nodes):
+    """Services of all nodes that are not rclpy's own, with their types."""
+    return {
+        name: kinds[0].replace("/srv/", "/")
+        for node in ALL_NODES
+        for name, kinds in nodes.node.get_service_names_and_types_by_node(node, "/")
+        if kinds[0].startswith("std_srvs")
+    }
 
 
 def allowed(node):

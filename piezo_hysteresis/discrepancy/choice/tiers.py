@@ -19,13 +19,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ...effects import Creep, GainDrift
 from ...identification.protocol import excitation
 from ...identification.protocol.drive_limits import DriveLimits, Samples
 from ...identification.protocol.protocol import CORNERED, Protocol, ProtocolPhase
 
 SLOW, SLOWEST = 1e-3, 1e-2
 """Sample periods at which slow phases are stored [s]."""
-SLOW_FAMILIES = ("creep", "drift")
+SLOW_FAMILIES = (Creep.family, GainDrift.family)
 """Families that only long phases show."""
 
 

@@ -168,6 +168,8 @@ def _framed(file: BinaryIO, size: int) -> Iterator[tuple[int, bytes, bool]]:
     while len(head := file.read(_HEAD.size)) == _HEAD.size:
         opcode, length = _HEAD.unpack(head)
         left = size - file.tell()
+        if left < 0:  # the file has grown since; what came is read the next time
+            return
         yield opcode, file.read(min(length, left)), length <= left
         if length > left:
             return

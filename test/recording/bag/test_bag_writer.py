@@ -21,6 +21,7 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 import yaml
@@ -29,6 +30,7 @@ from rosbags.rosbag2 import Reader
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.recording import Bag, BagWriter
 from piezo_hysteresis.recording.bag.bag import REORDERING_HORIZON
+from piezo_hysteresis.recording.bag.mcap_file import MAGIC, McapFile
 from piezo_hysteresis.recording.bag.phase_topic import STRING, PhaseNames
 
 ROOT = Path(__file__).parents[3]
@@ -61,6 +63,24 @@ def test_metadata_are_valid_from_the_first_moment(tmp_path):
     assert list(Bag(tmp_path / "bag").messages()) == []
     bag.close()
     bag.close()
+
+
+def test_a_file_that_grows_while_it_is_read_gives_what_was_there(tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        bag.add_topic("/phase", STRING)
+        for time_ns in range(3):
+            bag.write("/phase", time_ns, PhaseNames.to_cdr(time_ns, "step"))
+    whole = next((tmp_path / "bag").glob("*.mcap")).read_bytes()
+    growing = tmp_path / "growing.mcap"
+    counts = set()
+    for cut in range(len(MAGIC), len(whole)):
+        growing.write_bytes(whole[:cut])
+        file = McapFile(growing)
+        size = growing.stat().st_size
+        growing.write_bytes(whole)
+        with patch.object(Path, "stat", lambda self, size=size: os.stat_result((0,) * 6 + (size,) + (0,) * 3)):
+            counts.add(len(list(file.messages())))
+    assert counts == {0, 1, 2, 3}
 
 
 def test_a_bag_is_never_overwritten_and_never_guessed(tmp_path):
