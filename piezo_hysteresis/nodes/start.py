@@ -20,6 +20,8 @@ import signal
 import sys
 from importlib import import_module
 
+from .runtime.interrupt import remember_interrupts
+
 ROS_PACKAGES = (
     "action_msgs", "ament_index_python", "builtin_interfaces", "diagnostic_msgs", "lifecycle_msgs", "rcl_interfaces",
     "rclpy", "sensor_msgs", "std_msgs", "std_srvs",
@@ -60,6 +62,7 @@ def page_node() -> int:
 
 
 def _run(module: str) -> int:
+    remember_interrupts()
     try:
         return int(import_module(f".{module}", __package__).main())
     except (KeyboardInterrupt, ImportError) as error:

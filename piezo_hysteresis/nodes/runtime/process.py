@@ -35,6 +35,7 @@ from rclpy.task import Future
 from ...errors import PiezoError
 from .executor import make_executor, spin_until
 from .guarded_node import GuardedNode
+from .interrupt import was_interrupted
 
 _BAD_START = (
     InvalidParameterTypeException,
@@ -101,6 +102,8 @@ def run_together(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         nodes = [(life.make(), life) for life in lives]
         stop = _signalled()
+        if was_interrupted():
+            raise KeyboardInterrupt
     except KeyboardInterrupt:
         rclpy.try_shutdown()
         return 128 + signal.SIGINT
