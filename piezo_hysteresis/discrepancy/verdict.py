@@ -74,6 +74,7 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
     if not selection.in_time and not named:
         return Verdict.UNKNOWN, "No effect is named: the time limit ended the search before an answer was found."
     names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
+    explain = "explain" if len(selection.accepted) > 1 else "explains"
     closed = selection.explained(selection.score)
     if named:
         rest = (
@@ -81,7 +82,7 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
             if gap.after <= np.sqrt(ADEQUATE) * gap.floor
             else f"an error of {gap.after / gap.floor:.1f} times the floor remains unexplained"
         )
-        said = f"The model misses {names}, which explains {100 * closed:.0f} % of the gap; {rest}."
+        said = f"The model misses {names}, which {explain} {100 * closed:.0f} % of the gap; {rest}."
         fitted = [s.best.effect.public_name() for s in selection.accepted if not s.best.effect.is_predicted_live()]
         if not selection.in_time:
             said += " The time limit ended the search, so that more may be missing."
@@ -95,7 +96,7 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
         return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
     if is_explained(selection) and is_makeshift(selection):
         message = (
-            f"{names} explains only {100 * closed:.0f} % of the gap, and a linear effect that is really "
+            f"{names} {explain} only {100 * closed:.0f} % of the gap, and a linear effect that is really "
             "there explains all of it"
         )
         return Verdict.UNKNOWN, f"No effect is named: {message}."
