@@ -14,7 +14,8 @@
 
 """An interrupt that comes while a node starts, remembered even where a library swallows its exception.
 
-A `KeyboardInterrupt` that is raised in a destructor, or where a library catches everything, is lost: the node would go on.
+A `KeyboardInterrupt` that is raised in a destructor, or where a library catches everything, is lost, and the node would
+go on.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _asked: list[int] = []
 
 
 def remember_interrupts() -> None:
-    """Keep in mind every SIGINT from now on, and raise `KeyboardInterrupt` as Python does; ignored ones stay ignored."""
+    """Remember every SIGINT from now on, and raise `KeyboardInterrupt` as Python does; ignored ones stay ignored."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _on_interrupt)
 
