@@ -29,6 +29,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .errors import PiezoError
+from .picture import draw_with
 
 if TYPE_CHECKING:
     from .discrepancy import diagnose
@@ -81,3 +82,6 @@ def __getattr__(name: str) -> Any:
     if name not in _ROOMS:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     return getattr(import_module(f".{_ROOMS[name]}", __name__), name)
+
+
+draw_with(lambda: __getattr__("plot"))

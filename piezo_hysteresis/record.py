@@ -27,6 +27,7 @@ from .channel_mapping import ChannelMapping, Samples, are_finite
 from .errors import RecordError, printable
 from .html_table import html_table
 from .notice import Notice
+from .picture import Pictured
 
 __all__ = ["Experiment", "Notice", "Record", "Samples", "are_finite"]
 
@@ -51,7 +52,7 @@ def _channel(name: str, values: ArrayLike, length: int | None) -> Samples:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Record:
+class Record(Pictured):
     """One phase of an experiment at a constant sample period.
 
     Parameters
@@ -216,7 +217,7 @@ class Record:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Experiment:
+class Experiment(Pictured):
     """Records in the order in which they were taken, and what was noticed on reading them.
 
     Raises

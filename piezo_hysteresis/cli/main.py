@@ -78,8 +78,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _print_error(error, BAD_INPUT)
     except MemoryError:
         return _print_error("the recording does not fit into memory; decimate it or give fewer rows", BAD_INPUT)
-    except KeyboardInterrupt:
-        return _print_error("interrupted", INTERRUPTED)
+    except KeyboardInterrupt as interrupt:
+        return _print_error(": ".join(["interrupted", *map(str, interrupt.args)]), INTERRUPTED)
 
 
 def _parser(chosen: str | None) -> argparse.ArgumentParser:

@@ -73,6 +73,10 @@ def run(args: argparse.Namespace) -> int:
                 played += next(durations)
 
             records = record_phases(session, ((p.name, p.voltage, p.stored_every) for p in protocol), phase_begins)
+    except KeyboardInterrupt:
+        session.close()
+        safe = f"{session.limits.name} is at its safe voltage, {session.limits.safe_voltage:g} V"
+        raise KeyboardInterrupt(f"{safe}; nothing was written") from None
     finally:
         session.close()
     recording.write(Experiment(records), args.output)

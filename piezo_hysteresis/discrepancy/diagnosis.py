@@ -23,6 +23,7 @@ from typing import Any
 from ..html_table import html_table
 from ..identification.fit.fit import Fit
 from ..model.model import Model
+from ..picture import Pictured
 from ..record import Experiment
 from .changes.change_kinds import ParameterChange
 from .gap import Gap
@@ -43,7 +44,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Diagnosis:
+class Diagnosis(Pictured):
     """Where a model is wrong, which effect it misses, and the gap after adding it.
 
     Parameters

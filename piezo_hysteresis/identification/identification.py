@@ -23,6 +23,7 @@ import numpy as np
 from ..effects import Arx
 from ..html_table import html_table
 from ..model.model import Model
+from ..picture import Picture, picture_of
 from ..record import Experiment, Notice, Samples
 from .fit.fit import Fit
 from .fit.normal_equations import Nuisance, residuals
@@ -121,6 +122,10 @@ class Identification:
     phases: tuple[PhaseError, ...]
     notices: tuple[Notice, ...]
     structure: StructureChoice | None = None
+
+    def plot(self, experiment: Experiment) -> Picture:
+        """The free run of the model against the measurement, with the residual and the 95 % band."""
+        return picture_of(self, experiment)
 
     @property
     def judged(self) -> tuple[PhaseError, ...]:

@@ -28,7 +28,8 @@ from ..effects import Discretisation, Effect, HysteresisOperator
 from ..errors import ModelError
 from ..html_table import html_table
 from ..parameter import Parameter
-from ..record import Record
+from ..picture import Picture, picture_of
+from ..record import Experiment, Record
 from .chain import Chain, ChainState, Channels
 from .chain_order import in_chain_order
 from .free_run import free_run, linearised_run, simulated, standard_errors
@@ -94,6 +95,10 @@ class Model:
     def _repr_html_(self) -> str:
         rows = ((name, f"{value:.6g}", self.row(name).unit) for name, value in self.values().items())
         return html_table(repr(self), ("parameter", "value", "unit"), rows)
+
+    def plot(self, experiment: Experiment) -> Picture:
+        """The free run against the measurement, phase by phase, with the residual and the 95 % band."""
+        return picture_of(self, experiment)
 
     def __getitem__(self, name: str) -> Effect:
         for effect in self.effects:

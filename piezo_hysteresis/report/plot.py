@@ -34,7 +34,7 @@ def plot(
 ) -> Drawing:
     """The figure that shows `what` at a glance; a notebook shows it, and `Drawing.save_picture` writes it.
 
-    It is a function of the package and no method of its classes: a record knows no figures, and without a figure
+    `Record.plot`, `Experiment.plot`, `Model.plot`, `Identification.plot` and `Diagnosis.plot` call it. Without a figure
     nothing imports matplotlib.
 
     Parameters

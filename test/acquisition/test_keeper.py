@@ -14,15 +14,18 @@
 
 """A driver that dies or stands still leaves no device energised: its keeper goes to the safe voltage, slew kept."""
 
+import json
 import os
 import signal
 import subprocess
+import sys
 import time
 
 import numpy as np
 import pytest
 
 from benchmarks.wire import PERIOD, RAMP, SAFE_WITHIN, check_wire, device, driver_process
+from piezo_hysteresis.stage.back_ends import BACK_ENDS
 
 pytestmark = pytest.mark.device
 
@@ -77,3 +80,18 @@ def test_a_driver_whose_keeper_is_killed_ends_safe(tmp_path):
         finally:
             process.kill()
             process.wait()
+
+
+@pytest.mark.parametrize("sent", [b"", b"order"])
+def test_a_keeper_whose_driver_ends_first_ends_without_a_word(sent):
+    order = {"stage": "simulated", "sample_period": 0.0, "limits": {}, "ramp_rate": 1.0}
+    order["values"] = {row.name: row.value for row in BACK_ENDS["simulated"].rows}
+    keeper = subprocess.Popen(
+        [sys.executable, "-m", "piezo_hysteresis.acquisition.safety.keeper"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    keeper.stdout.close()
+    _, said = keeper.communicate(json.dumps(order).encode() + b"\n" if sent else b"", timeout=30.0)
+    assert (keeper.returncode, said) == (0, b"")

@@ -14,10 +14,14 @@
 
 """``piezo record``: a lab without ROS plays a protocol to a stage and records it."""
 
+import signal
+
 import numpy as np
 import pytest
 
 from piezo_hysteresis import recording
+from piezo_hysteresis.acquisition.phase_recorder import record_phases
+from piezo_hysteresis.cli import record
 
 pytestmark = pytest.mark.device
 
@@ -68,3 +72,20 @@ def test_a_file_that_makes_no_sense_is_refused_in_one_line(piezo, tmp_path, text
     assert done.status == 2
     assert reason in done.err
     assert done.err.count("\n") == 1
+
+
+def test_ctrl_c_leaves_the_stage_safe_says_so_and_writes_nothing(piezo, tmp_path, monkeypatch):
+    file, folder = tmp_path / "stage.yaml", tmp_path / "experiment"
+    file.write_text(STAGE.format(memory="false"))
+    sessions = []
+
+    def interrupted(session, phases, progress):
+        sessions.append(session)
+        return record_phases(session, phases, lambda name: name == "noise" and signal.raise_signal(signal.SIGINT))
+
+    monkeypatch.setattr(record, "record_phases", interrupted)
+    done = piezo("record", file, "short", "-o", folder)
+    assert done.status == 130
+    assert done.err.strip().endswith("is at its safe voltage, 0 V; nothing was written")
+    assert sessions[0].stage.voltage == 0.0
+    assert not folder.exists()

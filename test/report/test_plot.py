@@ -56,7 +56,16 @@ def test_plot_draws_it(what):
         piezo.plot(MODEL)
 
 
+@pytest.mark.parametrize("drawn", [RECORD.plot, EXPERIMENT.plot, lambda: MODEL.plot(EXPERIMENT)])
+def test_so_do_the_methods_and_the_picture_can_be_saved(drawn, tmp_path):
+    picture = drawn()
+    assert picture.data
+    picture.save_picture(str(tmp_path / "look.png"))
+    assert (tmp_path / "look.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_without_a_figure_nothing_imports_matplotlib():
     code = "import sys, piezo_hysteresis as p; [getattr(p, n) for n in p.__all__ if n != 'plot']; "
-    command = [sys.executable, "-c", code + "sys.exit('matplotlib' in sys.modules)"]
+    code += "r = p.Record([0.0, 1.0], [0.0, 1e-6], 1.0); before = 'matplotlib' in sys.modules; r.plot(); "
+    command = [sys.executable, "-c", code + "sys.exit(before or 'matplotlib' not in sys.modules)"]
     assert subprocess.run(command, cwd=ROOT, check=False, timeout=120).returncode == 0

@@ -50,13 +50,19 @@ _BETWEEN_ATTEMPTS = 0.2
 def main() -> int:
     """Keep one stage; returns 0 where it needed nothing or was brought to its safe voltage, 1 where that failed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver makes the stage safe, and says goodbye
-    order = json.loads(sys.stdin.readline())
+    line = sys.stdin.readline()
+    if not line:
+        return 0  # the driver ended before it said what to open
+    order = json.loads(line)
     try:
         stage = _opened(order)
     except PiezoError as error:
         print(f"{' '.join(str(error).split())}", flush=True)  # noqa: T201  # the answer to the driver
         return 1
-    print(READY, flush=True)  # noqa: T201  # the answer to the driver
+    try:
+        print(READY, flush=True)  # noqa: T201  # the answer to the driver
+    except BrokenPipeError:
+        os._exit(0)  # the driver has ended; it moves nothing before the keeper has answered
     reason = _listen(order["timeout"])
     if not reason:
         os._exit(0)  # closing the stage would move it

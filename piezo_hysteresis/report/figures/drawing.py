@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,7 +85,7 @@ class Drawing:
             writer.writerow(_cell(c[i]) if i < c.size else "" for c in columns)
         return stream.getvalue()
 
-    def save_picture(self, path: Path) -> None:
+    def save_picture(self, path: str | os.PathLike[str]) -> None:
         """Write the figure alone, in the format that the ending of the path names.
 
         Raises
@@ -92,8 +93,8 @@ class Drawing:
         RecordingError
             If the ending names none, or the file cannot be written.
         """
-        if path.suffix.lower() not in (".png", ".svg", ".pdf"):
-            raise RecordingError(f"{path}: got the ending '{path.suffix}', expected .png, .svg or .pdf")
+        if (ending := Path(path).suffix).lower() not in (".png", ".svg", ".pdf"):
+            raise RecordingError(f"{path}: got the ending '{ending}', expected .png, .svg or .pdf")
         try:
             with mpl.rc_context(SETTINGS):
                 self.figure.savefig(path)
