@@ -24,7 +24,8 @@ from ...identification.identify import identify
 from ...model.model_file import dumps, loads
 from ...recording import read
 from ...report.json_file import write_json
-from ..runtime.fit_process import Outcome, Report
+from ..runtime.fit_process import Outcome
+from ..runtime.job_process import Report
 
 
 def identification(path: Path, model: str, report: Report) -> Outcome:

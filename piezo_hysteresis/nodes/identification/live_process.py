@@ -16,25 +16,22 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from ...discrepancy.choice.live_diagnosis import LiveDiagnosis, begin
-from ...errors import IdentificationError, PiezoError, RecordingError
+from ...errors import IdentificationError, RecordingError
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import ProtocolPhase
 from ...model.model_file import dumps
 from ...record import Experiment, Record
 from ...recording import read
 from ...report.json_file import write_json
-from ..runtime.fit_process import Outcome, Report, end_with_parent
+from ..runtime.fit_process import Outcome
+from ..runtime.job_process import Exchange, JobProcess, Report
 
 PATIENCE = 20.0
 """Longest wait until what was recorded has reached the file [s]."""
@@ -75,7 +72,7 @@ class Due:
     likely: str
 
 
-class LiveProcess:
+class LiveProcess(JobProcess[Due | Outcome]):
     """One live diagnosis; ends with this process.
 
     Parameters
@@ -86,79 +83,25 @@ class LiveProcess:
         Of the stage.
     settings : LiveSettings
         Of the user.
-
-    Attributes
-    ----------
-    progress : (str, float)
-        What is computed, and the fraction done.
     """
 
     def __init__(self, path: Path, limits: DriveLimits, settings: LiveSettings) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._connection, other = context.Pipe()
-        self._process = context.Process(target=_work, args=(other, path, limits, settings), daemon=True)
-        self._process.start()
-        other.close()
-        self.progress: tuple[str, float] = ("starting", 0.0)
+        super().__init__("diagnosis", _decide, path, limits, settings)
 
     def played(self, phases: Sequence[ProtocolPhase]) -> None:
         """Say that these phases, the last ones of the recording, were played."""
-        self._connection.send((len(phases), phases[-1].duration))
-
-    def poll(self) -> Due | Outcome | None:
-        """What is due next, or the outcome; None while it is being computed.
-
-        Raises
-        ------
-        IdentificationError
-            With the reason, if the diagnosis failed or its process died.
-        """
-        while self._connection.poll():
-            try:
-                message = self._connection.recv()
-            except EOFError:
-                raise IdentificationError(
-                    f"the diagnosis ended without a result (exit code {self._process.exitcode}); out of memory?"
-                ) from None
-            if isinstance(message, Due | Outcome):
-                return message
-            if isinstance(message, str):
-                raise IdentificationError(message)
-            self.progress = message
-        return None
-
-    def close(self) -> None:
-        """End the diagnosis, finished or not."""
-        self._process.terminate()
-        self._process.join()
-        self._connection.close()
+        self.send((len(phases), phases[-1].duration))
 
 
-def _work(connection: Connection, path: Path, limits: DriveLimits, settings: LiveSettings) -> None:
-    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the node, which ends this process
-    try:
-        connection.send(_decide(connection, path, limits, settings))
-    except PiezoError as error:
-        connection.send(str(error))
-    except Exception as error:
-        connection.send(f"fault of the diagnosis: {error!r}; the traceback is in the log")
-        raise
-
-
-def _decide(connection: Connection, path: Path, limits: DriveLimits, settings: LiveSettings) -> Outcome:
+def _decide(exchange: Exchange, path: Path, limits: DriveLimits, settings: LiveSettings) -> Outcome:
     live = begin(limits, error_rate=settings.error_rate, longest=settings.longest, seed=settings.seed)
-
-    def report(word: str, fraction: float) -> None:
-        connection.send((word, fraction))
-
     phases = 0
     while live.due:
         likely = live.updates[-1].sentence() if live.updates else ""
-        connection.send(Due(live.due_name, live.due, likely))
-        count, last = connection.recv()
+        exchange.send(Due(live.due_name, live.due, likely))
+        count, last = exchange.receive()
         phases += count
-        live = live.advanced(_recorded(path, phases, last, report), report)
+        live = live.advanced(_recorded(path, phases, last, exchange.report), exchange.report)
     return _outcome(live, path)
 
 

@@ -29,7 +29,8 @@ from ...model.model_file import dumps, loads
 from ...model.model_parameters import model_hash
 from ...online.change.baseline import Baseline
 from ...online.voltage_history import DriveHistory
-from ..runtime.fit_process import Outcome, Report
+from ..runtime.fit_process import Outcome
+from ..runtime.job_process import Report
 
 _MINUTE, _BASELINE = "minute.npz", "baseline.npz"
 """Files of a task."""
