@@ -167,5 +167,10 @@ def _phases(found: Identification) -> Table:
         (p.phase, f"{p.percent:.3f}", f"{1e9 * p.rms:.1f}", "fitted" if p.is_fitted else "held out")
         for p in found.phases
     )
-    note = f"Zero of the sensor free per phase. {found.free_run_percent:.3g} % of range on what judges the model."
+    judged = "phases that were not fitted" if any(not p.is_fitted for p in found.phases) else "all phases, all fitted"
+    span = 100.0 * found.free_run_error / found.free_run_percent if found.free_run_percent else 0.0
+    note = (
+        f"Zero of the sensor free per phase. Per cent of range; the range is {1e6 * span:.4g} µm, peak to peak over "
+        f"the experiment. Over {judged}, each counting the same: {found.free_run_percent:.3g} %."
+    )
     return Table("Free-run error", ("phase", "% of range", "nm", "data"), rows, note, frozenset({1, 2}))

@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         require_new_experiment("-o", args.output)
     require_new_file("--preview", args.preview)
     require_new_file("--json", args.json)
-    experiment = reading_options.read(args)
+    experiment = reading_options.read(args, rows_before=0)
     show(record_table(experiment, noise_floors(experiment.records)), notice_table(experiment))
     if args.preview is not None:
         _show_preview(experiment, Path(args.preview).expanduser())

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     from ..report.live.server import PageServer
 
     models = {} if args.model is None else {Path(args.model).stem: model_file.load(args.model)}
-    experiment = reading_options.read(args)
+    experiment = reading_options.read(args, rows_before=0)
     comparison = compare(experiment, models)
     title = f"Recording {', '.join(Path(path).name for path in args.experiment)}"
     server = PageServer(lambda document: RecordingPage(document, comparison, title), port=args.port)

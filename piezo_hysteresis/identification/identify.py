@@ -39,7 +39,7 @@ from .identified_range import identified_range
 from .one_core import on_one_core
 from .records.conditioning_split import known_from_within
 from .records.excitation_content import sensor_noise
-from .records.leading_step import steps_apart
+from .records.leading_step import begins_with_a_jump, steps_apart
 from .records.roles import HELD_OUT, Roles, roles_of
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.delay import Delay, identify_delay
@@ -59,6 +59,11 @@ FEWEST_SAMPLES = 32
 """Number of samples of the shortest record that can show a loop."""
 HIGHEST_ORDER = 10
 """Highest model order of the comparison."""
+LEADING_STEP = (
+    "the step comes with the first sample, so that no onset is read from it; the joint fit takes delay, ringing and "
+    "creep from it"
+)
+"""Message where the only step is the one with which a record begins."""
 
 
 @on_one_core
@@ -192,7 +197,7 @@ def identify(
         joint, more_notices = choose_memory(joint, records, floors, roles.fitted, roles.loops)
         notices += more_notices
     if not roles.broadband:
-        notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted])
+        notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted], rivals_counted=structure is not None)
     report("free run", 0.95)
     phases = phase_errors(joint.model, experiment, roles)
     zero = float(np.mean([e.mean() for e in residuals(joint.model, records)]))
@@ -227,7 +232,8 @@ def _delay(experiment: Experiment, roles: Roles, notices: list[Notice]) -> Delay
     try:
         delay = identify_delay(next((records for records in named if records), calm or fast))
     except IdentificationError as error:
-        notices.append(Notice("no_step", str(error), "step"))
+        jumps = any(not r.continues and begins_with_a_jump(r) for r in experiment)
+        notices.append(Notice("no_step", LEADING_STEP if jumps else str(error), "step"))
         return None
     notices += delay.notices
     return delay

@@ -31,6 +31,8 @@
 ``truncated``         a phase whose beginning is not recorded, or that begins on a branch of its loop
 ``history``           a phase before which others were played that are not recorded
 ``moved``             the drive moved in the idle before the first phase
+``step_before``       the displacement jumps with the first sample: a step from rest was not recorded
+``rows_before``       rows in front of the chosen ones were read for the state of the stage
 ``proposed``          names of phases that come from what the drive looks like
 ``averaged``          a recording too long for the memory, averaged on reading
 ``columns`` ``held``  how channels were found in a file of other software, and paired
@@ -44,7 +46,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from ..errors import RecordingError
@@ -52,14 +54,15 @@ from ..record import Experiment, Notice, Record
 from .bag.bag import Bag
 from .bag.bag_writer import BagWriter
 from .bag.rosbag2 import Rosbag2, recorded_model
-from .checks.initial_condition_check import departures, is_within_its_loop
 from .checks.quality import inspect
+from .checks.record_starts import checked_starts
 from .columns import TableColumns, experiment_from, to_columns
 from .formats.csv import Csv
 from .formats.gcs_array import GcsArrayFormat
 from .formats.known_formats import FORMATS, Format, WritableFormat
 from .formats.mat import Mat
 from .formats.npz import Npz
+from .rows_before import with_rows_before
 from .segmentation.decimation import load_decimation
 from .table.read_options import Column, ReadOptions
 
@@ -82,6 +85,7 @@ def read(
     include: Sequence[str] = (),
     average: int | None = None,
     decimate: Mapping[str, int] | None = None,
+    rows_before: int = 0,
 ) -> Experiment:
     """Read a recording, whatever its format, or several of one stage as one experiment.
 
@@ -96,6 +100,9 @@ def read(
     decimate : mapping of str to int, optional
         Phase name to the number of samples that are averaged into one on reading (`Record.decimate`); default what the
         identification node left in the folder of its bag, or nothing.
+    rows_before : int
+        Largest number of rows in front of `rows` that are read too, as a phase ``conditioning``. The stage is not
+        fitted or judged there, but its state is carried into `rows`. Without effect if `initial_voltage` is given.
 
     Returns
     -------
@@ -118,7 +125,7 @@ def read(
     notices: list[Notice] = []
     for path in paths:
         place = Path(path).expanduser()
-        found = _one(place, _format(place, format), options)
+        found = with_rows_before(partial(_one, place, _format(place, format)), options, rows_before)
         factors = load_decimation(place) if decimate is None else decimate
         by_record = [(r, factors.get(r.phase, factors.get(r.phase.split("_")[0]))) for r in found]
         records += [r if factor is None else r.decimate(factor) for r, factor in by_record]
@@ -165,34 +172,13 @@ def from_columns(
     [0.0, 2e-06, 5e-07]
     """
     options = ReadOptions(None, names or {}, units or {}, sample_period, initial_voltage)
-    experiment = _checked(experiment_from(columns, options), options)
+    experiment = checked_starts(experiment_from(columns, options), options)
     return experiment.noting(*inspect(experiment))
 
 
 def _one(place: Path, chosen: Format, options: ReadOptions) -> Experiment:
     """The experiment of one path."""
-    return _checked(chosen.read(place, options), options)
-
-
-def _checked(experiment: Experiment, options: ReadOptions) -> Experiment:
-    """What the records claim about their beginning checked."""
-    records = experiment.records
-    if records[0].continues:  # what it continues is not here
-        records = (replace(records[0], continues=False, truncated=True), *records[1:])
-        experiment = experiment.noting(Notice("truncated", _CONTINUES, records[0].phase))
-    if options.initial_voltage is not None:
-        settled = options.initial_voltage
-        records = tuple(r if r.continues or r.truncated else replace(r, initial_voltage=settled) for r in records)
-    midway = {i for i, r in enumerate(records) if is_within_its_loop(r)}
-    more_notices = [Notice("truncated", _WITHIN, records[i].phase) for i in sorted(midway)]
-    records = tuple(replace(r, truncated=True) if i in midway else r for i, r in enumerate(records))
-    came_from = departures(replace(experiment, records=records))
-    records = tuple(replace(r, initial_voltage=came_from.get(i, r.initial_voltage)) for i, r in enumerate(records))
-    if came_from:
-        phases = ", ".join(dict.fromkeys(records[i].phase for i in came_from))
-        levels = " or ".join(f"{v:.4g} V" for v in sorted(set(came_from.values())))
-        more_notices.append(Notice("in_motion", _IN_MOTION.format(phases=phases, levels=levels)))
-    return replace(experiment, records=records).noting(*more_notices)
+    return checked_starts(chosen.read(place, options), options)
 
 
 def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str | None = None) -> None:
@@ -219,15 +205,6 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     chosen.write(experiment, place)
 
 
-_WITHIN = "begins on a branch of its loop: what came before is not recorded; a settled stage needs `initial_voltage`"
-"""Message of a record that begins in motion on its loop."""
-_CONTINUES = (
-    "continues a phase that was not read: its initial state is unknown, and a simulation is wrong at first; read the "
-    "whole experiment"
-)
-"""Message of a first record that continues one which is not there."""
-_IN_MOTION = "{phases}: the first sample lies on a ramp from {levels}, taken as where the stage had settled"
-"""Message of records that begin on a ramp."""
 _BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
 """Format that the end of a name stands for."""
 

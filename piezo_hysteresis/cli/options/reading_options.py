@@ -29,6 +29,10 @@ from ...record import Experiment
 T = TypeVar("T")
 
 
+ROWS_BEFORE = 1 << 20
+"""Largest number of rows in front of ``--rows`` that are read for the state of the stage."""
+
+
 def add_arguments(parser: argparse.ArgumentParser, needs_experiment: bool = True) -> None:
     """Declare the experiment and what the file may not say about itself."""
     parser.add_argument(
@@ -70,7 +74,9 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
         type=float,
         help="drive voltage at which the stage rested before every phase [V]",
     )
-    group.add_argument("--rows", metavar="FROM:TO", help="range of rows to read, as a Python slice")
+    group.add_argument(
+        "--rows", metavar="FROM:TO", help="range of rows to read, as a Python slice; rows before it carry the state"
+    )
     group.add_argument(
         "--phase",
         metavar="[TIME=]NAME",
@@ -101,8 +107,15 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def read(args: argparse.Namespace) -> Experiment:
+def read(args: argparse.Namespace, rows_before: int = ROWS_BEFORE) -> Experiment:
     """The experiment that the arguments name.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        With the arguments of `add_arguments`.
+    rows_before : int
+        Largest number of rows in front of ``--rows`` that carry the state of the stage; 0 reads ``--rows`` alone.
 
     Raises
     ------
@@ -110,7 +123,7 @@ def read(args: argparse.Namespace) -> Experiment:
         If it cannot be read, or an option makes no sense.
     """
     try:
-        experiment = recording.read(*args.experiment, **keywords(args))
+        experiment = recording.read(*args.experiment, rows_before=rows_before, **keywords(args))
     except RecordError as error:
         raise RecordError(as_options(str(error))) from None
     except PiezoError as error:

@@ -50,6 +50,13 @@ def conditioning_length(record: Record) -> int:
     return samples if samples <= LONGEST * record.size else 0
 
 
+def covers(lead: Record, record: Record) -> bool:
+    """True where the drive of `lead` has been at both ends of the range of the drive of `record`."""
+    near = AT_THE_END * float(np.ptp(record.voltage))
+    low, high = float(lead.voltage.min()), float(lead.voltage.max())
+    return low <= float(record.voltage.min()) + near and high >= float(record.voltage.max()) - near
+
+
 def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice, ...]]:
     """Every truncated record cut in two: a conditioning phase up to the first full loop, and the rest, which continues.
 
@@ -63,6 +70,9 @@ def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice,
     records: list[Record] = []
     notices: list[Notice] = []
     for record in experiment:
+        before = records[-1] if records and record.continues else None
+        if before is not None and before.phase in CONDITIONING and before.truncated and not covers(before, record):
+            record = replace(record, truncated=True)
         samples = conditioning_length(record) if record.truncated and record.phase not in CONDITIONING else 0
         if samples:
             records.append(replace(record[:samples], phase=CONDITIONING[0]))

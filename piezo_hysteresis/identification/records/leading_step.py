@@ -49,14 +49,20 @@ def step_length(record: Record) -> int:
     >>> step_length(Record(drive, drive, 0.01, initial_voltage=0.0))
     128
     """
+    if not begins_with_a_jump(record):
+        return 0
     jump = abs(float(record.voltage[0]) - record.settled_voltage)
     speed = np.abs(np.diff(record.voltage))
-    if speed.size == 0 or jump < SUDDEN * float(np.median(speed)):
-        return 0
-    if jump < LARGE * float(np.ptp(np.append(record.voltage, record.settled_voltage))):
-        return 0
     length = 1 + int(np.searchsorted(np.cumsum(speed), jump))
     return length if FEWEST <= length < record.size - FEWEST else 0
+
+
+def begins_with_a_jump(record: Record) -> bool:
+    """True where the first voltage is far from the settled one, against the usual speed of the drive and its range."""
+    jump = abs(float(record.voltage[0]) - record.settled_voltage)
+    speed = np.abs(np.diff(record.voltage))
+    reach = float(np.ptp(np.append(record.voltage, record.settled_voltage)))
+    return bool(speed.size and jump > 0.0 and jump >= max(SUDDEN * float(np.median(speed)), LARGE * reach))
 
 
 def steps_apart(records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Blocks:

@@ -46,7 +46,7 @@ def lag(fit: Fit) -> tuple[float, float]:
     return value, float(np.sqrt(max(variance, 0.0)))
 
 
-def lag_notices(fit: Fit, contents: Sequence[ExcitationContent]) -> tuple[Notice, ...]:
+def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_counted: bool = False) -> tuple[Notice, ...]:
     """Notices ``lag_only``, and ``one_frequency`` where lag and hysteresis cannot be distinguished.
 
     Parameters
@@ -55,6 +55,8 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent]) -> tuple[Notice
         The joint fit.
     contents : sequence of Content
         Of the records that were fitted.
+    rivals_counted : bool
+        Whether the covariance of the fit holds what other plays and rates of creep would make of the lag.
     """
     value, error = lag(fit)
     highest = max(c.bandwidth for c in contents)
@@ -71,9 +73,7 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent]) -> tuple[Notice
     if max(c.lines for c in moving) <= ONE_FREQUENCY and max(c.bandwidth for c in moving) <= 1.5 * min(
         c.bandwidth for c in moving
     ):
-        message = (
-            "the drive has one frequency only, where a lag and a narrow backlash look alike; the "
-            "lag is less certain than its interval"
-        )
-        notices.append(Notice("one_frequency", message))
+        message = "the drive has one frequency only, where a lag and a narrow backlash look alike; "
+        known = "the interval of the lag holds both" if rivals_counted else "the lag is less certain than its interval"
+        notices.append(Notice("one_frequency", message + known))
     return tuple(notices)

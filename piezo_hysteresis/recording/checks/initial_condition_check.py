@@ -43,6 +43,12 @@ _APART = 0.01
 """Least difference of two displacements, share of the stroke."""
 _STRAIGHT, _NEAR = 0.1, 0.05
 """Largest relative change of the step of a ramp; tolerance of its first sample, in steps."""
+_JUMP = 0.05
+"""Least jump of the displacement behind a step that is not recorded, share of the range."""
+_STILL, _FEWEST_HELD = 1e-3, 32
+"""Range of a drive that is held, share of the range of the experiment; smallest number of samples of it."""
+_NEAR_LEVEL = 0.25
+"""Distance to a level from which such a step may have come, share of the step."""
 _AHEAD = (0.5, 1.0)
 """Samples from where a ramp begins to its first sample: for averages half of one, or a little more."""
 
@@ -97,7 +103,9 @@ def not_at_rest(record: Record) -> list[Notice]:
     opening = min(opening, max(20, record.size // 20))
     noise = _noise(y)
     few = max(1, opening // 8)
-    drift = abs(float(y[opening - few : opening].mean() - y[:few].mean()))
+    later = float(y[opening - few : opening].mean())
+    first = float(y[0]) if abs(later - y[0]) > _JUMP * y_span else float(y[:few].mean())
+    drift = abs(later - first)
     explained = 3.0 * float(np.abs(u[:opening] - u[0]).max()) * (y_span / u_span if u_span > 0.0 else 0.0)
     # creep and drift move a resting stage too: only what is large against the phase contradicts rest
     if drift <= explained + _NOISE * noise / np.sqrt(few) + (0.05 * y_span if u_span > 0.0 else np.inf):
@@ -113,6 +121,46 @@ def not_at_rest(record: Record) -> list[Notice]:
 
 def _noise(displacement: Samples) -> float:
     return float(np.median(np.abs(np.diff(displacement, 2)))) / 2.4
+
+
+def steps_from(experiment: Experiment) -> dict[int, float]:
+    """Records whose displacement jumps while the drive is held from the first sample, with the level [V] of before.
+
+    The stage follows a step that the record does not show. The jump and the gain of the stage give the level; it has to
+    be near 0 V, or near a level at which other records rest when they begin.
+    """
+    found: dict[int, float] = {}
+    driven = max(experiment, key=lambda r: float(np.ptp(r.voltage)))
+    begins = _held(driven, float(np.ptp(driven.voltage)))
+    moving = driven[begins if begins < driven.size else 0 :]
+    u_span, y_span = float(np.ptp(moving.voltage)), float(np.ptp(moving.displacement))
+    if u_span == 0.0 or y_span == 0.0:
+        return found
+    along = np.dot(moving.voltage - moving.voltage.mean(), moving.displacement)
+    gain = float(np.sign(along)) * y_span / u_span
+    for i, record in enumerate(experiment):
+        if record.continues or record.truncated or record.initial_voltage is not None:
+            continue
+        u, y = record.voltage[:_EXCERPT], record.displacement[:_EXCERPT]
+        held = _held(record, u_span)
+        if held < _FEWEST_HELD:
+            continue
+        jump = float(np.median(y[held // 2 : held])) - float(y[0])
+        if abs(jump) < _JUMP * y_span + _NOISE * _noise(y):
+            continue
+        level = float(u[0]) - jump / gain
+        others = [r.settled_voltage for k, r in enumerate(experiment) if k != i and r.initial_voltage is not None]
+        nearest = min((0.0, *others), key=lambda v: abs(v - level))
+        if abs(nearest - level) < _NEAR_LEVEL * abs(jump / gain):
+            found[i] = nearest
+    return found
+
+
+def _held(record: Record, span: float) -> int:
+    """Samples from the first one on in which the drive stays where it is; `span` is the range of the drive [V]."""
+    u = record.voltage[:_EXCERPT]
+    moved = np.flatnonzero(np.abs(u - u[0]) > _STILL * span)
+    return int(moved[0]) if moved.size else u.size
 
 
 def departures(experiment: Experiment) -> dict[int, float]:

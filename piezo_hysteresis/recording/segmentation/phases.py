@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import RecordingError
-from ...record import Notice, Record, Samples
+from ...record import Experiment, Notice, Record, Samples
 from .levels import LARGEST_NOISE, Piece, pieces_of
 from .waveform import phase_name, turning_points
 
@@ -71,6 +71,23 @@ def labelled(
         said += [f"{name} from {part.start_time + start * part.sample_period:.6g} s" for start, name in proposal]
     more = f" and {len(said) - 12} more" if len(said) > 12 else ""
     return records, [Notice("proposed", f"the phases were named by their drive: {', '.join(said[:12])}{more}")]
+
+
+def steps_named(experiment: Experiment) -> Experiment:
+    """An experiment in which a proposed ``rest`` that begins with a step from another voltage is called ``step``."""
+    notices = list(experiment.notices)
+    records = list(experiment.records)
+    span = max(float(np.ptp(np.append(r.voltage, r.settled_voltage))) for r in records)
+    for i, record in enumerate(records):
+        if record.phase != "rest" or record.continues or record.truncated:
+            continue
+        proposed = f"rest from {record.start_time:.6g} s"
+        at = next((k for k, n in enumerate(notices) if n.kind == "proposed" and proposed in n.message), None)
+        if at is None or abs(float(record.voltage[0]) - record.settled_voltage) <= LARGEST_NOISE * span:
+            continue
+        records[i] = replace(record, phase="step")
+        notices[at] = replace(notices[at], message=notices[at].message.replace(proposed, f"step{proposed[4:]}", 1))
+    return replace(experiment, records=tuple(records), notices=tuple(notices))
 
 
 def _named(parts: Sequence[Record], phases: Sequence[tuple[float, str]]) -> list[Record]:

@@ -179,10 +179,13 @@ def test_a_sensor_that_hangs_is_stuck():
     assert "stuck" in kinds(Record(drive, y, PERIOD, "sine_5hz"))
 
 
-def test_one_sample_of_a_ring_down_makes_no_recording_worthless():
+def test_a_ring_down_holds_no_drop_outs():
     y = 1.665e-5 + 5e-9 * np.random.default_rng(1).normal(size=600)
     y[:4] = 1.7256e-5, 1.6750e-5, 1.6473e-5, 1.6803e-5
-    assert not any(n.severe for n in found("dropout", Record(3.5 + 1e-3 * np.arange(600), y, 1e-3, "hold")))
+    assert "dropout" not in kinds(Record(3.5 + 1e-3 * np.arange(600), y, 1e-3, "hold"))
+    time = 1e-4 * np.arange(4000)
+    y = 1e-5 * (1.0 - np.exp(-100.0 * time) * np.cos(2.0 * np.pi * 1000.0 * time))
+    assert "dropout" not in kinds(Record(5.0 + time, y, 1e-4, "x", initial_voltage=0.0))
 
 
 @pytest.mark.parametrize("length", [1, 7, 40])
@@ -332,3 +335,48 @@ def test_a_record_that_begins_on_a_branch_of_its_loop_does_not_claim_rest(tmp_pa
     assert experiment[0].truncated
     assert any(n.kind == "truncated" for n in experiment.notices)
     assert not read(tmp_path / "within", initial_voltage=3.5)[0].truncated
+
+
+def ringing(size=6000, hold=2000):
+    """A step from 0 to 5 V with the first sample, a hold, a sine; a stage that follows late and rings."""
+    time = 1e-4 * np.arange(size)
+    drive = 5.0 + np.where(np.arange(size) < hold, 0.0, 4.0 * np.sin(2.0 * np.pi * 10.0 * (time - time[hold])))
+    y = 3e-6 * drive - 1.5e-5 * np.exp(-50.0 * time) * np.cos(2.0 * np.pi * 600.0 * time)
+    return drive, y + 2e-9 * np.random.default_rng(2).normal(size=size)
+
+
+def test_a_step_before_the_first_sample_is_found_and_named(tmp_path):
+    drive, y = ringing()
+    path = tmp_path / "lab.csv"
+    table = np.c_[1e-4 * np.arange(drive.size), drive, 1e6 * y]
+    np.savetxt(path, table, delimiter=",", header="time_s,voltage_V,displacement_um", comments="")
+    inferred, stated = read(path), read(path, initial_voltage=0.0)
+    for experiment in (inferred, stated):
+        assert [r.phase for r in experiment] == ["step", "sine_10hz"]
+        assert experiment[0].settled_voltage == 0.0
+    assert [n.kind for n in inferred.notices].count("step_before") == 1
+    assert not any(n.kind == "step_before" for n in stated.notices)
+
+
+def test_a_jump_that_no_known_level_explains_is_told():
+    drive, y = ringing()
+    assert "not_at_rest" in kinds(Record(drive, y, 1e-4, "x"))
+    assert "not_at_rest" not in kinds(Record(drive[2000:], y[2000:], 1e-4, "x"))
+
+
+def test_rows_carry_what_the_rows_before_them_say(tmp_path):
+    drive, y = ringing()
+    path = tmp_path / "lab.csv"
+    table = np.c_[1e-4 * np.arange(drive.size), drive, 1e6 * y]
+    np.savetxt(path, table, delimiter=",", header="time_s,voltage_V,displacement_um", comments="")
+    np.savetxt(tmp_path / "bare.csv", table[:, 1:], delimiter=",", header="voltage_V,displacement_um", comments="")
+    for file, period in ((path, None), (tmp_path / "bare.csv", 1e-4)):
+        lead, wanted = read(file, rows=(3000, 5000), rows_before=1 << 20, sample_period=period)
+        assert (lead.phase, lead.size, lead.settled_voltage) == ("conditioning", 3000, 0.0)
+        assert wanted.continues and not wanted.truncated and wanted.size == 2000
+        assert wanted.start_time == pytest.approx(0.3)
+        capped, _ = read(file, rows=(3000, 5000), rows_before=100, sample_period=period)
+        assert capped.size == 100 and capped.truncated
+        assert len(read(file, rows=(3000, 5000), sample_period=period)) == 1
+        settled = {"initial_voltage": 0.0, "sample_period": period}
+        assert len(read(file, rows=(3000, 5000), rows_before=1 << 20, **settled)) == 1

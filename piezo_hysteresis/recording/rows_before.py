@@ -1,0 +1,58 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rows in front of the chosen ones: they bring the model into the state in which the stage was at the first one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ..record import Experiment, Notice
+from .table.read_options import ReadOptions
+
+CONDITIONING = "conditioning"
+"""Phase of rows that only bring the stage into a known state."""
+
+
+def with_rows_before(read: Callable[[ReadOptions], Experiment], options: ReadOptions, most: int) -> Experiment:
+    """The rows that `options` choose, behind a phase ``conditioning`` of the rows before them.
+
+    Parameters
+    ----------
+    read : callable
+        Reads one recording as options say.
+    options : ReadOptions
+        With its `rows`. Where they begin with the first one, or are counted from the end, or `initial_voltage` is
+        given, nothing is read before them.
+    most : int
+        Largest number of rows before.
+    """
+    wanted = read(options)
+    first, _ = options.from_the_beginning
+    count = min(first, most)
+    count -= count % (options.average or 1)
+    if not (count and wanted[0].truncated and options.passes_over):
+        return wanted
+    lead = read(replace(options, rows=(first - count, first), phases=CONDITIONING))
+    ahead = [replace(r, phase=CONDITIONING, truncated=r.truncated or first > count) for r in lead]
+    end = ahead[-1].start_time + ahead[-1].duration
+    has_no_clock = wanted[0].start_time == ahead[0].start_time
+    if not has_no_clock and abs(wanted[0].start_time - end) > 0.5 * wanted[0].sample_period:
+        return wanted
+    first_wanted = replace(wanted[0], continues=True, truncated=False)
+    later = end - wanted[0].start_time if has_no_clock else 0.0
+    behind = (replace(r, start_time=r.start_time + later) for r in (first_wanted, *wanted.records[1:]))
+    message = f"the {count} rows before were read for the state of the stage; they are not fitted and not judged"
+    return replace(wanted, records=(*ahead, *behind)).noting(Notice("rows_before", message, wanted[0].phase))
