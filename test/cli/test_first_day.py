@@ -247,6 +247,20 @@ def test_three_phases_in_one_file_become_three(tmp_path):
     assert names == ["sine_2hz", "triangle", "staircase"]
 
 
+def test_so_do_three_waveforms_without_rests(tmp_path):
+    t = np.arange(4000) * 1e-3
+    drive = np.concatenate(
+        (5 - 5 * np.cos(4 * np.pi * t), np.interp(t % 1, [0, 0.5, 1], [0, 8, 0]), 4 - 4 * np.cos(40 * np.pi * t))
+    )
+    rows = np.column_stack((np.arange(drive.size) * 1e-3, drive, 5.0 * drive))
+    path = table(tmp_path / "three.csv", "time_s,voltage_V,displacement_um\n", rows)
+    done = piezo("import", path, "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    records = recording.read(tmp_path / "out").records
+    assert [(r.phase, r.continues) for r in records] == [("sine_2hz", False), ("triangle", True), ("sine_20hz", True)]
+    assert "sine_2hz from 0 s, triangle from 4 s, sine_20hz from 8 s" in done.stdout
+
+
 def test_help_of_emulate_names_the_ports():
     said = " ".join(piezo("emulate", "--help").stdout.split())
     assert "default: 50000 for gcs2, 31763 for nidaqmx" in said

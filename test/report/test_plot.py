@@ -60,6 +60,7 @@ def test_plot_draws_it(what):
 def test_so_do_the_methods_and_the_picture_can_be_saved(drawn, tmp_path):
     picture = drawn()
     assert picture.data
+    assert len(repr(picture)) < 200
     picture.save_picture(str(tmp_path / "look.png"))
     assert (tmp_path / "look.png").read_bytes().startswith(b"\x89PNG")
 

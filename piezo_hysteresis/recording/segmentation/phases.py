@@ -26,6 +26,7 @@ from ...errors import RecordingError
 from ...record import Experiment, Notice, Record, Samples
 from .levels import LARGEST_NOISE, Piece, pieces_of
 from .waveform import phase_name, turning_points
+from .waveform_changes import waveform_changes
 
 _JUMP = 0.05
 """Length of the movements over that of the levels up to which the movements are jumps."""
@@ -126,6 +127,7 @@ def propose(voltage: Samples, sample_period: float) -> list[tuple[int, str]]:
     list of (int, str)
         The first one starts at sample 0. Constant drive is ``rest`` at the first level and ``hold`` at others; levels
         with transitions between them are ``step``, ``steps`` (two levels), ``staircase``, ``ramp`` or ``trapezoid``.
+        A movement is cut where its waveform changes.
     """
     pieces = pieces_of(voltage)
     proposal: list[tuple[int, str]] = []
@@ -140,15 +142,20 @@ def propose(voltage: Samples, sample_period: float) -> list[tuple[int, str]]:
             i = end
             continue
         if piece.moves:
-            name = phase_name(voltage[piece.start : piece.stop], sample_period)
+            proposal += _movement(voltage[piece.start : piece.stop], piece.start, sample_period)
         else:
             near = abs(piece.level - first_level) <= LARGEST_NOISE * np.ptp(voltage)
-            name = "rest" if near else "hold"
-        proposal.append((piece.start, name))
+            proposal.append((piece.start, "rest" if near else "hold"))
         i += 1
     if len(proposal) > _MOST:
         return [(0, phase_name(voltage, sample_period))]
     return [(0, proposal[0][1]), *proposal[1:]]
+
+
+def _movement(voltage: Samples, start: int, sample_period: float) -> list[tuple[int, str]]:
+    """First sample and name of every waveform of a movement that begins at `start`."""
+    edges = [0, *waveform_changes(voltage), voltage.size]
+    return [(start + a, phase_name(voltage[a:b], sample_period)) for a, b in itertools.pairwise(edges)]
 
 
 def _chain_end(pieces: list[Piece], i: int, voltage: Samples) -> int:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ...record import Samples
 
-_POINTS = 40_000
+COARSEST = 40_000
 """Samples in which turning points are searched one by one."""
 _LEAST_SWING = 0.05
 """Least swing of a turning point, share of the range."""
@@ -75,9 +75,9 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
         return "steps"
     if _is_chirp(wave):
         return "chirp"
-    if np.median(np.diff(turns)) < 8 * (voltage.size // _POINTS):  # too fast for the coarse turning points
+    if np.median(np.diff(turns)) < 8 * (voltage.size // COARSEST):  # too fast for the coarse turning points
         middle = wave.size // 2
-        voltage = wave[max(0, middle - _POINTS // 2) : middle + _POINTS // 2]
+        voltage = wave[max(0, middle - COARSEST // 2) : middle + COARSEST // 2]
         turns = turning_points(voltage, _LEAST_SWING * span)
     straight = _straightness(voltage, turns)
     reversals = turns[1:-1]  # the ends of the record are none
@@ -107,15 +107,15 @@ def sine_name(frequency: float) -> str:
 def turning_points(voltage: Samples, least_swing: float) -> NDArray[np.int64]:
     """Positions of the first sample, of every reversal by at least `least_swing` [V], and of the last sample."""
     positions = np.arange(voltage.size)
-    if voltage.size > _POINTS:
-        length = 2 * voltage.size // _POINTS
+    if voltage.size > COARSEST:
+        length = 2 * voltage.size // COARSEST
         blocks = voltage[: voltage.size // length * length].reshape(-1, length)
         extremes = np.stack((blocks.argmin(axis=1), blocks.argmax(axis=1)), axis=1)
         extremes.sort(axis=1)
         positions = np.append((extremes + length * np.arange(len(blocks))[:, None]).ravel(), voltage.size - 1)
     found = [0]
     candidate, direction = 0, 0
-    values = voltage.tolist() if voltage.size <= _POINTS else None
+    values = voltage.tolist() if voltage.size <= COARSEST else None
     for position in positions.tolist():
         value = values[position] if values else voltage[position]
         best = values[candidate] if values else voltage[candidate]

@@ -65,6 +65,9 @@ class Drawing:
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")  # found once, kept for every format
 
+    def __repr__(self) -> str:
+        return f"Drawing({self.name}: {self.alternative})"
+
     def svg(self) -> str:
         """The figure as SVG text, the same for the same data."""
         stream = io.StringIO()
