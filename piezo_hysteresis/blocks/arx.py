@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..c_form import HISTORY, CForm
-from .block import Array, State
+from .block import Array, Section, State
 from .kernel import fma, kernel
-from .linear import LinearBlock, Section
+from .linear import LinearBlock
 
 ORDER = 8
 """Taps and feedback go in groups of this many, padded with zeros: eight numbers stay in registers."""

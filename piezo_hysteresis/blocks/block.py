@@ -28,10 +28,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..c_form import CForm
+from ..inverse_terms import InverseStart, InverseTerms, started_together, summed
 
 Array = NDArray[np.float64]
 State = Any
 """Opaque to everyone but the block that made it."""
+Section = tuple[Array, Array]
+"""Numerator and denominator of a transfer function, in powers of z⁻¹; the denominator begins with 1."""
 
 
 class Block(ABC):
@@ -80,6 +83,18 @@ class Block(ABC):
     def c_form(self) -> CForm | str:
         """The block as C code, equal to `run`; or the reason why there is none, for a message."""
         return "has no C form"
+
+    def sections(self) -> tuple[Section, ...]:
+        """Transfer functions in series that the block is; none if it is not linear, or has no finite ones."""
+        return ()
+
+    def inverse_terms(self) -> InverseTerms | None:
+        """What the block contributes to the inverse of drive, hysteresis and creep; None if it has no place there."""
+        return None
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        """State of that inverse, from the last input of the block and its state after it."""
+        return InverseStart()
 
 
 class MemorylessBlock(Block):
@@ -144,6 +159,12 @@ class SumBlock(Block):
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         outputs, states = zip(*(m.run(x, s) for m, s in zip(self.members, state, strict=True)), strict=True)
         return sum(outputs[1:], outputs[0]), states
+
+    def inverse_terms(self) -> InverseTerms | None:
+        return summed([m.inverse_terms() for m in self.members])
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        return started_together([m.inverse_start(x, s) for m, s in zip(self.members, state, strict=True)])
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
         return tuple(m.rest_tangent(x0, dx0) for m in self.members)

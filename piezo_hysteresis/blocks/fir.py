@@ -19,8 +19,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..c_form import HISTORY, CForm
-from .block import Array, State
-from .linear import AddedBlock, Section
+from .block import Array, Section, State
+from .linear import AddedBlock
 
 STEP = """\
 const double *u = remember(s->inputs, INPUTS, &s->newest, x - s->x_rest);

@@ -22,9 +22,6 @@ import numpy as np
 
 from .block import Array, Block, State
 
-Section = tuple[Array, Array]
-"""Numerator and denominator of a transfer function, in powers of z⁻¹; the denominator begins with 1."""
-
 
 class LinearBlock(Block):
     """Linear dynamics acting on the deviation from the rest point: y = K·x0 + filter(x − x0).

@@ -19,9 +19,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..c_form import CForm
-from .block import Array, State
+from ..inverse_terms import InverseStart, InverseTerms
+from .block import Array, Section, State
 from .kernel import kernel
-from .linear import AddedBlock, Section
+from .linear import AddedBlock
 from .relaxation import hold
 
 
@@ -113,6 +114,13 @@ class LowPassBlock(AddedBlock):
         numbers = {"POLES": self.count, "left": left, "lead": lead, "back": back}
         state = ("double x_rest", f"double z[{1 + self.count}]")
         return CForm(STEP, "memset(s, 0, sizeof *s);\ns->x_rest = x;\nreturn x;", numbers, state)
+
+    def inverse_terms(self) -> InverseTerms | None:
+        return InverseTerms(dict(zip(("left", "lead", "back"), self.step, strict=True))) if self.count == 1 else None
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        x0, z = state
+        return InverseStart({"slewed": x0 + z[0, 0], **dict.fromkeys(("pole", "held", "pushed"), x0 + z[0, 1])})
 
     def own_rest(self) -> State:
         return np.zeros(1 + self.count)

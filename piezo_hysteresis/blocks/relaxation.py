@@ -21,7 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..c_form import CForm, Number
-from .block import Array
+from ..inverse_terms import InverseStart, InverseTerms, RelaxationTerms
+from .block import Array, State
 from .kernel import kernel
 from .linear import AddedBlock
 
@@ -151,6 +152,15 @@ class RelaxationBlock(AddedBlock):
         numbers |= {"direct": float(self.mix[0]), "weight": self.mix[1:]}
         state = ("double x_rest, last", f"double z[{self.mix.size - 1}]")
         return CForm(STEP, "memset(s, 0, sizeof *s);\ns->x_rest = x;\nreturn x + gain * x;", numbers, state)
+
+    def inverse_terms(self) -> InverseTerms:
+        direct, weights = float(self.mix[0]), self.mix[1:]
+        own = RelaxationTerms(direct, self.hold.fade, self.hold.lead, weights, self.gain)
+        return InverseTerms(relaxations=own)
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        x0, z = state
+        return InverseStart(relaxations=(x0 + z[0, 0], x0 + z[0, 1:]))
 
     def gain_slopes(self) -> Array:
         return self.mix_slopes.sum(axis=1)

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..c_form import CForm
+from ..inverse_terms import InverseTerms
 from .block import Array, MemorylessBlock, State
 from .kernel import kernel
 
@@ -64,3 +65,6 @@ class ChangeOfUnit(MemorylessBlock):
 
     def c_form(self) -> CForm:
         return CForm("return factor * x;", numbers={"factor": self.factor})
+
+    def inverse_terms(self) -> InverseTerms:
+        return InverseTerms({"per_volt": self.factor})

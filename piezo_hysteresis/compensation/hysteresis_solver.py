@@ -27,11 +27,10 @@ from math import copysign
 from ..blocks.bouc_wen_kernel import BETA, GAMMA, A, general_step, plain_step
 from ..blocks.kernel import fma, inlined
 from ..effects.hysteresis.published_bouc_wen import step as published_step
+from ..inverse_terms import GENERAL, NO_LOOP, PLAIN, PUBLISHED
 
-NO_LOOP, PLAIN, GENERAL, PUBLISHED = range(4)
-"""Kinds of loop: none, n = 1 without terms, with terms, the explicit step of Eq. (7)."""
 P1, P2, SQUARE, FOURTH = range(4)
-"""Numbers of the static polynomial: of v³, v, v² and v⁴."""
+"""Numbers of the static polynomial, in the order of `POLYNOMIAL`: of v³, v, v² and v⁴."""
 ROUNDING = 1e-15
 """Share of w, and of v, below which a difference is rounding."""
 NEWTON = 6

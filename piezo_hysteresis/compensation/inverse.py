@@ -22,30 +22,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..blocks.arx import ArxBlock
-from ..blocks.block import Block, State, SumBlock
+from ..blocks.block import Block, State
 from ..blocks.channel_addition import ChannelBlock
-from ..blocks.fir import FirBlock
-from ..blocks.low_pass import LowPassBlock
 from ..blocks.scaling import ChangeOfUnit
 from ..blocks.softening.mode_path import WholePath
 from ..blocks.softening.softened_arx import SoftenedArxBlock
 from ..blocks.time import TimeBlock
 from ..c_form import CForm
 from ..effects import Invertibility
-from ..effects.dynamics.extra_resonance import ModeBlock
 from ..effects.environment.mains_hum import MainsHumBlock
 from ..effects.sensor.gain_drift import GainDriftBlock
 from ..effects.sensor.offset import OffsetBlock
 from ..effects.sensor.sensor_nonlinearity import SensorNonlinearityBlock
 from ..errors import ModelError
+from ..inverse_terms import InverseTerms
 from ..model.chain import Chain, ChainState
 from ..model.model import Model
 from ..model.samples import samples
 from . import inverted_block as t
 from .band import Band
 from .limits import Limits
-from .nonlinear_part import KINDS, NonlinearPart, RecursionState
+from .nonlinear_part import NonlinearPart, RecursionState
 
 Array = NDArray[np.float64]
 
@@ -128,8 +125,9 @@ class Inverse:
         self.chain: Chain = kept.at(model.sample_period)
         self.not_on_path = tuple(e.name for e in model.effects if e.invertibility is Invertibility.NOT_NEEDED)
         blocks, labels = self.chain.blocks, self.chain.labels
-        self._nonlinear_end = _end_of_nonlinear_part(blocks, labels.index("voltage_scale"))
-        self._nonlinear = NonlinearPart(blocks[: self._nonlinear_end], self.limits, self.sample_period)
+        terms = _terms_of_nonlinear_part(blocks, labels)
+        self._nonlinear_end = len(terms)
+        self._nonlinear = NonlinearPart(terms, self.limits, self.sample_period)
         after = list(zip(labels, blocks, strict=True))[self._nonlinear_end :]
         own = [(self._nonlinear_end + k, _stage(b, label)) for k, (label, b) in enumerate(after)]
         inverted: list[tuple[int | None, t.InvertedBlock]] = [(k, stage) for k, stage in own[::-1] if stage is not None]
@@ -154,12 +152,6 @@ class Inverse:
     def resume(self, state: ChainState) -> InverseState:
         """State of the inverse for a stage whose model is in `state`; the dynamics are taken as settled."""
         end = self._nonlinear_end
-        inputs: list[float] = []
-        own: list[State] = []
-        for block, x, one in zip(self.chain.blocks[:end], state.inputs[:end], state.blocks[:end], strict=True):
-            count = len(block.members) if isinstance(block, SumBlock) else 1
-            inputs += [x] * count
-            own += list(one) if isinstance(block, SumBlock) else [one]
         started = tuple(
             stage.start(state.inputs[-1] if k is None else state.inputs[k], None if k is None else state.blocks[k])
             for k, stage in self._stages
@@ -168,7 +160,8 @@ class Inverse:
             last = len(self.chain.blocks) - 1
             reading = self.chain.blocks[last].static(state.inputs[last])
             started = (self._stages[0][1].start(reading, None), *started[1:])
-        return InverseState(started, self._nonlinear.start(inputs, own), state.time, 0)
+        nonlinear = self._nonlinear.start(self.chain.blocks[:end], state.inputs[:end], state.blocks[:end])
+        return InverseState(started, nonlinear, state.time, 0)
 
     def run(self, wanted: ArrayLike, state: InverseState) -> tuple[Array, InverseState]:
         """Drive voltage [V] of the next samples, and the state after them.
@@ -217,12 +210,23 @@ class Inverse:
         return found | {"drive": (0, self._nonlinear.c_form())}
 
 
-def _end_of_nonlinear_part(blocks: Sequence[Block], scale: int) -> int:
-    """Index of the first block after drive, hysteresis and creep."""
-    return next(
-        (k for k, b in enumerate(blocks) if k > scale and (isinstance(b, ChangeOfUnit) or not isinstance(b, KINDS))),
-        len(blocks),
-    )
+def _terms_of_nonlinear_part(blocks: Sequence[Block], labels: Sequence[str]) -> list[InverseTerms]:
+    """Terms of drive, hysteresis and creep: of all blocks up to the first that belongs to the dynamics.
+
+    Raises
+    ------
+    ModelError
+        If a block of the drive has no terms.
+    """
+    scale, terms = labels.index("voltage_scale"), list[InverseTerms]()
+    for k, block in enumerate(blocks):
+        own = block.inverse_terms()
+        if own is None and k < scale:
+            raise _without_inverse(block, labels[k])
+        if own is None or (k > scale and own.drive):
+            break
+        terms.append(own)
+    return terms
 
 
 def _stage(block: Block, label: str) -> t.InvertedBlock | None:
@@ -235,7 +239,7 @@ def _stage(block: Block, label: str) -> t.InvertedBlock | None:
     """
     if isinstance(block, ChannelBlock | MainsHumBlock):
         return None
-    if isinstance(block, ArxBlock | FirBlock | LowPassBlock | ModeBlock):
+    if block.sections():
         return t.InvertedLinear(block, block.sections(), label)
     if isinstance(block, SoftenedArxBlock) and isinstance(block.path, WholePath):
         return t.InvertedSoftening(block, label)
@@ -249,4 +253,8 @@ def _stage(block: Block, label: str) -> t.InvertedBlock | None:
         return t.InvertedAddition(block)
     if isinstance(block, OffsetBlock):
         return t.InvertedOffset(block)
-    raise ModelError(f"{label}: {type(block).__name__} has no inverse; expected a block that compensation can invert")
+    raise _without_inverse(block, label)
+
+
+def _without_inverse(block: Block, label: str) -> ModelError:
+    return ModelError(f"{label}: {type(block).__name__} has no inverse; expected a block that compensation can invert")

@@ -22,9 +22,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.block import Block, State
+from ..blocks.block import Block, Section, State
 from ..blocks.kernel import kernel
-from ..blocks.linear import Section
 from ..blocks.softening.softened_arx import SoftenedArxBlock, force
 from ..blocks.softening.softened_arx_c import FORCE, FORCE_FOR, SETTLE
 from ..blocks.time import TimeBlock

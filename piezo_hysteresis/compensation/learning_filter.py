@@ -21,19 +21,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.arx import ArxBlock
-from ..blocks.fir import FirBlock
-from ..blocks.linear import Section
-from ..blocks.low_pass import LowPassBlock
-from ..effects.dynamics.extra_resonance import ModeBlock
-from ..errors import ModelError, ParameterError
+from ..errors import ModelError
 from ..model.model import Model
+from ..model.parameter_covariance import response_error
 
 Array = NDArray[np.float64]
-Response = NDArray[np.complex128]
-
-STEP = 1e-3
-"""Step of a parameter for the numerical derivative of the response, in units of its standard error."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -73,15 +65,8 @@ class ResponseCheck:
         known = model.covariance
         if known is None:
             return None
-        z = np.exp(-2j * np.pi * frequency * model.sample_period)
-        values, matrix = model.values(), known.matrix
-        slopes = np.zeros((len(known.names), z.size), dtype=np.complex128)
-        for row, name in enumerate(known.names):
-            step = STEP * float(np.sqrt(matrix[row, row]))
-            if name in values and step > 0.0:
-                slopes[row] = _relative_slope(model, name, values[name], step, z)
-        variance = np.einsum("ki,kl,li->i", slopes.conj(), matrix, slopes).real
-        return cls(frequency, np.ones_like(z), np.sqrt(np.maximum(variance, 0.0)))
+        deviation = response_error(model, known.names, known.matrix, frequency)
+        return cls(frequency, np.ones(frequency.size, dtype=np.complex128), deviation)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -183,29 +168,3 @@ class LearningFilter:
         now = max(0.0, np.sum(signal[in_band]))
         scale = 2.0 / size**2
         return correction, float(np.sqrt(scale * left)), float(np.sqrt(scale * now))
-
-
-def _relative_slope(model: Model, name: str, value: float, step: float, z: Response) -> Response:
-    """Slope of the logarithm of the response with a number, at z = exp(−jωT), in powers of which the sections stand.
-
-    The coefficients of the sections are linear in most numbers, and the response is not: near a slow pole, whose
-    denominator nearly vanishes, only their slopes can be taken by a finite step.
-    """
-    try:
-        moved = model.with_values({name: value + step})
-    except ParameterError:  # at its bound
-        step = -step
-        moved = model.with_values({name: value + step})
-    total = np.zeros_like(z)
-    for own, other in zip(_sections(model), _sections(moved), strict=True):
-        for sign, now, then in zip((1.0, -1.0), own, other, strict=True):
-            slope = np.polysub(then[::-1], now[::-1]) / step if then.size == now.size else np.zeros(1)
-            total = total + sign * np.polyval(slope, z) / np.polyval(now[::-1], z)
-    return total
-
-
-def _sections(model: Model) -> list[Section]:
-    """Of all linear dynamics of the chain."""
-    blocks = model.at(model.sample_period).blocks
-    kinds = ArxBlock | FirBlock | LowPassBlock | ModeBlock
-    return [section for block in blocks if isinstance(block, kinds) for section in block.sections()]

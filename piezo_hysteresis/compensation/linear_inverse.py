@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..blocks.arx import arx_row, difference_equation, padded
-from ..blocks.linear import Section
+from ..blocks.block import Section
 from ..c_form import CForm
 from ..errors import ModelError
 from .factors import factors, preview_taps, zero_phase_taps

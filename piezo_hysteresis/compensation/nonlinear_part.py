@@ -12,7 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`NonlinearPart`: creep, hysteresis, amplifier and limits of a chain, which are inverted together."""
+"""`NonlinearPart`: creep, hysteresis, amplifier and limits of a chain, which are inverted together.
+
+What a block contributes it states itself: `Block.inverse_terms`.
+"""
 
 from __future__ import annotations
 
@@ -22,21 +25,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.block import Block, State, SumBlock
-from ..blocks.low_pass import LowPassBlock
-from ..blocks.relaxation import RelaxationBlock
-from ..blocks.scaling import ChangeOfUnit
+from ..blocks.block import Block, State
 from ..c_form import CForm, Number
-from ..effects.drive.amplifier_saturation import RAMP, AmplifierSaturationBlock
-from ..effects.drive.amplifier_slew_limit import AmplifierSlewLimitBlock
-from ..effects.drive.backlash import BacklashBlock
-from ..effects.hysteresis.bouc_wen import BoucWenBlock
-from ..effects.hysteresis.even_input_polynomial import EvenInputPolynomialBlock
-from ..effects.hysteresis.hysteresis_memory import HysteresisMemoryBlock
-from ..effects.hysteresis.level_dependent_memory import LevelDependentMemoryBlock
-from ..effects.hysteresis.published_bouc_wen import PublishedBlock
-from ..effects.material.creep_exponential import CreepExponentialBlock
+from ..effects.drive.amplifier_saturation import RAMP
 from ..errors import ModelError
+from ..inverse_terms import NO_LOOP, POLYNOMIAL, InverseTerms, LoopTerms, PlayTerms, RelaxationTerms
 from . import hysteresis_solver as solver
 from . import recursion as r
 from .limits import Limits
@@ -46,27 +39,10 @@ Array = NDArray[np.float64]
 RecursionState = tuple[Array, Array, Array, Array]
 """State of drive and loop, of the plays, last inputs of the relaxations, and state of the relaxations."""
 
-KINDS = (
-    AmplifierSaturationBlock,
-    AmplifierSlewLimitBlock,
-    BacklashBlock,
-    ChangeOfUnit,
-    BoucWenBlock,
-    PublishedBlock,
-    HysteresisMemoryBlock,
-    LevelDependentMemoryBlock,
-    EvenInputPolynomialBlock,
-    RelaxationBlock,
-    CreepExponentialBlock,
-    SumBlock,
-)
-"""Blocks that the recursion can invert, in addition to a low-pass before the hysteresis."""
-
-LOOPS = (BoucWenBlock, PublishedBlock, HysteresisMemoryBlock, LevelDependentMemoryBlock)
-"""Blocks with a static part of their own."""
-
 FARTHEST = 1e3
 """Largest normalised drive in which a root is searched."""
+WITHOUT_LOOP = LoopTerms(NO_LOOP, np.zeros(8))
+"""Loop of a chain that has none."""
 
 
 class NonlinearPart:
@@ -74,8 +50,8 @@ class NonlinearPart:
 
     Parameters
     ----------
-    blocks : sequence of Block
-        Blocks from the drive to the creep; sums are split into their members.
+    terms : sequence of InverseTerms
+        Of the blocks from the drive to the creep.
     limits : Limits
         Of the drive.
     sample_period : float
@@ -87,55 +63,24 @@ class NonlinearPart:
         If the hysteresis has no static slope.
     """
 
-    def __init__(self, blocks: Sequence[Block], limits: Limits, sample_period: float) -> None:
-        self.blocks = [m for b in blocks for m in (b.members if isinstance(b, SumBlock) else (b,))]
-        self.kind, self.loop, self.periods = solver.NO_LOOP, np.zeros(8), np.full(2, sample_period)
-        self.poly, self.weights, self.radii = np.zeros(4), np.zeros((2, 0)), np.zeros(0)
+    def __init__(self, terms: Sequence[InverseTerms], limits: Limits, sample_period: float) -> None:
         self.drive = np.zeros(16)
         self.drive[[r.PER_VOLT, r.LEAD]] = 1.0
         self.drive[[r.LOWER, r.UPPER, r.REACH]] = -np.inf, np.inf, np.inf
         self.drive[[r.LOWEST, r.HIGHEST]] = limits.voltage_min, limits.voltage_max
         self.drive[[r.STEP, r.RESOLUTION]] = limits.max_slew_rate * sample_period, limits.resolution
-        banks: list[tuple[float, Array, Array, Array]] = []
-        for block in self.blocks:
-            self._take(block, banks)
-        if not any(isinstance(b, LOOPS) for b in self.blocks):
-            self.poly[solver.P2] += 1.0 if not any(isinstance(b, EvenInputPolynomialBlock) for b in self.blocks) else 0
+        for name, value in (item for t in terms for item in t.drive.items()):
+            self.drive[r.DRIVE.index(name)] = value
+        hysteresis = next((t for t in terms if t.is_hysteresis), InverseTerms(polynomial={"p2": 1.0}))
+        self.poly = np.array([hysteresis.polynomial.get(name, 0.0) for name in POLYNOMIAL])
+        self._loop = hysteresis.loop or WITHOUT_LOOP
+        self.kind, self.loop = self._loop.kind, self._loop.numbers
+        self.periods = np.array(self._loop.periods or (sample_period, sample_period))
+        self._plays = hysteresis.plays or PlayTerms(np.zeros(0), np.zeros(0), np.zeros(0))
+        self.weights, self.radii = np.vstack((self._plays.weights, self._plays.bends)), self._plays.radii
         self._bracket()
-        self.bank = self._bank(banks)
-
-    def _take(self, block: Block, banks: list[tuple[float, Array, Array, Array]]) -> None:
-        d = self.drive
-        if isinstance(block, AmplifierSaturationBlock):
-            d[[r.LOWER, r.UPPER, r.CORNER]] = block.lower, block.upper, block.corner
-        elif isinstance(block, AmplifierSlewLimitBlock):
-            d[r.REACH] = block.reach
-        elif isinstance(block, LowPassBlock):
-            d[[r.LEFT, r.LEAD, r.BACK]] = block.step
-        elif isinstance(block, BacklashBlock):
-            d[r.PLAY] = block.b
-        elif isinstance(block, ChangeOfUnit):
-            d[r.PER_VOLT] = block.factor
-        elif isinstance(block, BoucWenBlock):
-            self.kind = solver.PLAIN if block.is_plain else solver.GENERAL
-            self.loop, self.periods = block.loop, np.array([block.sample_period, block.jump_period])
-            self.poly[[solver.P1, solver.P2]] = block.p1, block.p2
-        elif isinstance(block, PublishedBlock):
-            self.kind, self.loop = solver.PUBLISHED, np.append(block.p[:4], np.zeros(4))
-            self.poly[[solver.P1, solver.P2]] = block.p[4:]
-        elif isinstance(block, HysteresisMemoryBlock):
-            self.weights, self.radii = np.vstack((block.c, np.zeros(block.c.size))), block.radii
-        elif isinstance(block, LevelDependentMemoryBlock):
-            self.weights, self.radii = np.vstack((block.c, block.bends)), block.radii
-        elif isinstance(block, EvenInputPolynomialBlock):
-            self.poly[[solver.SQUARE, solver.FOURTH]] = block.p_e, block.p_4
-        elif isinstance(block, RelaxationBlock):
-            banks.append((float(block.mix[0]), block.hold.fade, block.hold.lead, block.mix[1:]))
-        elif isinstance(block, CreepExponentialBlock):
-            steps = np.array([pole.step for pole in block.poles]).reshape(-1, 3)
-            banks.append((0.0, 1.0 - steps[:, 0], steps[:, 1], block.c))
-        else:
-            raise ModelError(f"{type(block).__name__}: has no inverse; expected a block that compensation can invert")
+        self._relaxations = [t.relaxations for t in terms if t.relaxations is not None]
+        self.bank = self._bank(self._relaxations)
 
     def _bracket(self) -> None:
         """Set the interval in which roots are searched: between extrema of the static curve, inside the limits."""
@@ -153,88 +98,65 @@ class NonlinearPart:
         d[r.HIGH] = min(FARTHEST, ends[1] * d[r.PER_VOLT], *real[real > 0.0])
 
     @staticmethod
-    def _bank(
-        banks: list[tuple[float, Array, Array, Array]],
-    ) -> tuple[NDArray[Any], ...]:
-        starts = np.cumsum([0, *(b[1].size for b in banks)]).astype(np.uint64)
-        direct = np.array([b[0] for b in banks])
-        fade, lead, weights = (np.concatenate([np.zeros(0), *(b[k] for b in banks)]) for k in (1, 2, 3))
-        gains = np.array([1.0 + b[0] + float(b[3] @ b[2]) for b in banks])
+    def _bank(relaxations: Sequence[RelaxationTerms]) -> tuple[NDArray[Any], ...]:
+        starts = np.cumsum([0, *(b.weights.size for b in relaxations)]).astype(np.uint64)
+        direct = np.array([b.direct for b in relaxations])
+        rows = [(b.fade, b.lead, b.weights) for b in relaxations]
+        fade, lead, weights = (np.concatenate([np.zeros(0), *(row[k] for row in rows)]) for k in range(3))
+        gains = np.array([1.0 + b.direct + float(b.weights @ b.lead) for b in relaxations])
         return starts, direct, fade, lead, weights, gains
 
-    def start(self, inputs: Sequence[float], states: Sequence[State]) -> RecursionState:
-        """State of the recursion from the last inputs and states of the blocks; sums are split into their members."""
+    def start(self, blocks: Sequence[Block], inputs: Sequence[float], states: Sequence[State]) -> RecursionState:
+        """State of the recursion from its blocks, their last inputs and their states."""
         state, plays, lasts = np.zeros(8), np.zeros(self.radii.size), []
         banks: list[Array] = [np.zeros(0)]
-        at = float(inputs[0])
-        state[: r.PUSHED + 1] = at
-        for block, x, own in zip(self.blocks, inputs, states, strict=True):
-            if isinstance(block, AmplifierSaturationBlock):
-                state[r.SLEWED : r.PUSHED + 1] = block.static(x)
-            elif isinstance(block, AmplifierSlewLimitBlock):
-                state[r.SLEWED : r.PUSHED + 1] = own[0]
-            elif isinstance(block, LowPassBlock):
-                x0, z = own
-                state[r.SLEWED], state[r.POLE : r.PUSHED + 1] = x0 + z[0, 0], x0 + z[0, 1]
-            elif isinstance(block, BacklashBlock):
-                state[r.HELD] = own[0]
-            elif isinstance(block, BoucWenBlock | PublishedBlock):
-                state[r.H] = own[0]
-            elif isinstance(block, HysteresisMemoryBlock | LevelDependentMemoryBlock):
-                plays = own.copy()
-            elif isinstance(block, RelaxationBlock):
-                x0, z = own
-                lasts.append(x0 + z[0, 0])
-                banks.append(x0 + z[0, 1:])
-            elif isinstance(block, CreepExponentialBlock):
-                x0, z = own
-                lasts.append(x)
-                banks.append(x0 + z[0, 1::2])
+        state[: r.PUSHED + 1] = float(inputs[0])
+        for block, x, own in zip(blocks, inputs, states, strict=True):
+            begin = block.inverse_start(x, own)
+            for name, value in begin.drive.items():
+                state[r.STATE.index(name)] = value
+            if begin.h is not None:
+                state[r.H] = begin.h
+            if begin.plays.size:
+                plays = begin.plays.copy()
+            if begin.relaxations is not None:
+                lasts.append(begin.relaxations[0])
+                banks.append(begin.relaxations[1])
         state[r.LAST] = state[r.HELD] * self.drive[r.PER_VOLT]
         hysteresis = self.kind, self.loop, self.periods, self.poly, self.weights, self.radii
         state[r.W] = solver.output(*hysteresis, state[r.H], state[r.LAST], plays, state[r.LAST])
         return state, plays, np.array(lasts), np.concatenate(banks)
 
-    def c_form(self) -> CForm | str:
+    def c_form(self) -> CForm:
         """The recursion as C code: its ``rest`` takes the drive voltage, its ``step`` the wanted output."""
-        loop: CForm | str = CForm("")
-        numbers: dict[str, Number] = {"h0": 0.0, "virgin": 0.0, "PLAYS": self.radii.size}
-        settled = []
-        for block in self.blocks:
-            if isinstance(block, BoucWenBlock | PublishedBlock):
-                loop = block.c_form()
-                numbers["h0"] = block.static(0.0)
-            elif isinstance(block, HysteresisMemoryBlock | LevelDependentMemoryBlock):
-                numbers["virgin"] = block.virgin
-            elif isinstance(block, RelaxationBlock | CreepExponentialBlock):
-                settled.append(block.gain)
-        if isinstance(loop, str):
-            return loop
         one_at_least = (0, max(0, 1 - self.radii.size))  # C has no empty arrays
+        numbers: dict[str, Number] = {
+            "h0": self._loop.initial,
+            "virgin": self._plays.virgin,
+            "PLAYS": self.radii.size,
+        }
         plays = (("c", self.weights[0]), ("bend", self.weights[1]), ("radius", self.radii))
         numbers |= {name: np.pad(values, one_at_least) for name, values in plays}
         numbers |= {"loop": np.append(self.loop, self.periods), "poly": self.poly}
-        numbers |= dict(zip(r.NAMES_IN_C, self.drive.tolist(), strict=True))
+        numbers |= dict(zip(r.DRIVE, self.drive.tolist(), strict=True))
         state = ["double voltage, slewed, pole, held, pushed", "double h, v, w"]
         state.append(f"double play[{max(1, self.radii.size)}]")
         before: list[str] = []
         rest, after = [r.REST_IN_C], []
-        starts, direct, *rows, gains = self.bank
-        for b, (gain, whole) in enumerate(zip(gains, settled, strict=True)):
-            fade, lead, weight = (row[starts[b] : starts[b + 1]] for row in rows)
+        for b, (gain, own) in enumerate(zip(self.bank[-1], self._relaxations, strict=True)):
             bank: dict[str, Number] = {
-                "SIZE": fade.size,
-                "fade": fade,
-                "lead": lead,
-                "weight": weight,
-                "direct": float(direct[b]),
+                "SIZE": own.fade.size,
+                "fade": own.fade,
+                "lead": own.lead,
+                "weight": own.weights,
+                "direct": own.direct,
             }
-            numbers |= {f"{name}_{b}": value for name, value in (bank | {"gain": gain, "settled": whole}).items()}
-            state += [f"double last_{b}, bank_{b}[{fade.size}]"]
+            numbers |= {f"{name}_{b}": value for name, value in (bank | {"gain": gain, "settled": own.settled}).items()}
+            state += [f"double last_{b}, bank_{b}[{own.fade.size}]"]
             before.insert(0, r.BEFORE_IN_C.replace("BANK", str(b)))
             rest.append(r.SETTLED_IN_C.replace("BANK", str(b)))
             after.append(r.AFTER_IN_C.replace("BANK", str(b)))
-        library = (*loop.library, RAMP, solver.LOOP_END_IN_C[self.kind], solver.SOLVE_IN_C, r.AMPLIFIER_IN_C)
+        library = (*self._loop.library, RAMP, solver.LOOP_END_IN_C[self.kind], solver.SOLVE_IN_C, r.AMPLIFIER_IN_C)
         step = "".join((*before, r.DRIVE_IN_C, *after, "return u;"))
         return CForm(step, "".join((*rest, "return w;")), numbers, tuple(state), library)
 

@@ -30,13 +30,15 @@ PER_VOLT, LEFT, LEAD, BACK, PLAY, REACH, LOWER, UPPER, CORNER, LOWEST, HIGHEST, 
 )
 """Numbers of the drive: 1/voltage scale, pole, play, slew limit and saturation of the amplifier, limits of the drive
 [V], ends of the search [v], sign of the static slope, smallest change that turns a play round [V]."""
-NAMES_IN_C = (
+DRIVE = (
     "per_volt", "left", "lead", "back", "play", "reach", "lower", "upper", "corner", "lowest", "highest", "step", "low",
     "high", "turn", "resolution",
 )  # fmt: skip
-"""Names of the same numbers in C code."""
+"""Names of the same numbers, in `InverseTerms` and in C code."""
 VOLTAGE, SLEWED, POLE, HELD, PUSHED, LAST, H, W = range(8)
 """States: drive, behind the slew limit, behind the pole, behind the play, before the play [V]; v, h and w."""
+STATE = ("voltage", "slewed", "pole", "held", "pushed", "v", "h", "w")
+"""Names of the same states, in `InverseStart` and in C code."""
 SAME = 1e-13
 """A change below this share of the voltage does not count as a reversal of a play."""
 TOUCHING = 1e-6

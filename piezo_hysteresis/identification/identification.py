@@ -23,6 +23,7 @@ import numpy as np
 from ..effects import Arx
 from ..html_table import html_table
 from ..model.model import Model
+from ..model.parameter_covariance import response_error
 from ..picture import Picture, picture_of
 from ..record import Experiment, Notice, Samples
 from .fit.fit import Fit
@@ -150,32 +151,13 @@ class Identification:
         return tuple(pair for pair in pairs if abs(pair[2]) > CORRELATED)
 
     def response(self, frequency: Samples) -> tuple[np.ndarray, Samples]:
-        """G at `frequency` [Hz] and its relative standard error, both of shape (k,).
-
-        The error of the complex value follows from the covariance of the coefficients. The coefficients alone have no
-        meaning, because poles and zeros of a high order nearly cancel.
-        """
+        """G at `frequency` [Hz] and its relative standard error (`response_error`), both of shape (k,)."""
         arx = self.model[Arx.name]
         assert isinstance(arx, Arx)
-        period = self.model.sample_period
-        value = arx.response(frequency, period)
-        names = [n for n in self.fit.names if n.startswith(f"{Arx.name}.")]
-        rows = [self.fit.names.index(n) for n in names]
-        z = np.exp(-2j * np.pi * np.asarray(frequency) * period)
-        a, b = np.concatenate(([1.0], arx.array("a"))), arx.array("b")
-        at_a, at_b = np.polyval(a[::-1], z), np.polyval(b[::-1], z)
-        slopes = []
-        for name in names:
-            number = name.partition(".")[2]
-            if number == "delay":
-                slopes.append(np.log(z))
-                continue
-            power = int(number[2:-1])
-            slopes.append(z**power / at_b if number[0] == "b" else -(z ** (power + 1)) / at_a)
-        relative = np.array(slopes).reshape(len(names), z.size)
-        covariance = self.fit.covariance[np.ix_(rows, rows)]
-        variance = np.einsum("ik,ij,jk->k", relative.conj(), covariance, relative).real
-        return value, np.sqrt(np.maximum(variance, 0.0))
+        rows = [k for k, name in enumerate(self.fit.names) if name.startswith(f"{Arx.name}.")]
+        names, covariance = [self.fit.names[k] for k in rows], self.fit.covariance[np.ix_(rows, rows)]
+        error = response_error(self.model, names, covariance, np.asarray(frequency))
+        return arx.response(frequency, self.model.sample_period), error
 
     def __repr__(self) -> str:
         return f"Identification({self.model!r}, free-run error {self.free_run_percent:.3g} % of range)"

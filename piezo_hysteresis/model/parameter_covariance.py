@@ -12,24 +12,35 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ParameterCovariance`: how uncertain the numbers of a model are together, and how a model file holds it."""
+"""`ParameterCovariance`: how uncertain the numbers of a model are together, and how a model file holds it.
+
+`response_error` says how uncertain they make the frequency response.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ModelError
+from ..blocks.block import Section
+from ..errors import ModelError, ParameterError
+
+if TYPE_CHECKING:
+    from .model import Model
 
 Array = NDArray[np.float64]
+Response = NDArray[np.complex128]
 
 NEGLIGIBLE = 1e-12
 """Share of the largest variance, in units of the standard errors, below which a direction counts as exactly known."""
 DIGITS = 9
 """Significant digits of a factor: the coefficients of dynamics nearly cancel, and their errors with them."""
+STEP = 1e-3
+"""Step of a number for the derivative of the response, in units of its standard error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,3 +93,54 @@ class ParameterCovariance:
         """Covariance (q, q) in the units of the numbers."""
         rows = np.array(self.factor).reshape(len(self.names), -1)
         return np.asarray(rows @ rows.T)
+
+
+def response_error(model: Model, names: Sequence[str], covariance: Array, frequency: Array) -> Array:
+    """Relative standard error of the response of the linear dynamics, shape (k,).
+
+    The error of the complex value follows from the covariance of the coefficients. The coefficients alone have no
+    meaning, because poles and zeros of a high order nearly cancel.
+
+    Parameters
+    ----------
+    model : Model
+        Identified model.
+    names : sequence of str
+        Uncertain numbers (q); those that do not act on the linear dynamics have no effect.
+    covariance : (q, q) ndarray
+        Their covariance, in their own units.
+    frequency : (k,) ndarray
+        Below half the sampling rate [Hz].
+    """
+    z = np.exp(-2j * np.pi * np.asarray(frequency) * model.sample_period)
+    values = model.values()
+    slopes = np.zeros((len(names), z.size), dtype=np.complex128)
+    for row, name in enumerate(names):
+        step = STEP * float(np.sqrt(covariance[row, row]))
+        if name in values and step > 0.0:
+            slopes[row] = _relative_slope(model, name, values[name], step, z)
+    variance = np.einsum("ki,kl,li->i", slopes.conj(), covariance, slopes).real
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _relative_slope(model: Model, name: str, value: float, step: float, z: Response) -> Response:
+    """Slope of the logarithm of the response with a number, at z = exp(−jωT), in powers of which the sections stand.
+
+    The coefficients of the sections are linear in most numbers, and the response is not: near a slow pole, whose
+    denominator nearly vanishes, only their slopes can be taken by a finite step.
+    """
+    try:
+        moved = model.with_values({name: value + step})
+    except ParameterError:  # at its bound
+        step = -step
+        moved = model.with_values({name: value + step})
+    total = np.zeros_like(z)
+    for own, other in zip(_sections(model), _sections(moved), strict=True):
+        for sign, now, then in zip((1.0, -1.0), own, other, strict=True):
+            total = total + sign * np.polyval(np.polysub(then[::-1], now[::-1]) / step, z) / np.polyval(now[::-1], z)
+    return total
+
+
+def _sections(model: Model) -> list[Section]:
+    """Of all linear dynamics of the chain."""
+    return [section for block in model.at(model.sample_period).blocks for section in block.sections()]

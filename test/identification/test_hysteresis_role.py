@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Another operator in the role of the hysteresis is one class: it is simulated, identified, diagnosed and reported."""
+"""Another operator in the role of the hysteresis is one class: simulated, identified, diagnosed, reported, inverted."""
 
 import ast
 from pathlib import Path
@@ -21,6 +21,8 @@ import numpy as np
 import pytest
 
 import piezo_hysteresis
+from piezo_hysteresis.blocks.block import Block
+from piezo_hysteresis.compensation import Inverse
 from piezo_hysteresis.discrepancy.search.baseline import exact
 from piezo_hysteresis.effects import (
     CHAIN,
@@ -28,6 +30,7 @@ from piezo_hysteresis.effects import (
     BoucWen,
     ChainPosition,
     HysteresisOperator,
+    Invertibility,
     Loop,
     Offset,
     PublishedBoucWen,
@@ -38,6 +41,7 @@ from piezo_hysteresis.errors import IdentificationError, ModelError
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.protocol import excitation
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.inverse_terms import InverseStart, InverseTerms, PlayTerms
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.parameter import Parameter
 from piezo_hysteresis.record import Experiment, Record
@@ -79,6 +83,51 @@ class PrandtlIshlinskii(HysteresisOperator):
         return HysteresisMemoryBlock(names, c, self["reach"] * np.arange(c.size) / c.size, 0.0)
 
 
+class OwnPlays(PrandtlIshlinskii):
+    """The same operator with a block of its own, which states what the inverse needs."""
+
+    name = "own_plays"
+    invertibility = Invertibility.EXACT
+
+    def block(self, setting, terms=()):
+        return OwnPlaysBlock(self.array("c"), self["reach"] * np.arange(self.array("c").size) / 8.0)
+
+
+class OwnPlaysBlock(Block):
+    """Plays in plain Python; state p (s,)."""
+
+    def __init__(self, c, radii):
+        self.c, self.radii = c, radii
+
+    def static(self, x0):
+        return float(self.c.sum() * x0)
+
+    def static_slopes(self, x0):
+        return float(self.c.sum()), np.zeros(0)
+
+    def rest(self, x0, time):
+        return np.full(self.c.size, x0)
+
+    def run(self, x, state):
+        y = np.empty_like(x)
+        for i, v in enumerate(x):
+            state = np.clip(state, v - self.radii, v + self.radii)
+            y[i] = self.c @ state
+        return y, state
+
+    def rest_tangent(self, x0, dx0):
+        raise NotImplementedError
+
+    def linearise(self, x, dx, state, tangent):
+        raise NotImplementedError
+
+    def inverse_terms(self):
+        return InverseTerms(plays=PlayTerms(self.c, np.zeros(self.c.size), self.radii))
+
+    def inverse_start(self, x, state):
+        return InverseStart(plays=state)
+
+
 TRUTH = PrandtlIshlinskii(c=(1.1, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05, 0.05), reach=0.47)
 
 
@@ -111,6 +160,28 @@ def test_it_is_identified_by_its_class_alone(experiment):
     assert found.free_run_percent < 0.3
     assert found.free_run_percent < 0.5 * identify(experiment, orders=(1, 1)).free_run_percent
     assert found.model[Arx.name].dc_gain == pytest.approx(1.0, rel=1e-6)  # the gauge is held for its gains too
+
+
+def test_its_block_brings_its_inverse():
+    model = Model((OwnPlays(**TRUTH.values), Arx(a=(-0.6,), b=(0.4,), delay=2.0), Offset()), 2e-4, 10.0, 1e-5)
+    inverse = Inverse(model)
+    moved = 4.0 * np.sin(np.linspace(0.0, 9.0, 300))
+    _, state = model.run(np.append(moved, np.full(100, moved[-1])), model.rest(0.0))  # until the dynamics have settled
+    later, _ = model.run(moved[::-1], state)
+    u, _ = inverse.command(later, inverse.resume(state))
+    reached, _ = model.run(u, state)
+    assert np.abs(reached[inverse.preview :] - later).max() < 1e-12 * np.abs(later).max()
+
+
+def test_an_operator_without_inverse_is_refused_by_name():
+    class Silent(OwnPlays):
+        def block(self, setting, terms=()):
+            block = super().block(setting, terms)
+            block.inverse_terms = lambda: None
+            return block
+
+    with pytest.raises(ModelError, match="own_plays: OwnPlaysBlock has no inverse"):
+        Inverse(Model((Silent(**TRUTH.values), Arx(b=(1.0,))), 2e-4, 10.0, 1e-5))
 
 
 def test_a_chain_without_one_says_so():

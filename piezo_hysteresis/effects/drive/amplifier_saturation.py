@@ -20,9 +20,10 @@ from typing import Self
 
 import numpy as np
 
-from ...blocks.block import Array, Block, MemorylessBlock
+from ...blocks.block import Array, Block, MemorylessBlock, State
 from ...c_form import CForm
 from ...errors import ParameterError
+from ...inverse_terms import InverseStart, InverseTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
@@ -120,3 +121,9 @@ class AmplifierSaturationBlock(MemorylessBlock):
     def c_form(self) -> CForm:
         numbers = {"lower": self.lower, "upper": self.upper, "corner": self.corner}
         return CForm("return x - ramp(x - upper, corner) + ramp(lower - x, corner);", "", numbers, (), (RAMP,))
+
+    def inverse_terms(self) -> InverseTerms:
+        return InverseTerms({"lower": self.lower, "upper": self.upper, "corner": self.corner})
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        return InverseStart(dict.fromkeys(("slewed", "pole", "held", "pushed"), self.static(x)))

@@ -24,6 +24,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.held import HeldBlock
 from ...blocks.kernel import kernel
 from ...c_form import CForm
+from ...inverse_terms import InverseStart, InverseTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
@@ -117,3 +118,9 @@ class AmplifierSlewLimitBlock(HeldBlock):
     def c_form(self) -> CForm:
         step = "s->y = fmin(fmax(x, s->y - reach), s->y + reach);\nreturn s->y;"
         return CForm(step, "s->y = x;\nreturn x;", {"reach": self.reach}, ("double y",))
+
+    def inverse_terms(self) -> InverseTerms:
+        return InverseTerms({"reach": self.reach})
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        return InverseStart(dict.fromkeys(("slewed", "pole", "held", "pushed"), state[0]))

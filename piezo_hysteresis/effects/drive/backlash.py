@@ -22,6 +22,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.held import HeldBlock
 from ...blocks.kernel import kernel
 from ...c_form import CForm
+from ...inverse_terms import InverseStart, InverseTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
@@ -112,3 +113,9 @@ class BacklashBlock(HeldBlock):
     def c_form(self) -> CForm:
         step = "s->y = fmax(x - b, fmin(x + b, s->y));\nreturn s->y;"
         return CForm(step, "s->y = x;\nreturn x;", {"b": self.b}, ("double y",))
+
+    def inverse_terms(self) -> InverseTerms:
+        return InverseTerms({"play": self.b})
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        return InverseStart({"held": state[0]})

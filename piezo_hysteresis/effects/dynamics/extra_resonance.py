@@ -21,10 +21,10 @@ from typing import Self
 import numpy as np
 from scipy.linalg import expm, expm_frechet
 
-from ...blocks.block import Array, Block, State
+from ...blocks.block import Array, Block, Section, State
 from ...blocks.fir import FirBlock
 from ...blocks.kernel import kernel
-from ...blocks.linear import AddedBlock, Section
+from ...blocks.linear import AddedBlock
 from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect

@@ -26,6 +26,7 @@ from ...blocks.bouc_wen_kernel import ADVANCE_IN_C, GENERAL_IN_C, LOOP, LOOP_OFF
 from ...blocks.bouc_wen_sensitivities import START, linearise_general, linearise_plain
 from ...c_form import CForm, Number
 from ...errors import ParameterError
+from ...inverse_terms import GENERAL, PLAIN, InverseStart, InverseTerms, LoopTerms
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
 from ..invertibility import Invertibility
@@ -184,3 +185,12 @@ class BoucWenBlock(Block):
         )
         rest = "s->h = h0;\ns->v = x;\nreturn p1 * x * x * x + p2 * x + h0;"
         return CForm(step, rest, numbers, ("double h, v",), (ADVANCE_IN_C, loop))
+
+    def inverse_terms(self) -> InverseTerms:
+        periods = self.sample_period, self.jump_period
+        library = ADVANCE_IN_C, PLAIN_IN_C if self.is_plain else GENERAL_IN_C
+        loop = LoopTerms(PLAIN if self.is_plain else GENERAL, self.loop, periods, self.start, library)
+        return InverseTerms(polynomial={"p1": self.p1, "p2": self.p2}, loop=loop)
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        return InverseStart(h=state[0])

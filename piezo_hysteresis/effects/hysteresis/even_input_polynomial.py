@@ -20,6 +20,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block, MemorylessBlock
 from ...c_form import CForm
+from ...inverse_terms import InverseTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..invertibility import Invertibility
@@ -71,3 +72,6 @@ class EvenInputPolynomialBlock(MemorylessBlock):
 
     def c_form(self) -> CForm:
         return CForm("return (p_e + p_4 * (x * x)) * (x * x);", numbers={"p_e": self.p_e, "p_4": self.p_4})
+
+    def inverse_terms(self) -> InverseTerms:
+        return InverseTerms(polynomial={"p_e": self.p_e, "p_4": self.p_4})

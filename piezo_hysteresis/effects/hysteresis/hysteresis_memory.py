@@ -24,6 +24,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.kernel import kernel
 from ...c_form import CForm
 from ...errors import ParameterError
+from ...inverse_terms import InverseStart, InverseTerms, PlayTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect, Term
 from ..excitation_need import ExcitationNeed
@@ -183,3 +184,9 @@ class HysteresisMemoryBlock(Block):
 
     def c_form(self) -> CForm:
         return plays_in_c("p", self.c, self.radii, self.virgin)
+
+    def inverse_terms(self) -> InverseTerms:
+        return InverseTerms(plays=PlayTerms(self.c, np.zeros(self.c.size), self.radii, self.virgin))
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        return InverseStart(plays=state)

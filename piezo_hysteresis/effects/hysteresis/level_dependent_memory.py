@@ -21,6 +21,7 @@ import numpy as np
 from ...blocks.block import Array, Block, State
 from ...blocks.kernel import kernel
 from ...c_form import CForm, Number
+from ...inverse_terms import InverseStart, InverseTerms, PlayTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Term
 from ..invertibility import Invertibility
@@ -183,3 +184,9 @@ class LevelDependentMemoryBlock(Block):
 
     def c_form(self) -> CForm:
         return plays_in_c("(p + bend[j] * p * p)", self.c, self.radii, self.virgin, bend=self.bends)
+
+    def inverse_terms(self) -> InverseTerms:
+        return InverseTerms(plays=PlayTerms(self.c, self.bends, self.radii, self.virgin))
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        return InverseStart(plays=state)

@@ -22,6 +22,7 @@ from ...blocks.block import Array, Block, State
 from ...blocks.kernel import fma, kernel
 from ...c_form import CForm
 from ...errors import ModelError
+from ...inverse_terms import PUBLISHED, InverseStart, InverseTerms, LoopTerms
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
 from ..invertibility import Invertibility
@@ -212,3 +213,10 @@ class PublishedBlock(Block):
         rest = "s->h = 0.0;\ns->v = x;\nreturn p1 * x * x * x + p2 * x;"
         numbers = dict(zip(("A", "beta", "gamma", "n", "p1", "p2"), self.p.tolist(), strict=True))
         return CForm(step, rest, numbers, ("double h, v",), (STEP,))
+
+    def inverse_terms(self) -> InverseTerms:
+        loop = LoopTerms(PUBLISHED, np.append(self.p[:4], np.zeros(4)), library=(STEP,))
+        return InverseTerms(polynomial={"p1": float(self.p[4]), "p2": float(self.p[5])}, loop=loop)
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        return InverseStart(h=state[0])

@@ -25,6 +25,7 @@ from ...blocks.linear import AddedBlock
 from ...blocks.low_pass import LowPassBlock
 from ...c_form import CForm
 from ...errors import ParameterError
+from ...inverse_terms import InverseStart, InverseTerms, RelaxationTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
@@ -139,3 +140,12 @@ class CreepExponentialBlock(AddedBlock):
         numbers = {"SIZE": self.c.size, "left": left, "lead": lead, "back": back, "c": self.c, "gain": self.gain}
         state = ("double x_rest, last", f"double z[{self.c.size}]")
         return CForm(STEP, "memset(s, 0, sizeof *s);\ns->x_rest = x;\nreturn x + gain * x;", numbers, state)
+
+    def inverse_terms(self) -> InverseTerms:
+        steps = np.array([pole.step for pole in self.poles]).reshape(-1, 3)
+        own = RelaxationTerms(0.0, 1.0 - steps[:, 0], steps[:, 1], self.c, self.gain)
+        return InverseTerms(relaxations=own)
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        x0, z = state
+        return InverseStart(relaxations=(x, x0 + z[0, 1::2]))
