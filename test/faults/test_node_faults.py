@@ -58,7 +58,7 @@ def newest(reports, node):
 
 
 def test_a_driver_never_follows_simulated_time(lab):
-    driver = lab.driver(use_sim_time=True)
+    driver = lab.driver(fresh=True, use_sim_time=True)
     assert driver.wait() == 2
     assert driver.output.strip().splitlines()[-1].startswith("use_sim_time: got true, expected false; a driver stamps")
     driver = lab.driver()
@@ -101,7 +101,7 @@ def test_no_date_on_the_clock_ends_a_node_that_follows_it(lab):
 
 
 def test_a_number_outside_its_range_is_refused_and_ends_nothing(lab):
-    assert lab.start("identification_node", seed=-3).wait() == 2
+    assert lab.start("identification_node", fresh=True, seed=-3).wait() == 2
     process = lab.start("identification_node")
     for name, value in (("seed", -3), ("seed", 2**62), ("seed", "3"), ("protocol", "nonsense")):
         answer = set_parameter(lab, "identification_node", name, value)

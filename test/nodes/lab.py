@@ -47,7 +47,12 @@ from piezo_hysteresis.nodes.messages.samples import samples_from_cloud
 from piezo_hysteresis.nodes.runtime.guarded_node import GuardedNode
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS, LATCHED
 
+from .node_server import ForkedNode
+
 PATIENCE = 60.0
+
+FORKED = ("driver_node", "model_node", "identification_node", "compensation_node")
+"""Executables that start as a fork of a process that has imported them."""
 
 DEEP = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
 """A test that is kept waiting by a busy machine shall not lose blocks on its own account."""
@@ -56,10 +61,14 @@ DEEP = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
 class NodeProcess:
     """A node of the package as a process, its output in a file."""
 
-    def __init__(self, command: list[str], environment: dict[str, str], log: Path) -> None:
+    def __init__(self, command: list[str], environment: dict[str, str], log: Path, forked: bool) -> None:
         self._log = log
-        with log.open("wb") as output:
-            self._process = subprocess.Popen(command, env=environment, stdout=output, stderr=subprocess.STDOUT)
+        self._process: ForkedNode | subprocess.Popen[bytes]
+        if forked:
+            self._process = ForkedNode(command, environment, log)
+        else:
+            with log.open("wb") as output:
+                self._process = subprocess.Popen(command, env=environment, stdout=output, stderr=subprocess.STDOUT)
         self.pid = self._process.pid
 
     @property
@@ -189,11 +198,13 @@ class Lab:
         namespace: str = "",
         environment: dict[str, str] | None = None,
         program: list[str] | None = None,
+        fresh: bool = False,
         **parameters: Any,
     ) -> NodeProcess:
         """Start ``driver_node``, ``model_node`` or ``identification_node``; '__' in a parameter name means '.'.
 
-        A `program` of the test's own takes the place of the executable.
+        A `program` of the test's own takes the place of the executable. A `fresh` process starts with an interpreter of
+        its own: for tests of what happens while a node starts.
         """
         number = len(self.processes)
         values = {name.replace("__", "."): value for name, value in parameters.items()}
@@ -210,7 +221,8 @@ class Lab:
             **(environment or {}),
         }
         command = [*(program or _command(executable)), *ros, *arguments]
-        process = NodeProcess(command, full, self.folder / f"{executable}_{number}.log")
+        forked = executable in FORKED and not fresh
+        process = NodeProcess(command, full, self.folder / f"{executable}_{number}.log", forked)
         self.processes.append(process)
         return process
 

@@ -53,7 +53,7 @@ def test_one_identification_node_per_driver(lab):
     """The second one of a driver does not start; that of another driver does; a killed one leaves no lock."""
     first = lab.start("identification_node")
     lab.wait(lambda: "identification_node" in lab.node.get_node_names(), "the first node")
-    second = lab.start("identification_node")
+    second = lab.start("identification_node", fresh=True)
     assert second.wait() == 2
     assert f"is held by process {first.pid} already" in second.output
     other = lab.start("identification_node", namespace="/other")

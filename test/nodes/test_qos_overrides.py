@@ -39,7 +39,8 @@ def test_a_driver_publishes_as_its_parameters_say_in_the_frame_of_its_axis(lab):
 
 
 def test_a_word_that_is_no_quality_is_refused_in_one_line(lab):
-    node = lab.start("model_node", "-p", "qos_overrides./prediction.publisher.reliability:=besteffort")
+    refused = "qos_overrides./prediction.publisher.reliability:=besteffort"
+    node = lab.start("model_node", "-p", refused, fresh=True)
     assert node.wait() == 2
     assert "qos_overrides of prediction" in node.output
 

@@ -100,7 +100,7 @@ def test_a_remapped_topic_is_recorded_under_its_own_name(lab):
 @pytest.mark.parametrize("after", [0.1, 0.4, 0.8])
 @pytest.mark.parametrize("executable", ["driver_node", "model_node", "identification_node"])
 def test_an_interrupt_while_a_node_starts_shows_no_traceback(lab, executable, after):
-    process = lab.start(executable)
+    process = lab.start(executable, fresh=True)
     lab.wait(lambda: process.is_importing or not process.is_running, "the start of Python")
     lab.pause(after)
     process.signal(signal.SIGINT)

@@ -53,7 +53,7 @@ def test_hold_timeout_leads_to_the_safe_voltage(lab):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 def test_a_signal_ramps_to_the_safe_voltage(lab, number):
-    driver = lab.driver(**IDEAL)
+    driver = lab.driver(fresh=True, **IDEAL)
     samples = lab.streaming()
     lab.send(np.concatenate((np.linspace(0, 4, 20_000), np.full(500_000, 4.0))), "long")
     lab.wait(lambda: samples.newest.voltage[-1] == 4.0, "the top")
