@@ -58,6 +58,9 @@ def changes(day: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanop
     for samples in (0.2, 2.0, 20.0):
         slow = replace(day, filter_pole=samples * PERIOD)
         yield f"pole {samples:g} samples", "lag", samples * PERIOD, slow
+    for samples in (0.5, 2.0, 10.0):
+        twice = replace(day, filter_twice=samples * PERIOD)
+        yield f"second order {samples:g} samples", "lag", None, twice
     yield "gain + 4 %", "static", None, replace(day, gain=1.04 * day.gain)
     yield "gain - 6 %", "static", None, replace(day, gain=0.94 * day.gain)
     yield "loop + 20 %", "hysteresis", None, replace(day, loop=1.2 * day.loop)

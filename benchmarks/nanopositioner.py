@@ -25,7 +25,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
+from scipy.signal import butter, cont2discrete, lfilter
 
 from piezo_hysteresis.blocks.kernel import kernel
 from piezo_hysteresis.record import Record
@@ -89,6 +89,7 @@ class Nanopositioner:
     gain: float = 1.0
     filter_delay: float = 0.0
     filter_pole: float = 0.0
+    filter_twice: float = 0.0
     softening: float = 0.0
     drift: float = 0.0
     plays: int = 30
@@ -165,6 +166,8 @@ class Nanopositioner:
         return self._late(np.asarray(lfilter(np.poly(a - b @ c) - den, den, w)), self.delay, self.pole, dt)
 
     def _filtered(self, x: Array, dt: float) -> Array:
+        if self.filter_twice:
+            x = lfilter(*butter(2, 0.5 / (np.pi * self.filter_twice), fs=1.0 / dt), x)
         return self._late(x, self.filter_delay, self.filter_pole, dt)
 
     @staticmethod

@@ -53,6 +53,7 @@ from .material.creep_fractional import CreepFractional
 from .material.creep_two_rates import CreepTwoRates
 from .sensor.gain_drift import GainDrift
 from .sensor.offset import Offset
+from .sensor.second_order_low_pass import SecondOrderLowPass
 from .sensor.sensor_bandwidth import SensorBandwidth
 from .sensor.sensor_nonlinearity import SensorNonlinearity
 
@@ -82,6 +83,7 @@ CHAIN: tuple[type[Effect], ...] = (
     SensorNonlinearity,
     GainDrift,
     SensorBandwidth,
+    SecondOrderLowPass,
     ThermalDrift,
     ThermalExpansion,
     AxisCoupling,
@@ -102,7 +104,7 @@ OPERATORS: dict[str, type[HysteresisOperator]] = {e.name: e for e in CHAIN if is
 BASELINE: tuple[type[Effect], ...] = (BoucWen, PublishedBoucWen, Arx, Offset)
 """The published model: what the others are missing from."""
 
-FINER_FORMS: tuple[type[Effect], ...] = (LevelDependentMemory, CreepTwoRates)
+FINER_FORMS: tuple[type[Effect], ...] = (LevelDependentMemory, CreepTwoRates, SecondOrderLowPass)
 """Finer forms of effects that an identified model may hold; a search names the effect, not its form."""
 
 CATALOGUE: tuple[type[Effect], ...] = tuple(e for e in CHAIN if e not in (*BASELINE, *FINER_FORMS))
@@ -164,6 +166,7 @@ __all__ = [
     "ChainPosition",
     "PublishedBoucWen",
     "RateDependentHysteresis",
+    "SecondOrderLowPass",
     "SensorBandwidth",
     "SensorNonlinearity",
     "Discretisation",

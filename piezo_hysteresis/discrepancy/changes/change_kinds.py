@@ -21,7 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from ...effects import Creep, ExtraDelay, ExtraResonance, SensorBandwidth, Softening, ThermalDrift
+from ...effects import Creep, ExtraDelay, ExtraResonance, SecondOrderLowPass, SensorBandwidth, Softening, ThermalDrift
+
+LEAVES = 6.0
+"""V that a change may leave: where more is left, the stage is not the same in all else, or another form of the change
+would fit better."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +59,9 @@ class ChangeKind:
 KINDS: dict[str, ChangeKind] = {
     "delay": ChangeKind(ExtraDelay.name, "lag", "tau", "s", (), "{how} by {size}"),
     "low_pass": ChangeKind(SensorBandwidth.name, "lag", "tau", "s", (), "behind a low-pass of time constant {size}"),
+    "low_pass_2": ChangeKind(
+        SecondOrderLowPass.name, "lag", "tau", "s", (), "behind a low-pass of second order with time constant {size}"
+    ),
     Creep.name: ChangeKind(Creep.name, Creep.family, "relative", "1", (Creep.name,), "with creep changed by {size}"),
     "resonance": ChangeKind(
         ExtraResonance.name, "dynamics", "f0", "Hz", ("resonance",), "with a resonance moved by {size}"
@@ -102,6 +109,11 @@ class ParameterChange:
         """What it is."""
         return KINDS[self.key]
 
+    @property
+    def member_certain(self) -> bool:
+        """False where another member of the family explains as much, or much is left."""
+        return self.after < LEAVES and all(KINDS[r].family != self.kind.family for r in self.rivals)
+
     def row(self) -> dict[str, Any]:
         """The change as an effect of ``answer.json``."""
         kind, rivals = self.kind, [KINDS[r] for r in self.rivals]
@@ -110,7 +122,7 @@ class ParameterChange:
             "name": kind.name,
             "law": kind.name,
             "family": kind.family,
-            "member_certain": all(r.family != kind.family for r in rivals),
+            "member_certain": self.member_certain,
             "explained_fraction": round(float(1.0 - np.sqrt(self.after / self.before)), 4),
             "parameters": {kind.parameter: {"value": self.size, "interval_95": [low, high], "unit": kind.unit}},
             "confusable_with": [r.name for r in rivals],

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ...effects import ExtraResonance
 from ...model.model import Model
 from ...record import Record
-from .change_kinds import KINDS, ParameterChange
+from .change_kinds import KINDS, LEAVES, ParameterChange
 from .change_search import Account, ChangeSearch
 from .signatures import SHAPES, shaped_model
 
@@ -38,8 +38,8 @@ Array = NDArray[np.float64]
 
 EXPLAINS = 0.7
 """Share of V that a change may leave beside gain, loop height and zero."""
-LEAVES, NEARLY_ALL = 6.0, 0.08
-"""V, or share of V, that a change may leave: where more is left, the stage is not the same in all else."""
+NEARLY_ALL = 0.08
+"""Share of V that a change may leave where it leaves more than `LEAVES`."""
 SEEN = 0.7
 """Size of a change, RMS in floors, from which it is reported."""
 RIVAL = 1.15
@@ -83,7 +83,9 @@ def find_change(
     found = [_Explanation(search, search.best(k)) for k in (*search.sides, *keys)]
     if "resonance" in keys and min(e.account.cost for e in found) > LEAVES:
         found.append(_moved_resonance(model, records, used, floors))
-    found.sort(key=lambda e: e.account.cost)
+    found.sort(
+        key=lambda e: e.account.cost * (RIVAL if e.account.key == "low_pass_2" else 1.0)
+    )  # the simpler lag first
     found[0] = _simulated(found[0], model, records, used, floors)
     best = found[0].account
     leaves = best.cost < LEAVES or best.cost < NEARLY_ALL * day.cost

@@ -31,7 +31,7 @@ from ..diagnosis import Diagnosis, Verdict
 from ..gap import measure_gap
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
-from .change_kinds import KINDS, ParameterChange
+from .change_kinds import KINDS, LEAVES, ParameterChange
 from .parameter_changes import find_change
 from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_model
 
@@ -106,7 +106,8 @@ def sentence_of(change: ParameterChange) -> str:
     words = kind.words.format(how="later" if change.size > 0.0 else "earlier", size=size)
     rivals = ", ".join(KINDS[r].name for r in change.rivals)
     alike = f"; {rivals} explains as much" if rivals else ""
-    return f"The stage is the same, but {words}: {kind.name} ({kind.family}){alike}."
+    left = "" if change.after < LEAVES else " More is left than the known error of the model: the form is not certain."
+    return f"The stage is the same, but {words}: {kind.name} ({kind.family}){alike}.{left}"
 
 
 def changed_model(model: Model, change: ParameterChange, records: Sequence[Record]) -> Model:

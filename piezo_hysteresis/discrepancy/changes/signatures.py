@@ -31,9 +31,11 @@ from ...effects import (
     Creep,
     CreepFractional,
     CreepTwoRates,
+    Discretisation,
     ExtraDelay,
     ExtraResonance,
     Offset,
+    SecondOrderLowPass,
     SensorBandwidth,
     Softening,
 )
@@ -179,18 +181,28 @@ def filtered(prediction: ChangeablePrediction, signal: Array, before: float, tau
     return np.asarray(scipy.signal.lfilter(num, den, signal, zi=state)[0])
 
 
+def filtered_twice(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
+    """A signal of the record behind a Butterworth filter of second order with time constant `tau` [s]."""
+    if tau <= 0.0:
+        return signal
+    period = prediction.record.sample_period
+    block = SecondOrderLowPass(tau=tau).block(Discretisation(period, period))
+    return np.asarray(block.run(signal, block.rest(before, 0.0))[0])
+
+
 Shaped = Callable[[ChangeablePrediction, Array, float, float], Array]
 """(prediction, signal, value before, size) → the changed signal."""
 
-SHAPES: dict[str, Shaped] = {"delay": delayed, "low_pass": filtered}
+SHAPES: dict[str, Shaped] = {"delay": delayed, "low_pass": filtered, "low_pass_2": filtered_twice}
 """Changes that act on the whole prediction, by name."""
 
 
 def shaped_model(model: Model, key: str, size: float) -> Model:
     """The model with a change of `SHAPES`: later by `size` [s], or behind a low-pass of that time constant [s]."""
-    if key == "low_pass":
-        present = model[SensorBandwidth.name]["tau"] if SensorBandwidth.name in model else 0.0
-        return model.with_effect(SensorBandwidth(tau=present + size))
+    for name, effect in (("low_pass", SensorBandwidth), ("low_pass_2", SecondOrderLowPass)):
+        if key == name:
+            present = model[effect.name]["tau"] if effect.name in model else 0.0
+            return model.with_effect(effect(tau=present + size))
     if Arx.name in model and ExtraDelay.name not in model:
         name = f"{Arx.name}.delay"
         return model.with_values({name: max(0.0, model.values()[name] + size / model.sample_period)})

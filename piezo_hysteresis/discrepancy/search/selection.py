@@ -227,10 +227,9 @@ def _judged(
     best = finest(simplest([c for c in refits if not bends_all_along(c)] or refits), before)
     gain, left = before.cost - best.score.cost, share_left(best.score, before, null)
     if gain < LEAST_GAIN or left > keeps:
-        message = (
-            f"in cross-validation it gains {gain:.2f} in mean ln R² ({LEAST_GAIN:g} is needed), and "
-            f"{100 * left:.0f} % of the excess error remains ({100 * keeps:.0f} % is allowed)"
-        )
+        small = f"in cross-validation it gains {gain:.2f} in mean ln R², and {LEAST_GAIN:g} is needed"
+        much = f"{100 * left:.0f} % of the excess error remains, and {100 * keeps:.0f} % is allowed"
+        message = "; ".join(text for text, fails in ((small, gain < LEAST_GAIN), (much, left > keeps)) if fails)
         return best, None, Rejection(best.name, message)
     alone = without(best, LATER)
     return best, alone, first_rejection(Trial(best, alone, null, keeps))

@@ -152,7 +152,7 @@ return x + r * (moved - u);
 class ModeBlock(AddedBlock):
     """x + r (q − x); state: last input, position, velocity/ω0."""
 
-    names = ("extra_resonance.r", "extra_resonance.f0", "extra_resonance.zeta")
+    names: tuple[str, ...] = ("extra_resonance.r", "extra_resonance.f0", "extra_resonance.zeta")
 
     def __init__(self, r: float, f0: float, zeta: float, sample_period: float) -> None:
         self.r = r
