@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Claim`: the one owner that may move a stage at present."""
+"""`Claim`: determines which owner may move a stage at present."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ import re
 from ..errors import StageError, printable
 
 _OWNER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
-"""What an owner may call itself."""
+"""Names that an owner may have."""
 
 
 class Claim:
-    """At most one owner at a time. The owner renews its claim. Times are in s on the steady clock.
+    """Held by at most one owner at a time, who has to renew it. Times are in s on the steady clock.
 
     Parameters
     ----------
     timeout : float
-        Time after which an owner that was not heard any more is taken for dead [s].
+        Time without a renewal after which the claim ends [s].
 
     Attributes
     ----------
     timeout : float
-        As given; may be set.
+        As above; it may be changed.
     owner : str
-        Who holds the claim; empty where nobody does.
+        Owner of the claim; empty where the stage is not claimed.
     """
 
     def __init__(self, timeout: float) -> None:
@@ -45,12 +45,12 @@ class Claim:
         self._heard = 0.0
 
     def take(self, owner: str, now: float) -> bool:
-        """Claim the stage, or repeat the claim; whether the owner is a new one.
+        """Claim the stage, or renew the claim; returns whether the owner is new.
 
         Raises
         ------
         StageError
-            If the stage is claimed by another one, or the name is none.
+            If another owner holds the claim, or the name is not allowed.
         """
         if not _OWNER.fullmatch(owner):
             raise StageError(f"claim: got owner {owner[:80]!r}, expected 1 to 64 letters, digits, '_', '.', '-'")
@@ -61,30 +61,30 @@ class Claim:
         return is_new
 
     def renew(self, owner: str, now: float) -> bool:
-        """Repeat the claim where it holds; False where it has ended, which an owner that stood still must learn."""
+        """Renew the claim. Returns False where it has ended, so that a suspended owner learns this."""
         if not owner or owner != self.owner:
             return False
         self._heard = now
         return True
 
     def release(self, owner: str) -> bool:
-        """Give the claim up; False where this owner does not hold it."""
+        """Release the claim; returns False where this owner does not hold it."""
         if not owner or owner != self.owner:
             return False
         self.owner = ""
         return True
 
     def has_expired(self, now: float) -> bool:
-        """Whether the owner has not been heard for longer than the time-out."""
+        """Whether the owner has not renewed its claim within the time-out."""
         return bool(self.owner) and now - self._heard > self.timeout
 
     def require(self, owner: str, what: str) -> None:
-        """Refuse what somebody else asks for while the stage is claimed; an empty `owner` is anybody.
+        """Refuse requests of others while the stage is claimed. An empty `owner` is a sender without a claim.
 
         Raises
         ------
         StageError
-            If the stage is claimed by another one, or `owner` does not hold the claim that it names.
+            If another owner holds the claim, or `owner` is given and does not hold it.
         """
         if owner == self.owner:
             return

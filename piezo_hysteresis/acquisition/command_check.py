@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`CommandCheck`: a command is played whole or refused whole. No node, only messages."""
+"""`CommandCheck`: checks a command, which is then either played completely or refused completely. No ROS."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ..stage.stage import Description, Samples
 
 @dataclass(frozen=True, slots=True)
 class CommandCheck:
-    """What a driver accepts.
+    """The rules by which a driver accepts commands.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class CommandCheck:
     sample_period : float
         Time between samples [s].
     max_age : float
-        Oldest command that is played, and furthest in the future [s].
+        Largest age of a command that is played, and largest time by which it may lie in the future [s].
     """
 
     limits: Description
@@ -42,16 +42,16 @@ class CommandCheck:
     max_age: float
 
     def waveform(self, voltage: Samples, stamp: int, now: int) -> Samples:
-        """Waveform of a command [V], shape (n,), checked but for its first step.
+        """The checked waveform of a command [V], shape (n,). `first_step` checks its first step.
 
         Parameters
         ----------
         voltage : (n,) ndarray of float64
             Drive voltage [V].
         stamp : int
-            When the command was sent [ns]; 0 where its age does not matter.
+            Time at which the command was sent [ns]; 0 switches the check of its age off.
         now : int
-            The driver's clock [ns].
+            Time on the driver's clock [ns].
 
         Raises
         ------
@@ -66,11 +66,11 @@ class CommandCheck:
         return self.limits.check_voltage(voltage, float(voltage[0]), self.sample_period)
 
     def first_step(self, waveform: Samples, present_voltage: float) -> None:
-        """Refuse a waveform that begins too far from the voltage in force [V]; StageError."""
+        """Raise StageError where a waveform begins too far from the present voltage [V]."""
         self.limits.check_voltage(waveform[:1], present_voltage, self.sample_period)
 
     def set_point(self, voltage: float) -> float:
-        """A voltage to ramp to [V]; StageError outside the limits or not finite."""
+        """A voltage to ramp to [V]; raises StageError where it is outside the limits or not finite."""
         self._require_drivable()
         low, high = self.limits.voltage_min, self.limits.voltage_max
         if not (math.isfinite(voltage) and low <= voltage <= high):

@@ -21,19 +21,19 @@ import math
 from .time_base import TimeBase
 
 _WINDOW = 100
-"""Number of blocks among which the least delayed one shows the difference of the clocks."""
+"""Number of blocks from which the least delayed one is taken to compare the clocks."""
 
 
 class DeviceClock:
-    """Follows the clock of a device by the times at which its blocks come.
+    """Estimates the clock of a device from the arrival times of its blocks.
 
-    Two quartz clocks part by some 50 µs per second. A block never comes before its last sample was taken, and mostly a
-    little later: of many blocks, the least delayed one shows how far the clocks differ.
+    Two quartz clocks drift apart by about 50 µs per second. A block arrives after its last sample was taken, with a
+    varying delay. Among many blocks, the least delayed one shows the difference of the clocks.
 
     Parameters
     ----------
     time_base : TimeBase
-        Moved when the clocks have parted by more than its tolerance.
+        It is shifted when the clocks differ by more than its tolerance.
     """
 
     def __init__(self, time_base: TimeBase) -> None:
@@ -41,12 +41,12 @@ class DeviceClock:
         self._least, self._blocks = math.inf, 0
 
     def follow(self, end: int, now: float) -> float:
-        """Note that the block before sample `end` has come at `now` [s] of the steady clock.
+        """Record that the block before sample `end` arrived at `now` [s] on the steady clock.
 
         Returns
         -------
         float
-            By how much later samples are due than was thought [s]; 0 where nothing had to be moved.
+            Shift of the time base to later times [s]; 0 where no shift was needed.
         """
         late = now - self._time_base.due(end)
         self._least, self._blocks = min(self._least, late), self._blocks + 1

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Drive`: the next samples to apply, with the phases that begin and end in them. No ROS."""
+"""`Drive`: the next samples to apply, and the phases that begin or end among them. No ROS."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Phase:
     name : str
         Phase name.
     commanded : bool
-        True where a waveform opened it.
+        True where the phase belongs to a commanded waveform.
     stamp : int
         Stamp of that command [ns].
     """
@@ -60,7 +60,7 @@ class EventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A phase began, was played to its end, or was stopped, before sample `offset` of the block."""
+    """Before sample `offset` of the block, a phase began, was completed, or was stopped."""
 
     offset: int
     kind: EventKind

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`LatencyBuffer`: labels of a drive that wait until its samples come back from a stage with latency. No ROS."""
+"""`LatencyBuffer`: delays the labels of a drive by the latency of the stage. No ROS."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class LatencyBuffer:
     Parameters
     ----------
     latency : int
-        Samples between a drive and its answer.
+        Samples between a voltage and the measurement of its effect.
     phase : int
-        Number of the phase that the first late samples belong to.
+        Number of the phase of the samples that are returned first.
     """
 
     def __init__(self, latency: int, phase: int) -> None:
@@ -41,11 +41,11 @@ class LatencyBuffer:
 
     @property
     def is_empty(self) -> bool:
-        """True when nothing that happened is still to be reported."""
+        """True when all events have been returned."""
         return not self._events
 
     def follow(self, drive: Drive) -> Drive:
-        """Take the drive that is given now and return the labels of what comes back now.
+        """Take the drive that is applied now, and return the labels of the samples that are measured now.
 
         Parameters
         ----------
@@ -54,7 +54,7 @@ class LatencyBuffer:
         Returns
         -------
         Drive
-            As many samples; its voltage is still that of the drive given.
+            As many samples as were given. Phases and events are delayed; the voltage is that of the given drive.
         """
         if not self._latency:
             return drive

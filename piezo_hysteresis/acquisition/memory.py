@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`MemoryAcquisition`: chains upload-run-read blocks of a stage with on-board memory. No ROS."""
+"""`MemoryAcquisition`: drives a stage with on-board memory by blocks that are uploaded, run and read. No ROS."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from .streaming import StreamingAcquisition
 class MemoryAcquisition(StreamingAcquisition):
     """As `StreamingAcquisition`, for a `MemoryStage`.
 
-    Waveforms and ramps are uploaded in blocks as long as the memory; while a voltage is held, single samples are read
-    on the slow path. The index follows the clock: time in which nothing was measured is a jump of the index, marked by
+    Waveforms and ramps are uploaded in blocks as long as the memory. While a voltage is held, single samples are read.
+    The index follows the clock, so that it jumps over the time in which nothing was measured; such a block is marked by
     `SampleBlock.follows_gap`.
 
     Parameters
@@ -74,7 +74,7 @@ class MemoryAcquisition(StreamingAcquisition):
         self._look(playback)
 
     def _look(self, playback: Playback) -> None:
-        """One sample on the slow path."""
+        """Read one sample while a voltage is held."""
         voltage, displacement = self.stage.read_voltage(), self.stage.read_displacement()
         first = max(self._time_base.index_at(time.monotonic()), self.index)
         with self._access:
@@ -85,7 +85,7 @@ class MemoryAcquisition(StreamingAcquisition):
         self._pass_on(first, drive, Acquired(np.array([voltage]), np.array([displacement])))
 
     def _play(self, playback: Playback, count: int) -> None:
-        """One block from upload to read-out; a stop is noticed between any two messages to the device."""
+        """Upload, run and read one block; a stop takes effect between any two messages to the device."""
         stage = cast(MemoryStage, self.stage)
         with self._access:
             voltage = playback.preview(count).voltage
@@ -114,7 +114,7 @@ class MemoryAcquisition(StreamingAcquisition):
             self._pass_on(first, drive, acquired)
 
     def _break_off(self, playback: Playback) -> None:
-        """The device goes to its safe voltage by itself; what it measured on the way is not known."""
+        """Let the device go to its safe voltage by itself; the samples on the way are not read."""
         self.stage.safe()
         if self._keeper is not None:
             self._keeper.require()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`record_phases`: waveforms played to a stage one after the other, and the samples of each as records. No ROS."""
+"""`record_phases`: plays waveforms to a stage in turn, and returns the samples of each as records. No ROS."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from .session import DriverSession
 from .streaming import Delivery, StreamingAcquisition
 
 SILENCE = 60.0
-"""Time without a sample, beyond the length of the waveform, after which a stage is given up [s]."""
+"""Time without a sample, beyond the length of the waveform, after which the recording ends with an error [s]."""
 
 
 def record_phases(
@@ -39,22 +39,22 @@ def record_phases(
     phases: Iterable[tuple[str, Samples, int]],
     progress: Callable[[str], None] = lambda name: None,
 ) -> tuple[Record, ...]:
-    """Play phases and record them; the stage rests at its safe voltage afterwards.
+    """Play phases and record them. Afterwards the stage is at its safe voltage.
 
     Parameters
     ----------
     session : DriverSession
-        Opened, not started.
+        A session that has been opened and not started.
     phases : iterable of (str, (n,) ndarray, int)
-        Name, drive at the sample period of the session [V], and how many samples are averaged into one.
+        Name, drive voltage at the sample period of the session [V], and number of samples that are averaged into one.
     progress : callable
         Called with the name of each phase before it is played.
 
     Returns
     -------
     tuple of Record
-        One per phase, or several where samples were never measured between them (a device reading out its memory);
-        all but the first continue the state of the stage.
+        One record per phase. Where samples were not measured (a device that reads out its memory) a phase gives several
+        records, and all but the first continue the state of the stage.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def record_phases(
     acquisition = session.start(time.time_ns, delivered.put, delivered.put, lambda: 1)
     records: list[Record] = []
     try:
-        while acquisition.playback.is_stopping:  # from where another program has left the stage
+        while acquisition.playback.is_stopping:  # from the voltage at which another program has left the stage
             _next(delivered, SILENCE)
         for name, voltage, average in phases:
             progress(name)
@@ -80,7 +80,7 @@ def _next(delivered: queue.SimpleQueue[Delivery | PiezoError], patience: float) 
     try:
         got = delivered.get(timeout=patience)
     except queue.Empty:
-        raise StageError(f"no sample came for {patience:g} s, expected some; is the device alive?") from None
+        raise StageError(f"no sample came for {patience:g} s, expected some; check the device") from None
     if isinstance(got, PiezoError):
         raise got
     return got
@@ -93,7 +93,7 @@ def _played(
     name: str,
     voltage: Samples,
 ) -> list[SampleBlock]:
-    """Blocks that hold samples of one phase, cut to those."""
+    """The blocks of one phase, without samples of other phases."""
     waveform = session.check.waveform(voltage, 0, 0)
     phase = acquisition.play(waveform, name, 0, session.check.first_step, lambda phase, size: None)
     patience = SILENCE + 2 * waveform.size * session.sample_period
@@ -111,7 +111,7 @@ def _played(
 
 
 def _records(blocks: list[SampleBlock], name: str, period: float, average: int, continues: bool) -> list[Record]:
-    """The blocks of one phase as records, cut where samples were never measured."""
+    """The blocks of one phase as records, cut where samples were not measured."""
     pieces: list[list[SampleBlock]] = []
     for block in blocks:
         if pieces and not block.follows_gap:

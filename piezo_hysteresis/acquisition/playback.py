@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Playback`: what the driver applies next, sample by sample: hold, ramp or waveform. No ROS."""
+"""`Playback`: determines the voltage of every sample: hold, ramp or waveform. No ROS."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ from ..errors import StageError
 from .drive import Drive, Event, EventKind, Phase, Samples
 
 _ENDLESS = 1 << 62
-"""Samples for which a voltage is held where no hold limit is set."""
+"""Number of samples that stands for an unlimited hold."""
 
 
 class Playback:
-    """Present voltage and phase, and what is applied next.
+    """Present voltage and phase, and the samples that follow.
 
     Parameters
     ----------
     voltage : float
-        Voltage in force [V].
+        Present voltage [V].
     safe_voltage : float
-        Where `stop` and the hold time-out lead [V].
+        Voltage that is approached after `stop` and after the hold time-out [V].
     sample_period : float
         Time between samples [s].
     ramp_rate : float
         Rate of every ramp [V/s].
     hold_timeout : float
-        Time after which a held voltage gives way to the safe one [s]; 0 holds for ever.
+        Time for which a voltage is held before the ramp to the safe voltage [s]; 0 holds it without limit.
 
     Notes
     -----
-    Phase 0 is ``idle``. A waveform opens the next number; everything after it (held voltage, set-points, the way to the
-    safe voltage) is a phase ``hold``. Waveforms are not checked here: see `CommandCheck`.
+    Phase 0 is ``idle``. A waveform begins the next phase. All that follows it (held voltage, set-points, the ramp to
+    the safe voltage) is a phase ``hold``. `CommandCheck` checks the waveforms.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Playback:
 
     @property
     def is_stopping(self) -> bool:
-        """True on the way to the safe voltage after `stop`."""
+        """True on the ramp to the safe voltage after `stop`."""
         return self._stopping
 
     @property
@@ -82,31 +82,31 @@ class Playback:
 
     @property
     def pending(self) -> int:
-        """Samples until the waveform or ramp under way ends; 0 while a voltage is held."""
+        """Samples until the present waveform or ramp ends; 0 while a voltage is held."""
         if self._waveform is not None:
             return self._waveform.size - self._played
         return math.ceil(abs(self._target - self.voltage) / self._step - 1e-9)
 
     def play(self, waveform: Samples, name: str, stamp: int = 0) -> Phase:
-        """Open the next phase with a waveform [V], from the next sample on.
+        """Begin the next phase with a waveform [V], at the next sample.
 
         Raises
         ------
         StageError
-            While another one is played, or the stage is on its way to the safe voltage.
+            While another waveform is played, or the stage is on its way to the safe voltage.
         """
         self.require_free(name)
         self._waveform, self._played = waveform, 0
         return self._begin(name, True, stamp)
 
     def ramp_to(self, voltage: float) -> None:
-        """Go to a voltage [V] at the ramp rate and hold it; StageError as for `play`."""
+        """Go to a voltage [V] at the ramp rate and hold it; raises StageError as `play` does."""
         self.require_free("set_voltage")
         self._hold()
         self._target = float(voltage)
 
     def stop(self) -> Phase:
-        """Leave what is played and go to the safe voltage; harmless when repeated. Returns the phase that ended."""
+        """End the present phase, go to the safe voltage, and return the ended phase; may be repeated."""
         stopped = self.phase
         if self.is_playing:
             self._waveform = None
@@ -116,7 +116,7 @@ class Playback:
         return stopped
 
     def jump(self, voltage: float) -> None:
-        """Take over the voltage [V] to which a device went by itself; it is held."""
+        """Hold the voltage [V] to which a device went by itself."""
         if self.is_playing:
             self._events.append((EventKind.STOPPED, self.phase))
         self._waveform, self._stopping = None, False
@@ -124,17 +124,17 @@ class Playback:
         self._hold()
 
     def pass_unseen(self, count: int) -> None:
-        """Let `count` samples of a held voltage pass without being taken: they count for the hold time-out only."""
+        """Skip `count` samples of a held voltage that are not measured; they only count for the hold time-out."""
         self._held = min(self._held + count, self._hold_limit - 1)
 
     def preview(self, count: int) -> Drive:
-        """The next `count` samples without taking them: for a device that is given them ahead."""
+        """The next `count` samples, which stay to be taken; for a device that receives its samples in advance."""
         twin = copy.copy(self)
         twin._events = list(self._events)
         return twin.take(count)
 
     def take(self, count: int) -> Drive:
-        """The next `count` samples; they count as applied."""
+        """Take the next `count` samples, which then count as applied."""
         voltage, phase = np.empty(count), np.empty(count, np.uint32)
         events: list[Event] = []
         at = 0
@@ -151,7 +151,7 @@ class Playback:
         return Drive(voltage, phase, tuple(events))
 
     def _advance(self, count: int) -> Samples:
-        """Samples of what is under way, at least one and at most `count`, and what comes after them."""
+        """Between one and `count` samples of the present waveform, ramp or hold, and the state after them."""
         if self._waveform is not None:
             part = self._waveform[self._played : self._played + count]
             self._played += part.size
@@ -188,7 +188,7 @@ class Playback:
         return self.phase
 
     def require_free(self, name: str) -> None:
-        """StageError while a waveform is played, or on the way to the safe voltage."""
+        """Raise StageError while a waveform is played, or on the way to the safe voltage."""
         if self.is_playing:
             raise StageError(f"{name}: '{self.phase.name}' is being played; wait for its end or stop it")
         if self._stopping:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`RecordedPlayback`: the phases of a replayed experiment, in place of commanded ones. No ROS."""
+"""`RecordedPlayback`: the phases of a replayed experiment, which take the place of commanded phases. No ROS."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class RecordedPlayback:
     phases : iterable of tuple
         Name and number of samples of every phase, in the order in which the stage plays them.
     voltage : float
-        Before the first one [V].
+        Voltage before the first phase [V].
     repeat : bool
-        Begin again after the last one; otherwise a phase ``hold`` follows.
+        Whether the phases are repeated after the last one; otherwise a phase ``hold`` follows.
     """
 
     is_playing = is_stopping = False
@@ -49,7 +49,7 @@ class RecordedPlayback:
         self.voltage = voltage
 
     def take(self, count: int) -> Drive:
-        """Labels of the next `count` samples; the voltages are for a stage that ignores them."""
+        """Labels of the next `count` samples. The stage ignores the voltages."""
         phase = np.empty(count, np.uint32)
         events: list[Event] = []
         at = 0
@@ -71,7 +71,7 @@ class RecordedPlayback:
         self._next += 1
 
     def require_free(self, name: str) -> None:
-        """StageError: it never is."""
+        """Raise StageError: a replayed stage accepts no command."""
         raise StageError(f"{name}: a recording is replayed and cannot be driven")
 
     def play(self, waveform: object, name: str, stamp: int = 0) -> Phase:
@@ -84,5 +84,5 @@ class RecordedPlayback:
         self.require_free("set_voltage")
 
     def stop(self) -> Phase:
-        """Nothing is energised."""
+        """Do nothing: a replayed stage has no voltage to remove."""
         return self.phase

@@ -46,8 +46,8 @@ class SampleBlock:
     frame : str
         Frame in which the displacement is measured; in recordings of earlier versions the name of the stage.
     follows_gap : bool
-        True where samples before the block were never measured (a device reading out its memory), as the jump of the
-        index shows; False where a jump of the index means lost messages.
+        True where the index jumps because samples were not measured (a device that reads out its memory); False where a
+        jump of the index means lost messages.
     """
 
     stamp: int
@@ -70,18 +70,18 @@ class SampleBlock:
         return {name: getattr(self, name) for name in ("time", "voltage", "displacement", "index", "phase")}
 
     def after(self, count: int) -> SampleBlock:
-        """Without its first samples."""
+        """The block without its first samples."""
         if count == 0:
             return self
         kept: dict[str, Any] = {name: values[count:] for name, values in self.columns.items()}
         return replace(self, **kept)
 
     def between(self, first: int, end: int) -> SampleBlock:
-        """Samples `first` to `end`, that one left out; the first one follows a gap only where the block's does."""
+        """Samples from `first` up to but without `end`. Only a part that begins with the block can follow a gap."""
         kept: dict[str, Any] = {name: values[first:end] for name, values in self.columns.items()}
         return replace(self, **kept, follows_gap=self.follows_gap and first == 0)
 
     @property
     def sample_period(self) -> float | None:
-        """Time between samples [s]; None for a block of one."""
+        """Time between samples [s]; None for a block of one sample."""
         return float(self.time[-1] - self.time[0]) / (self.size - 1) if self.size > 1 else None

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`DriverSession`: an opened stage with its limits and its lock, as a configured driver holds it. No ROS."""
+"""`DriverSession`: an opened stage with its limits and its lock, as a configured driver uses it. No ROS."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from .time_base import TimeBase
 
 
 class DriverSession:
-    """Opens a stage, and streams it between `start` and `make_safe`, as often as wanted, until it is closed.
+    """Opens a stage and streams its samples between `start` and `make_safe`, which may be repeated until `close`.
 
     Parameters
     ----------
@@ -47,16 +47,16 @@ class DriverSession:
     values : mapping
         Of the rows of the back end, by name.
     place : str
-        What no other driver may share, in words: topic and domain.
+        Description of the topic and domain that no other driver may use.
     read : callable, optional
-        Reads the records of a recording from its path, for the stage `replay`.
+        Function that reads the records of a recording from its path, for the stage `replay`.
     latch : StopLatch, optional
-        Outlives the session where it is given.
+        A latch that is kept beyond the session; by default the session makes its own.
 
     Raises
     ------
     PiezoError
-        If the stage cannot be opened, is driven already, or does not allow what the settings ask for.
+        If the stage cannot be opened, has another driver, or does not allow the settings.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class DriverSession:
 
     @property
     def streaming(self) -> StreamingAcquisition:
-        """The acquisition under way; StageError while nothing streams."""
+        """The running acquisition; raises StageError while there is none."""
         if self._acquisition is None:
             raise StageError("the driver is not active; activate it")
         return self._acquisition
@@ -104,7 +104,7 @@ class DriverSession:
         fail: Callable[[PiezoError], None],
         subscribers: Callable[[], int],
     ) -> StreamingAcquisition:
-        """Stream from the voltage in force on; see `StreamingAcquisition` for the parameters."""
+        """Begin to stream at the present voltage; see `StreamingAcquisition` for the parameters."""
         settings = self.settings
         wanted = self._values.get("subscribers", 0)
         arguments = (
@@ -129,11 +129,11 @@ class DriverSession:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What a user should know about the stage before it moves, a sentence each."""
+        """Sentences about the stage that a user should read before it moves."""
         return self.stage.notices if isinstance(self.stage, ReplayStage) else ()
 
     def in_force(self) -> dict[str, float | str | bool]:
-        """What holds, by the names of `IN_FORCE`."""
+        """The values in use, by the names of `IN_FORCE`."""
         limits, settings = self.limits, self.settings
         return {
             "stage": limits.name,
@@ -147,7 +147,7 @@ class DriverSession:
         }
 
     def _kept(self) -> KeeperLink | None:
-        """A keeper beside a device that can have one."""
+        """The keeper of a device that allows a second connection."""
         settings = self.settings
         if not (BACK_ENDS[settings.stage].has_keeper and settings.keeper_timeout):
             return None
@@ -162,16 +162,16 @@ class DriverSession:
         settings, safe = self.settings, self.limits.safe_voltage
         playback = Playback(stage.voltage, safe, self.sample_period, settings.ramp_rate, settings.hold_timeout)
         if abs(stage.voltage - safe) > settings.ramp_rate * self.sample_period:
-            playback.stop()  # left there by a driver that was killed, or by another program
+            playback.stop()  # a killed driver or another program has left the stage there
         return playback
 
     def make_safe(self) -> None:
-        """Ramp to the safe voltage and end the stream; harmless when nothing streams.
+        """Ramp to the safe voltage and end the stream; does nothing where there is no stream.
 
         Raises
         ------
         StageError
-            If the ramp was not finished in time; the stage has then been asked to go there by itself.
+            If the ramp was not finished in time. The stage has then been told to go there by itself.
         """
         acquisition, self._acquisition = self._acquisition, None
         if acquisition is None:
@@ -184,7 +184,7 @@ class DriverSession:
             )
 
     def close(self) -> None:
-        """Make safe, release stage and lock."""
+        """Bring the stage to its safe voltage, and release stage and lock."""
         try:
             self.stage.close()
         finally:

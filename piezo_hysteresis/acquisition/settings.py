@@ -30,9 +30,9 @@ _SOURCE = "driver"
 """Source of the parameters of the driver."""
 
 LARGEST_STEP = 0.4
-"""Share of the voltage range that the drive may move by from one sample to the next, where `max_slew_rate` is 0.
+"""Largest change of the drive from one sample to the next, as a share of the voltage range, where `max_slew_rate` is 0.
 
-Four thirds of the steepest edge of the identification protocols, 0.3 of the range in one sample.
+It is four thirds of the steepest edge of the identification protocols (0.3 of the range in one sample).
 """
 
 DRIVER: tuple[Row, ...] = (
@@ -61,7 +61,7 @@ DRIVER: tuple[Row, ...] = (
     Setting("frame_id", "", "frame of the displacement in all headers; empty: the namespace, without one 'stage'"),
     Parameter("discovery_time", "T_d", "s", 0.5, 0.0, 30.0, "wait for another driver of the same topics", _SOURCE),
 )
-"""Rows of the driver itself; those of the back ends follow under ``"<word>."``."""
+"""Parameters of the driver. The parameters of a back end have the prefix ``"<word>."``."""
 
 IN_FORCE: tuple[Row, ...] = (
     Setting("stage", "", "name of the stage"),
@@ -73,12 +73,12 @@ IN_FORCE: tuple[Row, ...] = (
     Parameter("ramp_rate", "S_r", "V/s", 0.0, 0.0, math.inf, "rate of set-points and of the way to safety", _SOURCE),
     Setting("stopped", False, "true after ~/stop, until ~/release"),
 )
-"""What holds while the driver is configured, under ``"in_force."``: planners read it."""
+"""Values in use while the driver is configured, with the prefix ``"in_force."``; planners read them."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriverSettings:
-    """Values of the rows of `DRIVER`, by name and in their units."""
+    """Values of the parameters in `DRIVER`, by name and in their units."""
 
     stage: str
     autostart: bool
@@ -102,19 +102,19 @@ class DriverSettings:
         return cls(**{field.name: values[field.name] for field in fields(cls)})
 
     def limits(self, stage: Description, sample_period: float) -> Description:
-        """The description of a stage, narrowed to what this driver lets pass; waveforms may be of any length.
+        """The description of a stage with the limits of this driver; waveforms may have any length.
 
         Parameters
         ----------
         stage : Description
-            Of the stage.
+            Description of the stage.
         sample_period : float
-            In force [s]: `LARGEST_STEP` counts per sample.
+            Sample period in use [s]; `LARGEST_STEP` is a change per sample.
 
         Raises
         ------
         ParameterError
-            If the driver would allow what the stage does not.
+            If the driver allows more than the stage.
         """
         if stage.ignores_drive:
             return stage
@@ -140,10 +140,10 @@ class DriverSettings:
         return replace(stage, voltage_min=low, voltage_max=high, max_slew_rate=slew, longest_block=None)
 
     def block_size(self, sample_period: float) -> int:
-        """Samples per message, at least one."""
+        """Number of samples per message, at least one."""
         return max(1, round(self.block_duration / sample_period))
 
     def longest_ramp(self, limits: Description) -> float:
-        """Time of the longest way to the safe voltage [s]."""
+        """Duration of the longest ramp to the safe voltage [s]."""
         reach = max(limits.voltage_max - limits.safe_voltage, limits.safe_voltage - limits.voltage_min)
         return math.ceil(reach / self.ramp_rate / self.real_time_factor)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`StageLock`: one driver per stage on a machine; the kernel releases it when the process dies. No ROS."""
+"""`StageLock`: allows one driver per stage on a machine, and ends with its process. No ROS."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from ..errors import StageError
 
 
 class StageLock:
-    """Locks on everything that only one driver may hold.
+    """Locks on the devices and names that only one driver may use.
 
     Parameters
     ----------
     holds : iterable of str
-        What is locked, in words: ``"device E-727 0123"``, ``"namespace /stage_x of domain 0"``.
+        Descriptions of what is locked, for example ``"device E-727 0123"`` or ``"namespace /stage_x of domain 0"``.
 
     Raises
     ------
     StageError
-        If another process holds one of them; none is kept then.
+        If another process holds one of the locks. All of them are then released.
     """
 
     def __init__(self, holds: Iterable[str]) -> None:
@@ -51,11 +51,11 @@ class StageLock:
                 raise
 
     def add(self, what: str) -> None:
-        """Lock one more thing; StageError if another process holds it."""
+        """Add a lock; raises StageError where another process holds it."""
         self._files.append(_lock(what))
 
     def release(self) -> None:
-        """Let others drive; harmless when repeated."""
+        """Release all locks; may be repeated."""
         for file in self._files:
             file.close()
         self._files.clear()

@@ -48,7 +48,7 @@ class Delivery:
     block : SampleBlock
         The samples.
     first : int
-        Number of the first sample, not wrapped.
+        Number of the first sample, without the wrap at 2^32.
     events : tuple of Event
         With offsets into the block.
     """
@@ -60,7 +60,7 @@ class Delivery:
 
 @dataclass(slots=True)
 class Tally:
-    """Counts and times [s] of an acquisition since its start."""
+    """Counters and times [s] of an acquisition since its start."""
 
     samples: int = 0
     blocks: int = 0
@@ -72,14 +72,14 @@ class Tally:
 
 
 class StreamingAcquisition:
-    """Blocks to and from a stage, one after the other, in a thread of its own.
+    """Exchanges blocks with a stage, one after the other, in its own thread.
 
     Parameters
     ----------
     stage : Stage
-        Configured; nobody else calls it while the thread runs.
+        Configured stage. Only this thread calls it while it runs.
     playback : Playback or RecordedPlayback
-        What is applied.
+        Source of the voltages.
     time_base : TimeBase
         Pace and stamps.
     block_size : int
@@ -87,19 +87,20 @@ class StreamingAcquisition:
     node_clock : callable
         The clock of the stamps [ns].
     deliver : callable
-        Takes every `Delivery`, in the thread.
+        Function that takes every `Delivery`; called in the thread.
     fail : callable
-        Takes the PiezoError that ended the thread; the stage has been made safe by itself where it could.
+        Function that takes the PiezoError that ended the thread. The stage has then gone to its safe voltage if it
+        could.
     ready : callable, optional
-        The first block waits until it is true.
+        The first block waits until this function returns True.
     latch : StopLatch, optional
-        Set by `stop`; nothing is played and no set-point taken while it is.
+        Latch that `stop` sets. While it is set, waveforms and set-points are refused.
     keeper : KeeperLink, optional
-        Of the stage; the thread ends with an error once it is lost.
+        Keeper of the stage. The thread ends with an error when the keeper is lost.
     """
 
     patience = 0.5
-    """Lag that is caught up with; beyond it the time base is postponed [s]."""
+    """Largest delay that the thread catches up with [s]; after a longer delay the time base is postponed."""
 
     def __init__(
         self,
@@ -128,7 +129,7 @@ class StreamingAcquisition:
         self._thread = threading.Thread(target=self._run, name="acquisition", daemon=True)
 
     def start(self) -> None:
-        """Begin with sample 0 now."""
+        """Start the thread; sample 0 is taken now."""
         self._thread.start()
 
     def play(
@@ -139,7 +140,7 @@ class StreamingAcquisition:
         check: Callable[[Samples, float], None],
         accepted: Callable[[Phase, int], None],
     ) -> Phase:
-        """Play a waveform next if `check` passes it at the voltage then in force; see `Playback.play`.
+        """Play a waveform next if `check` accepts it at the voltage of that moment; see `Playback.play`.
 
         `accepted` is called with the phase and the number of samples before the first one is applied.
         """
@@ -158,24 +159,24 @@ class StreamingAcquisition:
             self.playback.ramp_to(voltage)
 
     def stop(self) -> tuple[Phase, bool]:
-        """As `cancel`, and nothing moves after that until the latch is released."""
+        """As `cancel`, and forbid all motion until the latch is released."""
         self._latch.set()
         return self.cancel()
 
     def cancel(self) -> tuple[Phase, bool]:
-        """See `Playback.stop`; the phase that ended, and whether it was being played."""
+        """End the present phase as `Playback.stop` does; returns it, and whether a waveform was being played."""
         with self._access:
             was_playing = self.playback.is_playing
             return self.playback.stop(), was_playing
 
     def make_safe(self, timeout: float) -> bool:
-        """Stop, wait until the stage rests at the safe voltage and has reported it, and end the thread.
+        """Stop, wait until the stage has reported the safe voltage, and end the thread.
 
         Returns
         -------
         bool
-            False where the stage was not there within `timeout` [s]. True also for a thread that had failed: it has
-            made the stage safe, or reported that it could not.
+            False where the stage was not at the safe voltage within `timeout` [s]. True also where the thread had
+            failed before, because it has then made the stage safe or reported that it could not.
         """
         if not self._thread.is_alive():
             return True
@@ -198,7 +199,7 @@ class StreamingAcquisition:
                 self._step()
                 if self.playback.is_safe and self._late.is_empty:
                     self._safe.set()
-        except Exception as error:  # whatever it is, the stage must not stay energised
+        except Exception as error:  # after any exception the stage must not keep its voltage
             self._fail(self._abandon(error))
             self._safe.set()
 
@@ -221,7 +222,7 @@ class StreamingAcquisition:
         self._pass_on(self.index, self._late.follow(drive), acquired)
 
     def _keep_pace(self) -> bool:
-        """Wait until the next block is due; False where the thread has to end first."""
+        """Wait until the next block is due; returns False where the thread has to end before."""
         due = self._time_base.due(self.index + self.block_size)
         if not self._wait_until(due):
             return False
@@ -232,19 +233,19 @@ class StreamingAcquisition:
         return True
 
     def _follow(self, clock: DeviceClock) -> None:
-        """A device with a clock of its own has given a block when it was ready."""
+        """Follow the clock of a device that paces its blocks itself."""
         end, now = self.index + self.block_size, time.monotonic()
-        if self.index == 0:  # opening its stream took as long as it took
+        if self.index == 0:  # the time for opening the stream is unknown
             self._time_base.postpone(end, now)
         self.tally.latest = max(self.tally.latest, now - self._time_base.due(end))
         self.tally.clock_drift += clock.follow(end, now)
 
     def _wait_until(self, steady: float) -> bool:
-        """False where the thread has to end first."""
+        """Wait until a time; returns False where the thread has to end before."""
         return not self._halting.wait(max(steady - time.monotonic(), 0.0))
 
     def _pass_on(self, first: int, drive: Drive, acquired: Acquired) -> None:
-        """Deliver samples that begin at index `first`; what lies before them was never measured."""
+        """Deliver samples that begin at index `first`; the samples before them were not measured."""
         self.tally.clock_jumps += abs(self._time_base.follow(first, *read_together(self._node_clock)))
         count = acquired.voltage.size
         block = SampleBlock(

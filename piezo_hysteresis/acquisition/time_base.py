@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`TimeBase`: sample index <-> steady clock <-> stamp. No ROS."""
+"""`TimeBase`: converts between sample index, steady clock and time stamp. No ROS."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from collections.abc import Callable
 _NANO = 1_000_000_000
 """Nanoseconds in a second."""
 _TOGETHER = 2e-5
-"""Two readings so close count as one moment [s]."""
+"""Two readings within this time count as simultaneous [s]."""
 _ATTEMPTS = 8
-"""Readings of both clocks, of which the closest pair counts."""
+"""Number of readings of both clocks; the closest pair is used."""
 
 
 def read_together(node_clock: Callable[[], int]) -> tuple[float, int]:
-    """The steady clock [s] and the node's [ns] at one moment.
+    """Simultaneous readings of the steady clock [s] and of the node's clock [ns].
 
-    A busy computer may take the processor away between the two readings, which then would look like a jump of the
-    node's clock: of several attempts the closest counts.
+    A busy computer may interrupt the program between the two readings, which would look like a jump of the node's
+    clock. Of several attempts the closest pair is therefore used.
     """
     apart, steady, node = float("inf"), 0.0, 0
     for _ in range(_ATTEMPTS):
@@ -55,12 +55,12 @@ class TimeBase:
 
     Notes
     -----
-    A stamp is anchor + (index − anchor index)·T_s, free of the jitter of the computer. Only the two clocks are compared
-    to find a jump of the node's clock; a block that is published late moves nothing.
+    A stamp is anchor + (index − anchor index)·T_s, which is free of the jitter of the computer. A jump of the node's
+    clock is found by comparing the two clocks; a block that is published late does not change the stamps.
     """
 
     tolerance = 1e-3
-    """Departure of the node's clock from the stamps at which they are anchored anew [s]."""
+    """Difference between the node's clock and the stamps from which the anchor is renewed [s]."""
 
     def __init__(self, sample_period: float, rate: float = 1.0) -> None:
         self.sample_period = sample_period
@@ -68,29 +68,29 @@ class TimeBase:
         self.anchor(0, 0.0, 0)
 
     def anchor(self, index: int, steady: float, node: int) -> None:
-        """Let sample `index` be taken at `steady` [s] on the steady clock, `node` [ns] on the node's."""
+        """Set the anchor: sample `index` is taken at `steady` [s] and `node` [ns] of the two clocks."""
         self._anchor(index, steady, node)
         self._offset = node - round(steady * _NANO)
 
     def due(self, index: int) -> float:
-        """Time of a sample on the steady clock [s]."""
+        """Time at which a sample is due on the steady clock [s]."""
         return self._steady + (index - self._index) * self._real_period
 
     def index_at(self, steady: float) -> int:
-        """First sample that is not before `steady` [s]."""
+        """Index of the first sample that is not before `steady` [s]."""
         return self._index + -int((self._steady - steady) // self._real_period)
 
     def stamp(self, index: int) -> int:
-        """Stamp of a sample [ns]; not below zero, where a simulated clock has just begun."""
+        """Stamp of a sample [ns]. It is not below zero, also where a simulated clock has just begun."""
         return max(0, self._stamp_at(index))
 
     def follow(self, index: int, steady: float, node: int) -> float:
-        """Anchor anew at `index` if the node's clock, read together with the steady one, has jumped.
+        """Renew the anchor at `index` if the node's clock has jumped against the steady clock.
 
         Returns
         -------
         float
-            By how much the stamps moved [s]; 0 where nothing had to be done.
+            Shift of the stamps [s]; 0 where the clock has not jumped.
         """
         jump = node - round(steady * _NANO) - self._offset
         if abs(jump) <= self.tolerance * _NANO:
@@ -100,14 +100,14 @@ class TimeBase:
         return jump / _NANO
 
     def postpone(self, index: int, steady: float) -> float:
-        """Let sample `index` be due at `steady` [s], later than it was, or earlier where a device's clock is faster.
+        """Shift the time base so that sample `index` is due at `steady` [s], later or (fast device) earlier.
 
-        Stamps move along in real time; where the stage runs at another rate they stay without a gap.
+        In real time the stamps shift too. Where a simulated stage runs at another rate, they stay without a gap.
 
         Returns
         -------
         float
-            The delay [s].
+            The shift [s].
         """
         delay = steady - self.due(index)
         moved = round(delay * _NANO) if self._real_period == self.sample_period else 0

@@ -33,13 +33,13 @@ class Prediction:
     Parameters
     ----------
     first : int
-        First sample of the block that counts; those before it were repeated.
+        Position of the first new sample in the block; the samples before it had been received already.
     prediction, residual : (n,) ndarray
         Predicted displacement, and measured minus predicted [m], of the samples from `first` on; empty without a model.
     model : Model or None
-        Model they come from.
+        Model that computed them.
     warming_up : bool
-        True while what the drive did unseen still matters: before the first block, or in a gap.
+        True while voltages that were not received (before the first block, in a gap) influence the prediction.
     """
 
     first: int

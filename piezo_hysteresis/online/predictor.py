@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Predictor`: a model that follows a stage block by block: prediction, residual, change of model in mid-stream."""
+"""`Predictor`: predicts a stage block by block, and changes to a new model while samples arrive."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from .warmup import Warmup, chain_at
 Array = NDArray[np.float64]
 
 ZERO_TIME = 0.1
-"""Time over which the offset between sensor and model is averaged [s]; in motion it takes a whole loop."""
+"""Time over which the offset between sensor and model is averaged [s]; a moving stage is averaged over a loop."""
 
 ZERO_SAMPLES = 20
-"""Samples over which it is averaged at least."""
+"""Fewest samples over which the offset is averaged."""
 
 PIECE = 50_000
-"""Samples of the history that a new model is run over with every block: a few milliseconds of computing."""
+"""Samples of the history that a new model processes per block of the stream; this takes a few milliseconds."""
 
 SHORTEST_PERIOD, LONGEST_PERIOD = 1e-7, 1e3
-"""Sample periods of a stream [s]: memory goes with their inverse."""
+"""Limits of the sample period of a stream [s]; the memory needed is inversely proportional to it."""
 
 FORGETTING = 2.0
-"""Voltage scales after which loops have forgotten where they came from, exponentially with the way travelled."""
+"""Travel of the drive, in voltage scales, after which the initial state of a loop has decayed."""
 
 
 class Predictor:
@@ -56,14 +56,14 @@ class Predictor:
     sample_period : float
         Time between samples of the stream [s].
     model : Model, optional
-        First model; without one only the history is kept.
+        First model. Without a model the predictor only keeps the history.
     rms_time : float
         Time over which `residual_rms` is taken [s].
 
     Attributes
     ----------
     model : Model or None
-        Model in force.
+        Present model.
     chain, state : Chain, ChainState or None
         Its coefficients, and its state after the newest sample.
     sequence : SequenceCheck
@@ -71,14 +71,14 @@ class Predictor:
 
     Notes
     -----
-    A clean stream gives bit for bit ``model.run`` from rest at its first voltage, plus `offset`. Effects that depend on
-    time count it from the first sample. A new model takes over between two blocks, once it has been run over the
-    history; until then the old one goes on.
+    Without lost samples the prediction equals ``model.run`` from rest at the first voltage, plus `offset`, bit for bit.
+    Effects that depend on time count it from the first sample. A new model replaces the old one between two blocks,
+    after it has been run over the history.
 
     Raises
     ------
     RecordError
-        On a sample period that no stage has.
+        If the sample period is outside the limits.
     ModelError
         If the stream is faster than the model.
 
@@ -112,7 +112,7 @@ class Predictor:
 
     @property
     def offset(self) -> float:
-        """Sensor minus model where the offset was taken [m]."""
+        """Mean of sensor minus model over the window in which the offset was measured [m]."""
         return self._zero.offset
 
     @property
@@ -122,7 +122,7 @@ class Predictor:
 
     @property
     def warming_up(self) -> bool:
-        """True while what the drive did unseen, before the first block or in a gap, still matters."""
+        """True while voltages that were not received (before the first block, in a gap) influence the prediction."""
         if self._unseen is None:
             return False
         travelled = self._history.travel - self._unseen
@@ -135,21 +135,21 @@ class Predictor:
 
     @property
     def drive(self) -> DriveHistory:
-        """What was driven so far, as far as it is kept."""
+        """The drive voltage so far, as far as the history keeps it."""
         return self._history.copy()
 
     def swap(self, model: Model, offset: float | None = None) -> None:
-        """Let another model take over once it has been run over the history, with its offset [m] if that is known.
+        """Change to another model after it has been run over the history; `offset` [m] is its sensor offset, if known.
 
-        While one is on its way, the newest of the others waits until that one has taken over: models that come faster
-        than they can be run over the history hold up none.
+        While one model is being run over the history, the newest of the later models waits. Models may therefore arrive
+        faster than they can be run over the history.
 
         Raises
         ------
         ModelError
-            If the stream is faster than the model; the present one goes on.
+            If the stream is faster than the model; the present model stays.
         DivergenceError
-            If it runs away on the history; the present one goes on.
+            If the model diverges on the history; the present model stays.
         """
         chain = chain_at(model, self.sample_period)
         if self._history.count == 0:
@@ -161,7 +161,7 @@ class Predictor:
             self._warm(PIECE)
 
     def zero(self) -> None:
-        """Take the offset anew, over the next 0.1 s."""
+        """Measure the offset again, over the next 0.1 s."""
         self._zero_from(self._history.count)
 
     def predict(
@@ -173,7 +173,7 @@ class Predictor:
         follows_gap: bool = False,
         settled: bool = True,
     ) -> Prediction:
-        """Follow the stage over the next block.
+        """Predict the next block and compare it with the measurement.
 
         Parameters
         ----------
@@ -188,7 +188,7 @@ class Predictor:
         follows_gap : bool
             True where the samples missing before the block were never measured: the drive was held meanwhile.
         settled : bool
-            False where the stage has been driven before, so that a stream that begins here begins with loops unknown.
+            False where the stage has been driven before: its hysteresis begins a stream in an unknown state.
 
         Returns
         -------
@@ -197,9 +197,9 @@ class Predictor:
         Raises
         ------
         RecordError, ModelError
-            On channels that are empty, not finite or of different length; the block then counts as lost.
+            If a channel is empty or not finite, or if the lengths differ; the block is then treated as lost.
         DivergenceError
-            If the model, or the one to come, runs away; it is dropped and the history goes on.
+            If the present or the next model diverges. That model is removed, and the history is kept.
         """
         drive, measured = samples(voltage, "voltage"), samples(displacement, "displacement")
         if drive.size != measured.size:
@@ -239,7 +239,7 @@ class Predictor:
         self._rms.clear()
 
     def _bridge(self, missing: int, never_measured: bool) -> None:
-        """Hold the last voltage; what was really driven is unknown where the samples were lost on the way."""
+        """Bridge missing samples with the last voltage. The true voltage is unknown where messages were lost."""
         if not never_measured:
             self._unseen = self._history.travel
         gap = min(missing, round(LONGEST_SILENCE / self.sample_period), FULL_SAMPLES)
@@ -266,7 +266,7 @@ class Predictor:
         elif self._joined_unseen and not self.warming_up:
             self._joined_unseen = False
             self._zero_from(start)
-            self._zero.until = 2.0 * self._history.travel  # once more as far as what was forgotten
+            self._zero.until = 2.0 * self._history.travel  # as long again as the part that was forgotten
         elif self._zero.at_rest and not is_held(drive):
             self._zero.close()
         self._zero.add(measured, modelled, self._history.travel)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`RecentDisplacement`: the measured displacement of the last minute, for fitting a model to it."""
+"""`RecentDisplacement`: keeps the measured displacement of the last minute, to which a model can be fitted."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from .voltage_history import FULL_SAMPLES
 Array = NDArray[np.float64]
 
 DURATION = 60.0
-"""Time that is kept [s]; less where this is more than `FULL_SAMPLES`."""
+"""Time that is kept [s]; it is shorter where this time would exceed `FULL_SAMPLES`."""
 
 
 class RecentDisplacement:
-    """A ring of samples that follow one another without a gap.
+    """Ring buffer of consecutive samples without a gap.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class RecentDisplacement:
         self._end = self._filled = 0
 
     def add(self, index: int, displacement: Array) -> None:
-        """Add a block of samples [m], the first of which has a running number modulo 2^32; after a gap, begin anew."""
+        """Add a block of samples [m]; `index` counts its first sample modulo 2^32. A gap empties the buffer first."""
         if index != self._next:
             self.clear()
         self._next = (index + displacement.size) % 2**32
@@ -55,11 +55,11 @@ class RecentDisplacement:
         self._filled = min(self._filled + newest.size, self._ring.size)
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Remove all samples."""
         self._next, self._end, self._filled = None, 0, 0
 
     def copy(self) -> Array:
-        """All samples that are kept, the oldest first [m]."""
+        """A copy of the samples [m], the oldest first."""
         start = self._end - self._filled
         if start < 0:
             return np.concatenate((self._ring[start:], self._ring[: self._end]))

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class RunningRms:
-    """Rms over the newest blocks that together hold so many samples, or over all while there are fewer.
+    """Rms over the newest blocks that together hold `count` samples; None until there are as many.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class RunningRms:
 
     @property
     def value(self) -> float | None:
-        """Of what was added; None before there is anything."""
+        """Rms of the samples [unit of the samples]; None while there are too few."""
         return float(np.sqrt(sum(s for _, s in self._squares) / self._held)) if self._held else None
 
     def add(self, values: Array) -> None:
@@ -56,6 +56,6 @@ class RunningRms:
             self._held -= self._squares.popleft()[0]
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Remove all samples."""
         self._squares: deque[tuple[int, float]] = deque()
         self._held = 0

@@ -30,14 +30,14 @@ class SensorOffset:
     start : int
         First sample of the window.
     wanted : int
-        Samples to average; the offset holds from the first one on and settles with them.
+        Number of samples to average. The offset is used from the first sample on and improves with each further one.
     at_rest : bool
         True where the window ends early with the rest of the stage.
 
     Attributes
     ----------
     until : float
-        Travel of the drive [V] before which the window stays open, so that it covers a loop and not a piece of one.
+        The window stays open until the drive has travelled this far [V], so that it covers a whole loop.
     """
 
     def __init__(self, start: int, wanted: int, at_rest: bool = False) -> None:
@@ -48,7 +48,7 @@ class SensorOffset:
 
     @classmethod
     def known(cls, start: int, offset: float) -> SensorOffset:
-        """An offset [m] that needs no samples, from sample `start` on."""
+        """A known offset [m], valid from sample `start` on; no samples are averaged."""
         zero = cls(start, 0)
         zero._known = offset
         return zero
@@ -59,14 +59,14 @@ class SensorOffset:
         return (self._measured - self._modelled) / (self.stop - self.start) if self.stop > self.start else self._known
 
     def add(self, measured: Array, modelled: Array | None, travel: float) -> None:
-        """Take the next samples, as far as they are wanted.
+        """Add the next samples that lie in the window.
 
         Parameters
         ----------
         measured, modelled : (n,) ndarray
             Displacement [m]; `modelled` is None without a model.
         travel : float
-            Way of the drive so far [V].
+            Travel of the drive so far [V].
         """
         if travel < self.until:
             self._end = max(self._end, self.stop + measured.size)
@@ -79,9 +79,9 @@ class SensorOffset:
         self.stop += count
 
     def close(self) -> None:
-        """Want no more samples."""
+        """Close the window; later samples are ignored."""
         self._end = self.stop
 
     def remodel(self, mean: float) -> None:
-        """Put another model in, whose mean over the window is `mean` [m]."""
+        """Change to another model, whose mean displacement over the window is `mean` [m]."""
         self._modelled = mean * (self.stop - self.start)

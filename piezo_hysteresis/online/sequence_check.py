@@ -12,17 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`SequenceCheck`: the running index of a stream of blocks, checked for loss, repetition and new starts."""
+"""`SequenceCheck`: checks the running index of a stream of blocks for lost samples, repeated samples and restarts."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 LONGEST_SILENCE = 60.0
-"""A jump of the index that the stamps do not explain is a loss up to this time [s], a new start beyond."""
+"""Longest time [s] that a jump of the index may stand for if it counts as lost samples; a longer one counts as a
+restart."""
 
 LONGEST_DELAY = 1.0
-"""A block that repeats samples older than this [s] is no late message but a new start."""
+"""A block that repeats samples older than this [s] counts as a restart, not as a late message."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +33,9 @@ class Arrival:
     Parameters
     ----------
     missing : int
-        Samples that were skipped before the block.
+        Number of samples missing before the block.
     repeated : int
-        Leading samples of the block that came before; all of them where the block is late or doubled.
+        Number of leading samples that had been received already; all samples where the block is late or repeated.
     restarted : bool
         True for the first block of a stream.
     """
@@ -55,7 +56,7 @@ class SequenceCheck:
     Attributes
     ----------
     received, lost, repeated, restarts : int
-        Samples that counted, samples that never came, samples that came again or too late, and new starts.
+        Numbers of accepted samples, of lost samples, of samples that came twice or too late, and of restarts.
     """
 
     def __init__(self, sample_period: float) -> None:
@@ -65,7 +66,7 @@ class SequenceCheck:
         self._end = 0
 
     def join(self, index: int, stamp: int, size: int, follows_gap: bool = False) -> Arrival:
-        """Take the next block.
+        """Compare the next block with the blocks before it.
 
         Parameters
         ----------

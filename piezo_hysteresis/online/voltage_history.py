@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`VoltageHistory`: the drive voltage since the stage rested, for running another model over it."""
+"""`VoltageHistory`: keeps the drive voltage since the stage was at rest, so that a new model can be run over it."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FULL_SAMPLES = 3_000_000
-"""Samples kept in full at most, a minute at 50 kHz: 36 MB."""
+"""Largest number of samples at the full rate: a minute at 50 kHz, 36 MB."""
 
 REST_TOLERANCE = 5e-3
-"""Voltages that stay within this distance [V] count as held: the noise of a measured drive."""
+"""Voltages within this distance [V] count as held; it allows for the noise of a measured drive."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DriveHistory:
-    """The drive voltage since the stage rested, as a value.
+    """A frozen copy of the drive voltage since the stage was at rest.
 
     Parameters
     ----------
@@ -59,19 +59,19 @@ class DriveHistory:
 class VoltageHistory:
     """Every sample of the last `duration`, and averages over `slow_period` of the time before.
 
-    A stage that rests at the beginning of the stream needs no samples: the history begins where the drive leaves
-    `rest_voltage`.
+    The history begins where the drive leaves `rest_voltage`; samples of a stage that is still at rest are not kept.
 
     Parameters
     ----------
     sample_period : float
         Time between samples [s].
     duration : float
-        Time kept in full [s], `FULL_SAMPLES` at most; up to half as much again before the oldest part is averaged.
+        Time kept at the full rate [s], limited by `FULL_SAMPLES`; it grows by up to half before the oldest part is
+        averaged.
     slow_period : float
         Averaging time of older samples [s].
     slow_duration : float
-        Time kept as averages [s]; older ones are forgotten.
+        Time kept as averages [s]; older averages are removed.
     """
 
     def __init__(
@@ -83,14 +83,14 @@ class VoltageHistory:
     ) -> None:
         self.sample_period = sample_period
         self.factor = max(1, round(slow_period / sample_period))
-        """Samples averaged into a slow one."""
+        """Number of samples in one average."""
         self.rest_voltage = 0.0
         """Voltage [V] held before the first sample kept."""
         self.count = 0
-        """Samples of the stream so far."""
+        """Number of samples of the stream so far."""
         self.travel = 0.0
-        """Way of the drive since the beginning of the stream [V], at least: from end to end of every block that is not
-        held, so that the noise of a measured drive is no way."""
+        """Lower bound of the travel of the drive since the beginning of the stream [V]. It adds the distances between
+        the ends of all blocks that are not held, so that the noise of a measured drive does not count."""
         self._counted = 0.0
         self.has_rested = False
         """True once a block of the drive stood still."""
@@ -142,7 +142,7 @@ class VoltageHistory:
         position : int
             Where the last `read` ended, or `start`.
         values : int
-            Values wanted; of full ones as many more as make up whole averages, fewer at the end.
+            Number of values. At the full rate it is rounded up to whole averages; at the end there are fewer.
 
         Returns
         -------
@@ -159,7 +159,7 @@ class VoltageHistory:
         return 1, self._full[first : min(first + whole, self._kept)].copy()
 
     def copy(self) -> DriveHistory:
-        """All that is kept, at present."""
+        """A frozen copy of the history as it is now."""
         period = self.sample_period
         full = self._full[: self._kept].copy()
         return DriveHistory(

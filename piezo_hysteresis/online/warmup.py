@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Warmup`: a model brought to the present state of the stage by running it over the voltage history."""
+"""`Warmup`: brings a model to the present state of the stage by running it over the voltage history."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ def chain_at(model: Model, sample_period: float) -> Chain:
 
 
 class Warmup:
-    """A run over the history in pieces, so that a stream is not held up.
+    """Runs a model over the history in pieces, so that the stream does not have to wait.
 
     Parameters
     ----------
     model : Model
         Model to bring up to date.
     history : VoltageHistory
-        May grow meanwhile.
+        History of the stream, which may grow during the run.
     zero : SensorOffset
-        Samples of the stream whose mean prediction is wanted.
+        Offset whose window determines the samples for the mean prediction.
     offset : float, optional
         Sensor minus model [m], where it is known.
 
@@ -84,21 +84,21 @@ class Warmup:
 
     @property
     def mean(self) -> float | None:
-        """Mean prediction [m] over the window; None if the history no longer reaches it."""
+        """Mean prediction [m] over the window; None if the history begins after it."""
         return self._sum / self._weight if self._weight else None
 
     def advance(self, values: int) -> bool:
-        """Run over the next piece of the history; True once the model has reached its end.
+        """Run the model over the next piece of the history; returns True when it has reached the end.
 
         Parameters
         ----------
         values : int
-            Voltages to run over, averaged or full ones.
+            Number of voltages, averaged or at the full rate.
 
         Raises
         ------
         DivergenceError
-            If the model runs away.
+            If the model diverges.
         """
         while values > 0:
             self._position = max(self._position, self._history.start)
@@ -122,9 +122,9 @@ class Warmup:
 
 
 def compile_kernels() -> None:
-    """Run every effect once, switched on, fast and slow, so that no stream waits for a compiler.
+    """Run every effect once at the fast and at the slow rate, so that its kernels are compiled before a stream begins.
 
-    An effect that does not stand alone with its host (softening needs a resonance) is compiled when it is first met.
+    An effect that needs a further effect (softening needs a resonance) is compiled when it is first used.
     """
     for kind in CHAIN:
         rows = [p for p in kind.parameters if p.off is not None and not p.is_array]

@@ -15,8 +15,8 @@
 """`keeper`: a process that brings a stage to its safe voltage when the heartbeats of its driver end. No ROS.
 
 It is started by the driver (`KeeperLink`), which sends on standard input, in one line of JSON, how to open the stage,
-and after that sends a byte now and then. The keeper opens the stage over a connection of its own, without moving it,
-answers ``ready``, and does nothing as long as bytes come.
+and then sends a byte at regular intervals. The keeper opens the stage over its own connection, without moving it,
+answers ``ready``, and does nothing as long as bytes arrive.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from ...stage.opening import Opening
 from ...stage.stage import Stage
 
 READY = "ready"
-"""What the keeper answers when it holds the stage."""
+"""Answer of the keeper when it has opened the stage."""
 GOODBYE = b"q"
 """Sent by a driver that has made its stage safe itself."""
 ATTEMPTS = 5
-"""How often the keeper tries to bring the stage to its safe voltage."""
+"""Number of attempts to bring the stage to its safe voltage."""
 _BETWEEN_ATTEMPTS = 0.2
 """Time between two attempts [s]."""
 
 
 def main() -> int:
-    """Keep one stage; returns 0 where it needed nothing or was brought to its safe voltage, 1 where that failed."""
+    """Run the keeper of one stage. Returns 1 where the stage could not be brought to its safe voltage, otherwise 0."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver makes the stage safe, and says goodbye
     line = sys.stdin.readline()
     if not line:
@@ -80,7 +80,7 @@ def _opened(order: Mapping[str, Any]) -> Stage:
 
 
 def _listen(timeout: float) -> str:
-    """Why the heartbeats ended; empty where the driver said goodbye."""
+    """Reason why the heartbeats ended; empty where the driver ended them on purpose."""
     heard, descriptor = b"", sys.stdin.fileno()
     while not heard.endswith(GOODBYE):
         ready, _, _ = select.select([descriptor], [], [], timeout)
@@ -93,10 +93,10 @@ def _listen(timeout: float) -> str:
 
 
 def _make_safe(stage: Stage, order: Mapping[str, Any]) -> int:
-    time.sleep(stage.description.latency)  # what waits in the buffer of a device is played to its end first
+    time.sleep(stage.description.latency)  # the samples in the buffer of a device are played first
     for _ in range(ATTEMPTS):
         try:
-            if order["ends_driver"]:  # its device was the driver's alone: the stage learns where it stands
+            if order["ends_driver"]:  # only the driver had used the device: read the present voltage first
                 stage = _opened(order)
             stage.safe()
         except PiezoError as error:

@@ -33,7 +33,7 @@ from .keeper import GOODBYE, READY
 _START = 30.0
 """Longest time that a keeper takes to start and to open the stage [s]."""
 _PER_TIMEOUT = 10
-"""Heartbeats within the silence that the keeper allows."""
+"""Number of heartbeats within the time-out of the keeper."""
 
 
 class KeeperLink:
@@ -44,13 +44,13 @@ class KeeperLink:
     word : str
         Back end of the stage.
     values : mapping
-        Of its rows, by name.
+        Values of the parameters of the back end, by name.
     sample_period : float
-        In force [s].
+        Sample period of the driver [s].
     limits : Description
-        Of the driver.
+        Limits of the driver.
     ramp_rate : float
-        Of the way to the safe voltage [V/s].
+        Rate of the ramp to the safe voltage [V/s].
     timeout : float
         Silence of this process after which the keeper acts [s].
 
@@ -84,7 +84,7 @@ class KeeperLink:
             [sys.executable, "-m", "piezo_hysteresis.acquisition.safety.keeper"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            start_new_session=True,  # what ends the driver's group shall not end its keeper
+            start_new_session=True,  # a signal to the driver's process group must not end its keeper
         )
         assert self._process.stdin is not None
         self._pipe = self._process.stdin.fileno()
@@ -101,11 +101,11 @@ class KeeperLink:
 
     @property
     def is_lost(self) -> bool:
-        """True where the keeper has acted or died: the stage is no longer this driver's alone."""
+        """True where the keeper has acted or died, so that this driver may no longer drive the stage."""
         return self._is_lost or (not self._ended.is_set() and self._process.poll() is not None)
 
     def require(self) -> None:
-        """StageError where the keeper has acted or died."""
+        """Raise StageError where the keeper has acted or died."""
         if self.is_lost:
             raise StageError(
                 "the keeper of the stage has ended: this driver was silent for too long, or the keeper was killed; "
@@ -113,7 +113,7 @@ class KeeperLink:
             )
 
     def close(self) -> None:
-        """Send the keeper away: the stage is safe, or nothing can make it so. Harmless when repeated."""
+        """End the keeper, because the stage is safe or cannot be made safe; may be repeated."""
         if self._ended.is_set():
             return
         self._ended.set()
@@ -141,5 +141,5 @@ class KeeperLink:
     def _send(self, text: bytes) -> None:
         try:
             os.write(self._pipe, text)
-        except OSError:  # closed from the other side, or full: nobody reads
+        except OSError:  # the pipe is closed or full: the keeper does not read
             self._is_lost = True

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`StopLatch`: after a stop nothing moves until it is released. No ROS."""
+"""`StopLatch`: keeps the stage from moving after a stop until the user releases it. No ROS."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from ...errors import StageError
 
 
 class StopLatch:
-    """Set by a stop; only `release` resets it."""
+    """A latch that a stop sets and only `release` resets."""
 
     def __init__(self) -> None:
         self._is_set = False
 
     @property
     def is_set(self) -> bool:
-        """True from a stop on until it is released."""
+        """True between a stop and the release."""
         return self._is_set
 
     def set(self) -> None:
-        """Let nothing move from now on."""
+        """Forbid all motion until the release."""
         self._is_set = True
 
     def release(self) -> bool:
-        """Let commands move the stage again; returns whether they could not."""
+        """Allow motion again; returns whether it had been forbidden."""
         was_set, self._is_set = self._is_set, False
         return was_set
 
     def require_released(self, name: str) -> None:
-        """StageError for the command `name` while the stop holds."""
+        """Raise StageError for the command `name` while the latch is set."""
         if self._is_set:
-            raise StageError(f"{name}: the driver was stopped, nothing moves; call ~/release first")
+            raise StageError(f"{name}: the driver was stopped and moves nothing; call ~/release first")

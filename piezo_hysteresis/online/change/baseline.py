@@ -33,10 +33,10 @@ from .score import GROUPS, ChangeScore
 Array = NDArray[np.float64]
 
 FEWEST_SCORES = 60
-"""Scores of one class from which its scatter is known well enough to watch."""
+"""Fewest scores of one class from which its scatter can be estimated."""
 
 CLASS_RATIO = 4.0
-"""Drives whose span or speed differs by less than this factor are of one class."""
+"""Drives belong to one class where their spans and their speeds differ by less than this factor."""
 
 DriveClass = tuple[int, int]
 
@@ -85,11 +85,11 @@ class Baseline:
         return cls(known, model)
 
     def of_model(self, model: str) -> Baseline:
-        """The same scatter for another model, given by its hash: one that differs in a few calibrated numbers."""
+        """The same scatter for another model, given by its hash, which differs only in a few calibrated numbers."""
         return Baseline(self.scatter, model)
 
     def save(self, path: Path) -> None:
-        """Write as .npz, whole or not at all."""
+        """Write the baseline as .npz; the file appears only when it is complete."""
         arrays: dict[str, Any] = {"model": np.array(self.model)}
         for (span, speed), s in self.scatter.items():
             key = f"{span},{speed}"
@@ -114,7 +114,7 @@ class Baseline:
         Raises
         ------
         ModelError
-            If the file is no baseline.
+            If the file does not hold a baseline.
         """
         size = len(GROUPS)
         square = (size, size)

@@ -38,7 +38,7 @@ ALIKE = 0.97
 
 
 RECENTRED = 50
-"""Scores over which the offset of a new stream is learnt: a sensor's zero is taken anew whenever a stream begins."""
+"""Scores over which the offset of a new stream is estimated, because each stream has its own zero of the sensor."""
 
 _OFFSET = GROUPS.index("offset")
 """Row of the offset."""
@@ -60,7 +60,7 @@ class Change:
     onset : int
         Stamp at which the change began [ns].
     watched : bool
-        False where the present drive is of no class of the baseline, or excites nothing.
+        False where the baseline has no class for the present drive, or where this drive excites no group.
     """
 
     statistic: float = 0.0
@@ -94,7 +94,7 @@ class ChangeDetector:
         self._window: list[tuple[Array, Array, int, int]] = []
 
     def add(self, score: ChangeScore) -> Change:
-        """What is known after the next score."""
+        """Take the next score and return the result of the watch."""
         key = drive_class(score)
         scatter = self._baseline.scatter.get(key)
         if scatter is None or not scatter.excited.any():

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`false_alarm_threshold`: how large the statistic must be, so that false alarms are as rare as the user wants.
+"""`false_alarm_threshold`: the threshold of the statistic that gives the wanted rate of false alarms.
 
 The largest of many windows is not χ²-distributed. The stream of an unchanged stage is simulated instead.
 """
@@ -27,13 +27,13 @@ from ...blocks.kernel import kernel
 Array = NDArray[np.float64]
 
 WINDOW = 60
-"""Scores that a change is looked for in."""
+"""Number of newest scores in which a change is searched for."""
 
 SIMULATED = 200_000
-"""Scores that are simulated."""
+"""Number of simulated scores."""
 
 FEWEST_ALARMS = 40
-"""False alarms in the simulation from which their rate is known well enough."""
+"""Fewest false alarms in the simulation from which their rate is estimated."""
 
 
 @kernel
@@ -61,7 +61,7 @@ def false_alarm_threshold(directions: Array, interval: float, seed: int = 0) -> 
     interval : float
         Wanted mean number of scores between false alarms.
     seed : int
-        Of the simulation.
+        Seed of the simulation.
 
     Returns
     -------
@@ -90,6 +90,6 @@ def false_alarm_threshold(directions: Array, interval: float, seed: int = 0) -> 
 
 
 def _alarms(above: NDArray[np.bool_]) -> int:
-    """Alarms, where one lasts until the statistic has stayed below for a whole window."""
+    """Number of alarms. An alarm ends when the statistic has stayed below the threshold for a whole window."""
     places = np.flatnonzero(above)
     return int(places.size > 0) + int(np.count_nonzero(np.diff(places) > WINDOW))

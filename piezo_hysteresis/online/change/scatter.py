@@ -31,16 +31,16 @@ DISTINCT = 1e-6
 """Smallest part of a row of sensitivities, after the offset is taken out, that counts as excited."""
 
 SLOWEST_DECAY = 0.98
-"""Factor from score to score with which a correlation falls at least: 5 s."""
+"""Slowest decay of a correlation from one score to the next; this value is a correlation time of 5 s."""
 
 FEWEST_WINDOWS = 4
-"""Windows of one class from which it is known whether the misfit drifts."""
+"""Fewest windows of one class from which a drift of the misfit is estimated."""
 
 SMALLEST_ROOT = 1e-5
-"""Directions of a slope whose root is smaller than this, over the largest one, say nothing."""
+"""Directions of a slope are ignored where their root is smaller than this share of the largest root."""
 
 _TINY = float(np.finfo(np.float64).tiny)
-"""Smallest number that is divided by."""
+"""Smallest divisor; it prevents a division by zero."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,7 +63,7 @@ class Scatter:
     slope : (5, 5) ndarray
         Mean of `ChangeScore.slope`.
     memory : (2, 5) ndarray
-        Correlation of what successive scores say of each group, and the factor by which it falls with every further
+        Correlation between successive gradients for each group, and the factor by which it falls with every further
         score.
     wander : (5,) ndarray
         Variance of every group's change from one window of the watch to the next, beyond what the scatter explains:
@@ -91,7 +91,7 @@ class Scatter:
         return _scale(self.slope)
 
     def pull(self, score: ChangeScore) -> tuple[Array, Array]:
-        """What a score says of the groups: the gradient of its log likelihood (5,), and the information in it (5, 5).
+        """Gradient of the log likelihood of a score with respect to the groups (5,), and its Fisher information (5, 5).
 
         The gradient is zero on average while nothing changes, and information times θ after a change θ.
         """
@@ -161,7 +161,7 @@ def _memory(said: Array) -> Array:
 
 
 def _wander(pulls: Array, weights: Array, inflation: Array) -> Array:
-    """`Scatter.wander` of what every score says (n, 5), and the information in it; 0 where it is within the scatter."""
+    """`Scatter.wander` from the gradients (n, 5) and their information; 0 where the scatter explains it."""
     windows = len(pulls) // WINDOW
     if windows < FEWEST_WINDOWS:
         return np.zeros(len(GROUPS))

@@ -65,7 +65,7 @@ class ChangeScore:
     value : (5,) ndarray
         z = S e / √B, in the units of the rows times metres.
     slope : (5, 5) ndarray
-        M = S Sᵀ / √B: what z moves by where the parameters move.
+        M = S Sᵀ / √B: the derivative of the mean of z with respect to the parameters.
     span, speed : float
         Peak-to-peak of the drive voltage [V], and rms of its rate of change [V/s].
     stamp : int
@@ -113,7 +113,7 @@ class Scores:
     loop : mapping of str to float
         `loop_heights` of the model.
     tangent : ChainTangent
-        Sensitivities to them before the next sample; `Chain.rest_tangent` where nothing is known.
+        Sensitivities to them before the next sample; `Chain.rest_tangent` where they are unknown.
     """
 
     def __init__(self, chain: Chain, state: ChainState, loop: Mapping[str, float], tangent: ChainTangent) -> None:
@@ -127,7 +127,7 @@ class Scores:
         self._last: tuple[float, float, float] | None = None  # prediction, slow, voltage
 
     def add(self, voltage: Array, residual: Array, stamp: int) -> list[ChangeScore]:
-        """Scores that are complete with the next samples.
+        """Add the next samples, and return the scores that they complete.
 
         Parameters
         ----------
@@ -136,7 +136,7 @@ class Scores:
         residual : (n,) ndarray
             Measured minus predicted displacement [m].
         stamp : int
-            Time of the last of these samples [ns].
+            Time stamp of the last of these samples [ns].
         """
         y, names, rows, self._state, self._tangent = self._chain.linearise(
             voltage, self._state, self._tangent, self._loop

@@ -40,27 +40,27 @@ class ChangeWatch:
     false_alarm_interval : float
         Wanted mean time between false alarms [s].
     baseline : Baseline, optional
-        Of an earlier session; it counts while the model runs that it was taken with.
+        Baseline of an earlier session. It is used while the model with which it was taken is running.
 
     Attributes
     ----------
     change : Change
-        What the newest score says.
+        Result of the detector after the newest score.
     since : int
-        Stamp at which the change began that is still seen [ns]; 0 while there is none.
+        Stamp at which the present change began [ns]; 0 while there is none.
     groups : tuple of str
-        Groups that explain that change best, of all that was said since.
+        Groups that have explained this change best since it was first detected.
     alarms : int
-        Times at which a change was first seen.
+        Number of changes detected so far.
 
     Raises
     ------
     ModelError
-        From `add`, where a baseline that was asked for cannot be taken.
+        `add` raises it where the requested baseline cannot be computed.
 
     Notes
     -----
-    Everything begins anew with another model or after a gap; the baseline stays.
+    After a change of model or a gap the watch starts again without scores, and keeps the baseline.
     """
 
     def __init__(self, false_alarm_interval: float, baseline: Baseline | None = None) -> None:
@@ -81,11 +81,11 @@ class ChangeWatch:
         return self._wanted > 0
 
     def take_baseline(self, duration: float) -> None:
-        """Take a baseline over the next `duration` of the stream [s]; the old one counts until it is complete."""
+        """Take a baseline over the next `duration` of the stream [s]; the old one is used until it is complete."""
         self._wanted, self._taken = max(1, round(duration / BLOCK_TIME)), []
 
     def restart(self) -> None:
-        """Forget the scores so far: the sensor offset was taken anew, or samples were lost."""
+        """Discard all scores, because the sensor offset was measured again or samples were lost."""
         self._scores = None
 
     def add(self, voltage: Array, answer: Prediction, predictor: Predictor, stamp: int) -> bool:
@@ -96,9 +96,9 @@ class ChangeWatch:
         voltage : (n,) ndarray
             Drive voltage of the samples that `answer` predicts [V].
         answer : Prediction
-            Of the predictor.
+            Output of the predictor.
         predictor : Predictor
-            After it has seen the block.
+            The predictor after this block.
         stamp : int
             Time of the last sample [ns].
 
@@ -159,5 +159,5 @@ class ChangeWatch:
 
 
 def baseline_path(folder: Path, model: Model) -> Path:
-    """File of the baseline of a model in a folder."""
+    """Path of the file in a folder that holds the baseline of a model."""
     return folder / f"baseline_{model_hash(model).partition(':')[2]}.npz"
