@@ -14,8 +14,8 @@
 
 """`axis_node`: driver, model and identification node of one axis in one process and one thread of callbacks.
 
-One process less to start and to find; in exchange a fit that ends or a model that is loaded keeps the others waiting.
-The names of the nodes, their topics, services and parameters are those of the three processes.
+There are fewer processes to start and to discover. In exchange, the other nodes wait while a fit ends or a model is
+loaded. The names of the nodes, their topics, services and parameters are those of the three processes.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .runtime.process import NodeLife, run_together
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the three nodes; the exit code is 2 where their parameters make no sense."""
+    """Run the three nodes; the exit code is 2 where their parameters are invalid."""
     lives: list[NodeLife] = [
         NodeLife(DriverNode, DriverNode.begin, DriverNode.end),
         NodeLife(ModelNode, end=ModelNode.end),

@@ -38,6 +38,6 @@ def set_voltage() -> None:
 
 
 def _run(name: str) -> None:
-    """Run an example as it stands in ``share/piezo_hysteresis/examples``, where a user may read and copy it."""
+    """Run an example from ``share/piezo_hysteresis/examples``, where a user can read and copy it."""
     folder = Path(get_package_share_directory("piezo_hysteresis")) / "examples"
     runpy.run_path(str(folder / f"{name}.py"), run_name="__main__")

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Follow a running node: one line on the terminal, from the topics `status` of an axis until the job under way ends."""
+"""Show the `status` topics of an axis in one line on the terminal until the running job ends."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from .runtime.guarded_node import GuardedNode
 from .runtime.qos import LATCHED
 
 ENDED = {"done": 0, "failed": 1, "aborted": 1, "refused": 1}
-"""Last states of a job, and the exit status that each gives."""
+"""Last states of a job, with the exit code for each."""
 
 _IDLE = ("idle", "")
-"""States in which nothing is under way."""
+"""States in which no job is running."""
 
 _WIDTH = 110
-"""Characters of a line at most: a longer one could not be written over."""
+"""Largest number of characters of a line; a longer line could not be overwritten."""
 
 
 class Follower(GuardedNode):
@@ -45,7 +45,7 @@ class Follower(GuardedNode):
     Parameters
     ----------
     namespace : str
-        Of the axis, e.g. ``/stage_x``.
+        Namespace of the axis, e.g. ``/stage_x``.
     """
 
     def __init__(self, namespace: str) -> None:
@@ -75,7 +75,7 @@ class Follower(GuardedNode):
         self._under_way = self._under_way or state not in (*_IDLE, *ENDED)
 
     def _show(self, line: str) -> None:
-        """Write over the line before on a terminal; elsewhere a line for each change."""
+        """Overwrite the last line on a terminal; elsewhere write a line for each change."""
         if line == self._line:
             return
         self._line = line
@@ -87,7 +87,7 @@ class Follower(GuardedNode):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Follow an axis; 0 where its job ends well, 1 where it fails or is aborted, 130 on Ctrl-C."""
+    """Follow an axis; returns 0 where its job succeeds, 1 where it fails or is aborted, 130 on Ctrl-C."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     rclpy.init(args=given[1:], signal_handler_options=SignalHandlerOptions.NO)
     node = Follower(given[0] if given else "")

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Entry points of the node executables: nothing slow is imported before an interrupt is handled."""
+"""Entry points of the node executables: they import nothing slow before interrupts are handled."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _run(module: str) -> int:
 
 
 def _was_interrupted(error: BaseException | None) -> bool:
-    """Libraries turn an interrupt while they are imported into an ImportError of their own."""
+    """Whether an import failed by an interrupt, which some libraries turn into an ImportError."""
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
             return True

@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`TOPICS`: every topic of an axis, written down once.
+"""`TOPICS`: the table of all topics of an axis.
 
 Publishers, subscriptions and the recorder take name, type and quality of service from here. `make docs` writes the
-tables of topics and the rights in ``config/sros2_policy.xml`` from it; a test holds ``config/record_qos.yaml`` to it.
+tables of topics and the rights in ``config/sros2_policy.xml`` from it; a test compares ``config/record_qos.yaml`` with
+it.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from ..errors import ParameterError
 from .runtime.qos import COMMAND, COMMAND_STATUS, DEEP, LATCHED, SAMPLES, STATUS
 
 ANYONE = "anyone"
-"""Publisher of the topics by which a stage is moved: every program that holds the right."""
+"""Publisher of the topics that move a stage: every program with the right to do so."""
 ALL = "all"
 """Publisher of the topics that every node of the package publishes."""
 
@@ -56,13 +57,13 @@ class Topic:
     quality : rclpy.qos.QoSProfile
         Quality of service of its publishers.
     unit : str
-        Unit of its values; empty where it carries none.
+        Unit of its values; empty where they have none.
     rate : str
-        How often a message comes; empty where that is up to the publisher.
+        Rate of its messages; empty where the publisher decides it.
     by : str
         Node that publishes it, `ANYONE` or `ALL`.
     senders : tuple of str
-        Nodes of the package that publish it besides.
+        Further nodes of the package that publish it.
     readers : tuple of str
         Nodes that always subscribe to it; the recorder of the identification node takes every topic.
     """
@@ -83,12 +84,12 @@ class Topic:
 
     @property
     def is_latched(self) -> bool:
-        """True where a late joiner gets what was published before."""
+        """True where a late joiner receives the last messages."""
         return bool(self.quality.durability == DurabilityPolicy.TRANSIENT_LOCAL)
 
     @property
     def overriding(self) -> QoSOverridingOptions | None:
-        """Lets parameters change history, depth and reliability; None where late joiners rely on a message.
+        """Options by which parameters change history, depth and reliability; None for latched topics.
 
         Their names are ``qos_overrides.<topic>.<publisher or subscription>.<policy>``. rclpy writes them into the
         profile that it is given.
@@ -156,7 +157,7 @@ TOPICS: dict[str, Topic] = {
 
 
 def advertise(node: Node, name: str) -> Any:
-    """A publisher of one of `TOPICS`; ParameterError where a parameter asks for a quality that there is not."""
+    """A publisher of one of `TOPICS`; raises ParameterError where a parameter names an unknown quality of service."""
     topic = TOPICS[name]
     with _override_named(topic):
         return node.create_publisher(
@@ -165,7 +166,7 @@ def advertise(node: Node, name: str) -> Any:
 
 
 def advertise_lifecycle(node: LifecycleNode, name: str) -> Any:
-    """As `advertise`; silent while its node is not active."""
+    """As `advertise`; it publishes nothing while its node is not active."""
     topic = TOPICS[name]
     with _override_named(topic):
         quality = copy(topic.quality)
@@ -185,12 +186,12 @@ def subscribe(node: Node, name: str, callback: Callable[[Any], None], *, deep: b
     deep : bool
         Miss no message while the machine is busy.
     raw : bool
-        Take messages as they came over the wire, as bytes.
+        Receive messages as serialised bytes.
 
     Raises
     ------
     ParameterError
-        Where a parameter asks for a quality of service that there is not.
+        If a parameter names an unknown quality of service.
     """
     topic = TOPICS[name]
     quality = topic.deep if deep else copy(topic.quality)
@@ -204,5 +205,5 @@ def subscribe(node: Node, name: str, callback: Callable[[Any], None], *, deep: b
 def _override_named(topic: Topic) -> Iterator[None]:
     try:
         yield
-    except RuntimeError as error:  # what rclpy raises on a word that is no policy
+    except RuntimeError as error:  # rclpy raises this for an unknown policy
         raise ParameterError(f"qos_overrides of {topic.name}: {error}; expected a policy of ROS 2") from None

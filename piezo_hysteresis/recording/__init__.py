@@ -17,29 +17,29 @@
 >>> experiment = read("measured.csv", columns={"voltage": 1, "displacement": 5},
 ...                   units={"displacement": "um"}, sample_period=5e-3)          # doctest: +SKIP
 
-`read` mends nothing silently. What it found stands in `Experiment.notices`, by kind:
+`read` repairs nothing silently. It lists its findings in `Experiment.notices`, by kind:
 
 ====================  ==========================================================================================
-``gap`` ``split``     samples are missing; the phase is split there, the part behind it `truncated`
-``pause``             nothing was measured while a device held its voltage and was read out; the state is carried
-``non_finite``        samples that are no number of this world, dropped in the same way
+``gap`` ``split``     samples are missing; the phase is split, and the part after the gap is `truncated`
+``pause``             nothing was measured while a device held its voltage and was read out
+``non_finite``        samples that are not finite or beyond any stage; they are treated as a gap
 ``not_a_number``      cells of a table without a number
-``duplicate``         samples that came twice; the first ones count
-``non_monotonic``     samples that came out of order, or a time that runs back
-``restart``           the driver was started again within a bag
+``duplicate``         samples that were received twice; the first ones are used
+``non_monotonic``     samples that were received out of order, or a time that decreases
+``restart``           the driver was restarted within a bag
 ``cut`` ``damaged``   the file ends early, or parts of it cannot be decoded
-``truncated``         a phase whose beginning is not recorded, or that begins on a branch of its loop
-``history``           a phase before which others were played that are not recorded
+``truncated``         a phase without its beginning, or one that begins on a branch of its loop
+``history``           earlier phases were played and not recorded
 ``moved``             the drive moved in the idle before the first phase
 ``step_before``       the displacement jumps with the first sample: a step from rest was not recorded
 ``rows_before``       rows in front of the chosen ones were read for the state of the stage
-``proposed``          names of phases that come from what the drive looks like
+``proposed``          names of phases that were proposed from the shape of the drive
 ``averaged``          a recording too long for the memory, averaged on reading
-``columns`` ``held``  how channels were found in a file of other software, and paired
+``columns`` ``held``  the assignment of channels in a file of other software
 ``time_base``         times that are uneven, overlap, or are those of reception
 ====================  ==========================================================================================
 
-and what `inspect` finds in the samples themselves.
+and the kinds that `inspect` finds in the samples.
 """
 
 from __future__ import annotations
@@ -94,12 +94,12 @@ def read(
     *paths : path-like
         Files or folders. No recording continues the one before it.
     format : str, optional
-        Key of `FORMATS`; default what the path looks like.
+        Key of `FORMATS`; by default it is inferred from the path.
     axis, columns, units, sample_period, initial_voltage, rows, phases, include, average
-        What the file does not say: see `ReadOptions`.
+        Information that the file does not contain; see `ReadOptions`.
     decimate : mapping of str to int, optional
-        Phase name to the number of samples that are averaged into one on reading (`Record.decimate`); default what the
-        identification node left in the folder of its bag, or nothing.
+        Phase name to the number of samples that are averaged into one on reading (`Record.decimate`); default: the
+        values that the identification node has written beside its bag, if any.
     rows_before : int
         Largest number of rows in front of `rows` that are read too, as a phase ``conditioning``. The stage is not
         fitted or judged there, but its state is carried into `rows`. Without effect if `initial_voltage` is given.
@@ -107,14 +107,14 @@ def read(
     Returns
     -------
     Experiment
-        In SI units; `notices` list what was found in the data and what was done about it.
+        In SI units; `notices` lists the findings about the data.
 
     Raises
     ------
     RecordingError
-        If the path cannot be read as an experiment, or `decimate` names a phase that it does not hold.
+        If the path cannot be read as an experiment, or `decimate` names an unknown phase.
     RecordError
-        If the samples form no record.
+        If the samples do not form a record.
     """
     if not paths:
         raise RecordingError("read: got no path, expected a recording")
@@ -153,7 +153,7 @@ def from_columns(
     columns : mapping of str to (n,) array_like
         Titled as the columns of a CSV file, e.g. ``time_s``, ``voltage_V``, ``displacement_m``, ``phase``.
     names, units, sample_period, initial_voltage
-        What the titles do not say: as `columns`, `units`, … of `read`.
+        Information that the titles do not contain: as `columns`, `units`, … of `read`.
 
     Returns
     -------
@@ -177,7 +177,7 @@ def from_columns(
 
 
 def _one(place: Path, chosen: Format, options: ReadOptions) -> Experiment:
-    """The experiment of one path."""
+    """Read the experiment of one path."""
     return checked_starts(chosen.read(place, options), options)
 
 
@@ -191,12 +191,12 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     path : path-like
         ``run.csv`` and ``run.mat`` give that file, ``run.mcap`` the bag folder ``run``, anything else a folder of NPZ.
     format : str, optional
-        Key of `FORMATS` instead of what the ending says.
+        Key of `FORMATS`; by default it is inferred from the ending.
 
     Raises
     ------
     RecordingError
-        If the format cannot be written, or the path not.
+        If the format or the path cannot be written.
     """
     place = Path(path).expanduser()
     chosen = _named(format or _BY_SUFFIX.get(place.suffix.lower(), "npz"))
@@ -206,7 +206,7 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
 
 
 _BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
-"""Format that the end of a name stands for."""
+"""Format for each ending of a file name."""
 
 
 def _named(format: str) -> Format:

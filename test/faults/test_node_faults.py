@@ -80,7 +80,7 @@ def test_no_date_on_the_clock_ends_a_node_that_follows_it(lab):
     processes = [lab.start(node, use_sim_time=True) for node in NODES]
     reports = lab.diagnostics()
     lab.wait(lambda: all(newest(reports, node) for node in NODES), "the nodes")
-    assert "nothing comes on /clock" in newest(reports, "model_node").message
+    assert "no message arrives on /clock" in newest(reports, "model_node").message
     clock = lab.publisher(Clock, "/clock")
     lab.wait(lambda: clock.get_subscription_count() == len(NODES), "their clocks")
     for _ in range(100):

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The compensation node: it drives the stage where it should go, through the inverse of the model."""
+"""The compensation node: it drives the stage along a wanted displacement by the inverse of the model."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`AppliedState`: the state that the model is in after every voltage that was applied to the stage."""
+"""`AppliedState`: the state of the model after all voltages that were applied to the stage."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from ...online.voltage_history import is_held
 
 
 class AppliedState:
-    """Runs the model along, so that a path begins in the hysteresis and creep that the stage is in.
+    """Runs the model with the stage, so that the plan of a path starts from the present hysteresis and creep.
 
-    A new model is run over the voltages that were applied before it came.
+    A new model is first run over the voltages that were applied before it was received.
 
     Parameters
     ----------
@@ -52,17 +52,17 @@ class AppliedState:
 
     @property
     def is_ready(self) -> bool:
-        """Whether the model that was followed last has been run over what was applied."""
+        """Whether the newest model has been run over the applied voltages."""
         return self._predictor.state is not None and not self._predictor.is_swapping
 
     @property
     def model(self) -> Model:
-        """Model in force.
+        """Present model.
 
         Raises
         ------
         ModelError
-            If there is none: none came, or it ran away on what was applied.
+            If no model was received, or the model diverged on the applied voltages.
         """
         if self._predictor.model is None:
             raise ModelError("the model diverged on the voltages that were applied; identify again")
@@ -78,11 +78,11 @@ class AppliedState:
             If there is none.
         """
         if self._predictor.state is None:
-            raise ModelError("no samples have been taken in; is the driver active?")
+            raise ModelError("no samples were received; is the driver active?")
         return self._predictor.state
 
     def follow(self, model: Model) -> None:
-        """Let this model take over as soon as it has been run over what was applied.
+        """Use this model as soon as it has been run over the applied voltages.
 
         Raises
         ------
@@ -95,12 +95,12 @@ class AppliedState:
             self._predictor.swap(model)
 
     def take(self, block: SampleBlock) -> None:
-        """Run over a block; samples that were lost are bridged with the voltage held.
+        """Run the model over a block. Over lost samples the last voltage is held.
 
         Raises
         ------
         PiezoError
-            On samples that no stage gives, and on a model that runs away.
+            On samples that no stage can give, and on a model that diverges.
         """
         self._predictor.predict(
             int(block.index[0]),
@@ -116,12 +116,12 @@ class AppliedState:
 
 
 def check_period(model: Model, period: float) -> None:
-    """Refuse a driver at another period.
+    """Check that the driver has the sample period of the model.
 
     Raises
     ------
     ModelError
-        Naming both periods.
+        If the periods differ; the message names both.
     """
     if abs(period / model.sample_period - 1.0) > 1e-6:
         raise ModelError(

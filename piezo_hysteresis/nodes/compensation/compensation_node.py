@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`compensation_node`: sends the stage along a wanted displacement, through the inverse of the model and the driver."""
+"""`compensation_node`: drives the stage along a wanted displacement, by the inverse of the model."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class CompensationNode(GuardedNode):
         self.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def end(self) -> None:
-        """Stop what is under way, while services still work."""
+        """Stop the running job while services still work."""
         self._actions.end()
         if self._job is not None:
             self._give_up()
@@ -97,7 +97,7 @@ class CompensationNode(GuardedNode):
             self._status.refuse("model", str(error))
 
     def _follow_model(self, model: Model) -> None:
-        """From the next trajectory on; the one that plays ends with the model that it was planned with."""
+        """Use this model from the next trajectory on. The present one ends with the model with which it was planned."""
         self._model = model
         if self._job is None and self._applied is not None:
             self._applied.follow(model)
@@ -136,14 +136,14 @@ class CompensationNode(GuardedNode):
         return self._on_trajectory(trajectory_to_cloud(goal.displacement, goal.phase, self.get_clock().now().to_msg()))
 
     def _on_status(self, status: DiagnosticStatus) -> None:
-        if self._job is None or values_of(status)["state"] != "refused":  # another path was refused, not this one
+        if self._job is None or values_of(status)["state"] != "refused":  # this path was not refused, another one was
             self._actions.report(status)
 
     def _on_set_displacement(self, message: Float64) -> None:
         try:
             applied, limits = self._ready()
             if not applied.is_ready:
-                raise ModelError("the new model is being run over what was applied; send it again in a moment")
+                raise ModelError("the new model is being run over the applied voltages; send it again in a moment")
             found = self._runs.planned(np.full(16, float(message.data)), limits, way_back=False)
             if not found.reachability.is_whole:
                 raise StageError(why_not(found))
@@ -155,12 +155,12 @@ class CompensationNode(GuardedNode):
         self._status.show("set", f"{1e6 * message.data:.6g} µm by {found.voltage[-1]:.6g} V", "set_displacement")
 
     def _ready(self) -> tuple[AppliedState, Limits]:
-        """What the model knows of the stage, and the limits of the driver.
+        """The state of the model, and the limits of the driver.
 
         Raises
         ------
         PiezoError
-            If something is missing, or a job is under way.
+            If something is missing, or a job is running.
         """
         if self._job is not None:
             raise StageError(f"busy with '{self._phase}'; wait, or ~/stop first")
@@ -176,7 +176,7 @@ class CompensationNode(GuardedNode):
         if self._model is None:
             raise ModelError("no model yet; expected model_file, or a model on the topic 'model'")
         check_period(self._model, driver.sample_period)
-        slew = driver.max_slew_rate * (1.0 - 1e-9)  # rounding shall not make a step that the driver refuses
+        slew = driver.max_slew_rate * (1.0 - 1e-9)  # rounding must not cause a step that the driver refuses
         return self._applied, Limits(driver.voltage_min, driver.voltage_max, slew)
 
     def _known(self) -> AppliedState:
@@ -255,7 +255,7 @@ class CompensationNode(GuardedNode):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a compensation node; its exit code is 2 where its parameters make no sense."""
+    """Run a compensation node; its exit code is 2 where its parameters are invalid."""
     return run(CompensationNode, arguments, end=CompensationNode.end)
 
 

@@ -44,23 +44,23 @@ class PathError(StageError):
 
 
 class PathRuns:
-    """Jobs that go on by one step at every tick of the node.
+    """Jobs that advance by one step at every tick of the node.
 
     Parameters
     ----------
     driver : DriverClient
-        Plays the drive.
+        Client of the driver, which plays the drive.
     status : CompensationStatus
-        Where every step is reported.
+        Publishes every step.
     values : mapping of str to object
         Parameters of the node.
     applied : callable
-        Gives the state of the model after what was applied.
+        Returns the state of the model after the applied voltages.
 
     Attributes
     ----------
     tracking : Tracking or None
-        Of what is played.
+        Tracking of the drive that is being played.
     last : (str, Plan) or None
         Name and plan of the last trajectory.
     """
@@ -78,11 +78,11 @@ class PathRuns:
         self.last: tuple[str, Plan] | None = None
 
     def close(self) -> None:
-        """Let no plan begin any more."""
+        """Refuse all further plans."""
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def planned(self, wanted: np.ndarray, limits: Limits, way_back: bool = True) -> Plan:
-        """Plan of a path (n,) [m] from where the stage is."""
+        """Plan of a path (n,) [m] that starts at the present state of the stage."""
         applied = self._applied()
         return plan(
             applied.model,
@@ -115,7 +115,7 @@ class PathRuns:
         PathError
             If a part of it is not reachable; nothing has moved.
         StageError
-            If the driver refuses or stops it, or samples do not come.
+            If the driver refuses or stops the drive, or no samples arrive.
         """
         self._status.show("planning", f"{wanted.size} samples", name)
         yield from self._until(lambda: self._applied().is_ready, "the model to be run over what was applied")
@@ -140,7 +140,7 @@ class PathRuns:
         Raises
         ------
         StageError
-            If the driver refuses or stops it, or samples do not come.
+            If the driver refuses or stops the drive, or no samples arrive.
         """
         tracking = self.tracking = Tracking(found)
         self._status.show("playing", described(found), name, expected=found.expected.total)

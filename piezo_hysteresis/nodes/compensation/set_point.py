@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`SetPoint`: one displacement that is held, with a slow integral of what the sensor says where that was asked for."""
+"""`SetPoint`: holds one displacement, with an optional slow integral of the measured error."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from ...compensation import Limits
 from ..runtime.sending import send
 
 _INTERVAL = 0.1
-"""Time between two corrections [s]: the driver ramps to each of them."""
+"""Time between two corrections [s]; the driver ramps to each of them."""
 
 
 class SetPoint:
     """Voltage for a displacement that is held.
 
-    The integral is slow on purpose: a fast loop belongs into the controller of the stage. It does not go on where the
+    The integral is slow, because a fast feedback loop belongs into the controller of the stage. It stops where the
     voltage is at a limit.
 
     Parameters
     ----------
     publisher : rclpy.publisher.Publisher
-        Of `set_voltage`.
+        Publisher of `set_voltage`.
     integral_time : float
-        Time in which a constant error is corrected by itself once [s]; 0 switches the integral off.
+        Time constant with which a constant error is corrected [s]; 0 switches the integral off.
     """
 
     def __init__(self, publisher: Any, integral_time: float) -> None:
@@ -50,7 +50,7 @@ class SetPoint:
         self._sum, self._count = 0.0, 0
 
     def go(self, target: float, voltage: float, way: tuple[float, float], limits: Limits) -> None:
-        """Hold a displacement [m] by a voltage [V]; `way` is the change of both on the way there."""
+        """Hold a displacement [m] by a voltage [V]; `way` is the change of both from the present ones."""
         self._target, self._voltage, self._limits = target, voltage, limits
         if abs(way[1]) > 1e-9 and way[0] / way[1] > 0.0:
             self._slope = way[0] / way[1]
@@ -58,16 +58,16 @@ class SetPoint:
         send(self._publisher, Float64(data=voltage))
 
     def leave(self) -> None:
-        """Something else drives the stage from now on."""
+        """End the hold, because something else drives the stage."""
         self._target = None
 
     def measured(self, mean: float, count: int) -> None:
-        """Take in the mean displacement of so many samples [m]."""
+        """Add the mean displacement [m] of a number of samples."""
         if self._target is not None:
             self._sum, self._count = self._sum + mean * count, self._count + count
 
     def tick(self, elapsed: float) -> None:
-        """Let `elapsed` seconds pass."""
+        """Advance by `elapsed` seconds."""
         self._waited += elapsed
         if self._target is None or not self._integral_time or self._waited < _INTERVAL or not self._count:
             return

@@ -19,7 +19,7 @@ from __future__ import annotations
 from ...parameter import Parameter, Row, Setting
 
 _SOURCE = "compensation node"
-"""Where the bounds of the parameters come from."""
+"""Source of the bounds of the parameters."""
 
 COMPENSATION: tuple[Row, ...] = (
     Setting("model_file", "", "path of the first model; a model on the topic `model` replaces it between trajectories"),

@@ -42,7 +42,7 @@ class CompensationStatus:
     Attributes
     ----------
     listener : callable
-        Called with every status that is new.
+        Called with every new status.
     """
 
     def __init__(self, node: GuardedNode) -> None:
@@ -76,13 +76,13 @@ class CompensationStatus:
             self.listener(status)
 
     def refuse(self, phase: str, reason: str) -> None:
-        """Report that nothing moves, and why."""
+        """Report that nothing moves, with the reason."""
         self.refused, phase = self.refused + 1, printable(phase)
         self._node.get_logger().warning(f"refused '{phase}': {reason}", throttle_duration_sec=0.1)
         self.show("refused", reason, phase, DiagnosticStatus.WARN)
 
     def failed(self, phase: str, reason: str) -> None:
-        """Report what went wrong after something had moved."""
+        """Report an error after the stage has moved."""
         self._node.get_logger().error(f"'{phase}': {reason}")
         self.show("failed", reason, phase, DiagnosticStatus.ERROR)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Tracking`: what the stage does while it follows a path, sample by sample beside what was wanted."""
+"""`Tracking`: compares the measured with the wanted displacement while the stage follows a path."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Tracking:
         self._early: list[SampleBlock] = []
 
     def begin(self, first: int) -> None:
-        """The drive begins at this index; blocks that arrived before the driver reported it are added."""
+        """Set the index at which the drive begins, and add the blocks that arrived before the driver reported it."""
         self.first = first
         early, self._early = self._early, []
         for block in early:
@@ -54,7 +54,7 @@ class Tracking:
         return None if self.first is None else (self.first + self.plan.begin) % 2**32
 
     def take(self, block: SampleBlock) -> None:
-        """Take in a block of `samples`."""
+        """Add a block of `samples`."""
         if self.first is None:
             self._early = [*self._early[-200:], block]
             return
@@ -65,29 +65,29 @@ class Tracking:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the last sample of the drive has come in."""
+        """Whether the last sample of the drive has arrived."""
         return bool(np.isfinite(self._measured[-1]))
 
     @property
     def lost(self) -> int:
-        """Samples of the drive that did not come in."""
+        """Number of samples of the drive that did not arrive."""
         return int(np.isnan(self._measured).sum())
 
     @property
     def measured(self) -> Array:
-        """Displacement beside the drive [m], shape (m,); lost samples are those that the model predicts."""
+        """Displacement for every sample of the drive [m], shape (m,); predicted where samples were lost."""
         return np.where(np.isnan(self._measured), self.plan.predicted, self._measured)
 
     @property
     def errors(self) -> Array:
-        """Wanted − measured of the samples of the path that have come in [m]."""
+        """Wanted − measured displacement of the received samples of the path [m]."""
         begin = self.plan.begin
         off = self.plan.wanted - self._measured[begin : begin + self.plan.wanted.size]
         return np.asarray(off[np.isfinite(off)])
 
     @property
     def newest_error(self) -> float | None:
-        """Of the newest sample of the path that has come in; None before the first."""
+        """Error of the newest received sample of the path [m]; None before the first."""
         errors = self.errors
         return float(errors[-1]) if errors.size else None
 

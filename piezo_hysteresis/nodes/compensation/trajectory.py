@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Trajectories as messages: a cloud with the field `displacement`, and plans as text."""
+"""Conversion of trajectories to messages (clouds with the field `displacement`), and of plans to text."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def trajectory_to_cloud(displacement: ArrayLike, phase: str, stamp: Time) -> Poi
 
 
 def described(plan: Plan) -> str:
-    """A plan in one line."""
+    """Description of a plan in one line."""
     expected = plan.expected
     stated = "no free-run error stated" if expected.free_run is None else f"model {1e9 * expected.free_run:.1f} nm"
     return (
@@ -71,7 +71,7 @@ def described(plan: Plan) -> str:
 
 
 def why_not(plan: Plan) -> str:
-    """Why a path is refused, and the nearest reachable path."""
+    """Reason why a path is refused, and the nearest reachable path."""
     part, nearest = plan.reachability.parts[0], plan.reachability.nearest
     ways = []
     if nearest is not None and nearest.offset is not None:

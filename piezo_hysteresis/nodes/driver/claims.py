@@ -31,11 +31,11 @@ from ..runtime.sending import send
 from ..topics import advertise, subscribe
 
 _LOOK = 0.25
-"""Time between looks whether an owner still lives [s]."""
+"""Interval at which it is checked whether the owner renews its claim [s]."""
 
 
 class DriverClaims:
-    """Grants, releases and ends claims; a claim that ends leaves the stage on its way to the safe voltage.
+    """Grants, releases and ends claims. When a claim ends, the stage goes to the safe voltage.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ class DriverClaims:
     claim : Claim
         Of its stage.
     streaming : callable
-        The acquisition under way; raises StageError where there is none.
+        Returns the running acquisition; raises StageError where there is none.
     refuse : callable
-        Takes what was refused, a stamp, and the reason.
+        Takes the name of the refused request, a stamp, and the reason.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class DriverClaims:
                     self._node.get_logger().info(f"claimed by {self._claim.owner}")
                     self._show()
             elif message.value == "renew":
-                self._claim.renew(message.key, time.monotonic())  # one that has ended is seen on 'claimed_by'
+                self._claim.renew(message.key, time.monotonic())  # the end of a claim is published on 'claimed_by'
             elif message.value == "release":
                 if self._claim.release(message.key):
                     self._end(f"{message.key} has released the stage")
@@ -79,7 +79,7 @@ class DriverClaims:
             self._refuse("claim", 0, error)
 
     def _look(self) -> None:
-        """A waveform of an owner that has died is played to its end, which lies at the safe voltage."""
+        """End an expired claim. A waveform of its owner is played to its end, which lies at the safe voltage."""
         owner = self._claim.owner
         if not self._claim.has_expired(time.monotonic()) or self._is_playing():
             return

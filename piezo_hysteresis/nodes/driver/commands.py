@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`DriverCommands`: requests to the driver: `command`, `set_voltage`, `~/stop`, `~/cancel`, `~/release`."""
+"""`DriverCommands`: handles the requests `command`, `set_voltage`, `~/stop`, `~/cancel` and `~/release`."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from .publishers import DriverTopics
 from .stop_services import StopServices
 
 _LONGEST_NAME = 64
-"""Characters of a phase name at most."""
+"""Largest number of characters of a phase name."""
 
 _LOG_INTERVAL = 0.1
-"""Shortest time between two lines of one kind in the log [s]: a flood of commands fills no disk."""
+"""Shortest time between two lines of one kind in the log [s]: a flood of commands must not fill the disk."""
 
 _SET_POINT_INTERVAL = 1.0
-"""The same for set-points, which a program may send without end [s]."""
+"""Shortest time between two lines about set-points [s], which a program may send continuously."""
 
 
 class DriverCommands:
-    """Passes commands to the attached stage, or refuses them whole; every refusal is reported with its reason.
+    """Passes a command to the attached stage or refuses it completely, and reports the reason of a refusal.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ class DriverCommands:
     diagnostics : DriverDiagnostics
         Counts the refusals.
     latch : StopLatch
-        Of the driver.
+        Latch of the driver.
     tell_latch : callable
-        Called when the driver is stopped or released, in the thread of the stop.
+        Called in the thread of the stop when the driver is stopped or released.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class DriverCommands:
         self._attached = None
 
     def end(self) -> None:
-        """Serve no stop any more."""
+        """End the services for stopping."""
         self._services.end()
 
     def _stage(self) -> tuple[DriverSession, DriverTopics]:
@@ -114,13 +114,13 @@ class DriverCommands:
             self._refuse("set_voltage", 0, error)
 
     def _stop(self) -> str:
-        """Go to the safe voltage, and let nothing move until the stop is released."""
+        """Go to the safe voltage, and forbid all motion until the stop is released."""
         self._latch.set()
         self._publish_latch()
         return f"{self._go_to_safety(latch=True)}; nothing moves until ~/release"
 
     def _cancel(self) -> str:
-        """Go to the safe voltage; the next command is taken when the stage is there."""
+        """Go to the safe voltage. The next command is accepted when the stage has reached it."""
         return self._go_to_safety(latch=False)
 
     def _release(self) -> str:
@@ -144,7 +144,7 @@ class DriverCommands:
     def _refuse(self, name: str, stamp: int, reason: PiezoError) -> None:
         self._diagnostics.refused += 1
         message = f"refused '{name}': {reason}"
-        if name == "set_voltage":  # each line of code has an interval of its own
+        if name == "set_voltage":  # rclpy limits the rate separately for every line of code
             self._node.get_logger().warning(message, throttle_duration_sec=_SET_POINT_INTERVAL)
         else:
             self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)

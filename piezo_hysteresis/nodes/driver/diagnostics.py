@@ -31,21 +31,21 @@ from ..topics import DIAGNOSTICS, advertise
 
 
 class DriverDiagnostics:
-    """Publishes state, rate reached and what was lost; every change of state at once.
+    """Publishes the state, the rate and the losses once a second, and every change of state immediately.
 
     Parameters
     ----------
     node : GuardedNode
         The driver; its full name stands before every status.
     latch : StopLatch
-        Of the driver: whether it was stopped.
+        Latch of the driver, which shows whether it was stopped.
 
     Attributes
     ----------
     refused : int
-        Commands that were refused so far.
+        Number of refused commands.
     claim : Claim
-        Who alone may move the stage.
+        Claim on the stage.
     """
 
     def __init__(self, node: GuardedNode, latch: StopLatch) -> None:
@@ -66,7 +66,7 @@ class DriverDiagnostics:
         self.publish()
 
     def watch(self, acquisition: StreamingAcquisition | None, rate: float = 0.0) -> None:
-        """Report the figures of an acquisition that shall reach a rate [samples per s]; None ends it."""
+        """Report the counters of an acquisition with its nominal rate [samples per s]; None ends this."""
         self._acquisition, self._target = acquisition, rate
         self._seen = (time.monotonic(), 0, 0.0, 0.0)
 

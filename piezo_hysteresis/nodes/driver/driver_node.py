@@ -45,7 +45,7 @@ _SIMULATED_TIME = "use_sim_time"
 """Parameter of every ROS node: its clock follows /clock."""
 
 _OWN_CLOCK = "a driver stamps samples and checks commands by the clock of the computer"
-"""Why a driver refuses it."""
+"""Reason why a driver refuses this parameter."""
 
 
 class DriverNode(GuardedNode, LifecycleNode):
@@ -85,7 +85,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             self.trigger_activate()
 
     def end(self) -> None:
-        """Ramp to the safe voltage and release the stage, while publishers still work."""
+        """Ramp to the safe voltage and release the stage while publishers still work."""
         if self._state_machine.current_state[1] == "active":
             self.trigger_deactivate()
         if self._state_machine.current_state[1] in ("unconfigured", "inactive"):
@@ -108,7 +108,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             except Exception:
                 session.close()
                 raise
-        except Exception as error:  # rclpy would end the transition without a word
+        except Exception as error:  # rclpy would end the transition without a message
             self._report_failure(error)
             return TransitionCallbackReturn.FAILURE
         self._publish_in_force(session.in_force())
@@ -121,7 +121,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Let samples flow."""
+        """Begin to publish samples."""
         done = super().on_activate(state)
         assert self._session is not None and self._topics is not None
         self._failure = None
@@ -149,7 +149,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make safe and release the stage."""
+        """Bring the stage to its safe voltage and release it."""
         self._make_safe()
         self._release()
         self.get_logger().info("shut down")
@@ -157,7 +157,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         return super().on_shutdown(state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make safe and release the stage; the node is unconfigured then and can be tried again."""
+        """Bring the stage to its safe voltage and release it. The node is then unconfigured."""
         self._make_safe()
         self._release()
         super().on_error(state)
@@ -185,7 +185,7 @@ class DriverNode(GuardedNode, LifecycleNode):
                 self._report_failure(error)
 
     def _fail(self, error: PiezoError) -> None:
-        """The acquisition has ended by itself, in its thread: leave the active state from the executor's."""
+        """Leave the active state in the thread of the executor, because the thread of the acquisition has ended."""
         self._failure = error
         self._report_failure(error)
         self.executor.create_task(self.guarded(self._give_up))
@@ -195,7 +195,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             self.trigger_deactivate()
 
     def _latch_changed(self) -> None:
-        """The driver was stopped or released, in a thread of its own: show it from the executor's."""
+        """Publish in the thread of the executor that the driver was stopped or released."""
         if self.executor is not None:
             self.executor.create_task(self.guarded(self._publish_latch))
 
@@ -214,7 +214,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         self._in_force_changes = False
 
     def _refuse_while_configured(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Parameters are read at configure; a change that would have no effect is not accepted."""
+        """Refuse changes that would have no effect, because the parameters are read at configure."""
         ours = {row.name for row in DRIVER}
         for name in (parameter.name for parameter in parameters):
             reason = ""
@@ -243,7 +243,7 @@ def _records(path: str) -> tuple[Record, ...]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a driver; its exit code is 2 where its parameters make no sense."""
+    """Run a driver; its exit code is 2 where its parameters are invalid."""
     return run(DriverNode, arguments, begin=DriverNode.begin, end=DriverNode.end)
 
 

@@ -31,7 +31,7 @@ from ..runtime.sending import is_heard, send
 from ..topics import advertise, advertise_lifecycle
 
 _STATES = {EventKind.BEGAN: "playing", EventKind.DONE: "done", EventKind.STOPPED: "stopped"}
-"""Word of every event in `command_status`."""
+"""State in `command_status` for every event."""
 
 
 class DriverTopics:
@@ -71,13 +71,13 @@ class DriverTopics:
         return int(self._samples.get_subscription_count())
 
     def destroy(self) -> None:
-        """Take the topics back."""
+        """Remove the publishers."""
         for publisher in (self._samples, self._voltage, self._displacement, self._live, self._phase):
             self._node.destroy_lifecycle_publisher(publisher)
         self._node.destroy_publisher(self._status)
 
     def deliver(self, delivery: Delivery) -> None:
-        """Publish a block: phases that begin in it first, commands that end in it last."""
+        """Publish a block, after the phases that begin in it and before the ends of commands in it."""
         begun = [e for e in delivery.events if e.kind is EventKind.BEGAN]
         ended = [e for e in delivery.events if e.kind is not EventKind.BEGAN]
         for event in begun:
@@ -94,11 +94,11 @@ class DriverTopics:
             self._publish_live(delivery.block)
 
     def accepted(self, phase: Phase, size: int) -> None:
-        """Report that a command of so many samples will be played."""
+        """Report that a command will be played, with its number of samples."""
         self._publish_status(DiagnosticStatus.OK, phase.name, f"{size} samples", "accepted", phase.stamp, phase.number)
 
     def refused(self, name: str, stamp: int, reason: str) -> None:
-        """Report that a command will not be played, and why."""
+        """Report that a command will not be played, with the reason."""
         self._publish_status(DiagnosticStatus.WARN, name, reason, "refused", stamp)
 
     def stopped(self, phase: Phase) -> None:

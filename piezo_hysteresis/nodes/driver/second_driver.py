@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`refuse_second_driver`: one namespace has one driver, on this machine and on all others."""
+"""`refuse_second_driver`: raises an error where the namespace has a driver already, on this machine or another one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ...errors import StageError
 from ..runtime.qos import SAMPLES
 
 _SILENCE = 1.0
-"""Time without a block after which a publisher of samples is taken for dead [s]."""
+"""Time without a block after which a publisher of samples counts as dead [s]."""
 
 
 def refuse_second_driver(node: Node, discovery_time: float) -> None:
@@ -42,7 +42,7 @@ def refuse_second_driver(node: Node, discovery_time: float) -> None:
     Raises
     ------
     StageError
-        If another publisher sends samples. A silent one is taken for a driver that was killed.
+        If another publisher sends samples. A silent publisher counts as a driver that was killed.
     """
     deadline = time.monotonic() + discovery_time
     while node.count_publishers("samples") == 0:

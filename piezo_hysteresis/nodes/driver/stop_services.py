@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`StopServices`: `~/stop`, `~/cancel` and `~/release` of the driver, served by a thread that does nothing else."""
+"""`StopServices`: serves `~/stop`, `~/cancel` and `~/release` of the driver in its own thread."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 SUFFIX = "_stop"
-"""After the name of the driver: the name of the node that serves its stop."""
+"""Suffix that makes the name of the stop node from the name of the driver."""
 
 
 class StopServices:
     """Services under the name of the driver, on a node and an executor of their own.
 
-    The driver takes its callbacks one after the other: behind a flood of large commands a stop would wait for seconds.
+    The driver runs its callbacks one after the other. Behind many large commands, a stop would wait for seconds.
 
     Parameters
     ----------
     driver : rclpy.node.Node
         The driver.
     **actions : callable
-        By the last word of the service: what is done, in the thread of the services; returns the message of the
-        answer.
+        For the last word of each service name, the function that is called in this thread. It returns the message of
+        the answer.
     """
 
     def __init__(self, driver: Node, **actions: Callable[[], str]) -> None:
@@ -62,7 +62,7 @@ class StopServices:
         self._thread.start()
 
     def end(self) -> None:
-        """Serve nothing any more; harmless when repeated."""
+        """End the services; may be repeated."""
         if not self._ended.done():
             self._ended.set_result(None)
             self._executor.wake()
@@ -75,7 +75,7 @@ def _answering(action: Callable[[], str]) -> Callable[[Trigger.Request, Trigger.
     def answer(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
             response.message, response.success = action(), True
-        except Exception as error:  # the thread must live to serve the next stop
+        except Exception as error:  # the thread must survive to serve the next stop
             response.message = f"fault of the driver: {error!r}"
         return response
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`BagRecorder`: every topic of an axis, message by message as it came over the wire, into a bag."""
+"""`BagRecorder`: records all topics of an axis as serialised messages in a bag."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from ..topics import TOPICS, subscribe
 
 
 class BagRecorder:
-    """Subscribes to topics of an axis and writes what comes, until it is closed.
+    """Subscribes to topics of an axis and writes every message, until it is closed.
 
     Parameters
     ----------
     node : rclpy.node.Node
-        Whose namespace and executor are used.
+        Node with the namespace and the executor that are used.
     path : Path
         Folder of the bag, which must not exist.
     topics : collection of str
@@ -45,9 +45,9 @@ class BagRecorder:
     Attributes
     ----------
     counts : dict of str to int
-        Messages written so far by topic.
+        Number of messages written so far, by topic.
     failure : RecordingError or None
-        What ended the recording early.
+        Error that ended the recording early.
 
     Raises
     ------
@@ -79,14 +79,14 @@ class BagRecorder:
         return (newest - index) % 2**32 < 2**31
 
     def close(self) -> None:
-        """End the bag; harmless when repeated."""
+        """Close the bag; may be repeated."""
         while self._subscriptions:
             self._node.destroy_subscription(self._subscriptions.pop())
         self._bag.close()
 
     def _subscribe(self, name: str) -> object:
         described = TOPICS[name]
-        # whatever a topic is remapped to, readers look for it under its own name
+        # readers look for a topic under its own name, whatever it is remapped to
         topic, quality = self._node.resolve_topic_name(name, only_expand=True), described.quality
         self._bag.add_topic(
             topic,

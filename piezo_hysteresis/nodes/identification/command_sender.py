@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`CommandSender`: waveforms to the driver, packed and published in a thread of their own."""
+"""`CommandSender`: packs waveforms and publishes them to the driver in its own thread."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from ..runtime.sending import is_taken_by, send
 from ..topics import advertise
 
 _LONGEST_WAY = 2.0
-"""Wait for a waveform that is on its way when it is called off [s]."""
+"""Longest wait for a waveform that is being sent when the phase is cancelled [s]."""
 
 
 class CommandSender:
-    """Publishes on `command` while its node goes on: minutes of drive are 80 MB, seconds of work on a busy computer.
+    """Publishes on `command` in its own thread, because minutes of drive (80 MB) take seconds on a busy computer.
 
     Parameters
     ----------
@@ -49,13 +49,13 @@ class CommandSender:
         self._called_off = threading.Event()
 
     def reaches(self, driver: str) -> bool:
-        """Whether the node `driver` of this namespace takes what is sent; a recorder alone plays nothing."""
+        """Whether the node `driver` of this namespace subscribes to the command; a recorder alone plays nothing."""
         return is_taken_by(driver, self._node, self._publisher)
 
     def send(
         self, phase: ProtocolPhase, owner: str, leaving: Callable[[Time], None], lost: Callable[[str], None]
     ) -> None:
-        """Send a phase, stamped when it is packed and leaves: its age shall be that of its way.
+        """Send a phase. It is stamped when it is published, so that its age is the transport time.
 
         Parameters
         ----------
@@ -67,7 +67,7 @@ class CommandSender:
         lost : callable
             Called with the reason where the message did not leave, in the thread.
         """
-        self._join()  # nobody waits for what came before: its fate is known
+        self._join()  # the result of the phase before is known
         self._called_off.clear()
         self._thread = threading.Thread(
             target=self._send, args=(phase, owner, leaving, lost), name="command", daemon=True
@@ -75,20 +75,20 @@ class CommandSender:
         self._thread.start()
 
     def call_off(self, has_arrived: bool) -> None:
-        """Return when nothing is on its way any more: what arrived after a stop would be played.
+        """Wait until no waveform is being sent, because one that arrives after a stop would be played.
 
         Parameters
         ----------
         has_arrived : bool
-            Whether the driver has answered what was sent last. The middleware confirms it seconds later, and one that
-            has died confirms nothing.
+            Whether the driver has answered the last phase. The middleware confirms it seconds later; a dead driver
+            confirms nothing.
         """
         self._called_off.set()
         if self._join() and not has_arrived:
             self._publisher.wait_for_all_acked(Duration(seconds=_LONGEST_WAY))
 
     def _join(self) -> bool:
-        """Wait until the thread has ended; False where there was none."""
+        """Wait until the thread has ended; returns False where there was none."""
         thread, self._thread = self._thread, None
         if thread is not None:
             thread.join()

@@ -14,7 +14,7 @@
 
 """`DriverClient`: the driver as seen from the identification node.
 
-Its limits, its voltage, and the state of commands.
+It holds the limits, the voltage, and the state of commands.
 """
 
 from __future__ import annotations
@@ -45,23 +45,23 @@ _NAMES = ("sample_period", "voltage_min", "voltage_max", "safe_voltage", "max_sl
 """Parameters of the driver under ``in_force.`` that limit a protocol."""
 
 _POLL_INTERVAL = 0.5
-"""Time between two questions to the driver [s]."""
+"""Time between two requests to the driver [s]."""
 
 _FRESH = 3.0
-"""Greatest age of a status of the driver that still counts as its present state [s]."""
+"""Largest age of a status of the driver that counts as its present state [s]."""
 
 _CLAIM_INTERVAL = 0.5
 """Time between repetitions of a claim [s]."""
 
 _SAFE_WITHIN = 5e-3
-"""Distance from the safe voltage that counts as there [V]: converters round, measured voltages are noisy."""
+"""Largest distance from the safe voltage that counts as safe [V]; converters round, and measured voltages are noisy."""
 
 _PLACE_TOLERANCE = 0.01
-"""Distance from the beginning of a phase that is none, in spans of the drive."""
+"""Largest distance from the first voltage of a phase at which the phase may begin, in spans of the drive."""
 
 
 class DriverClient:
-    """Asks the driver for its limits, sends phases to it, and follows their state.
+    """Asks the driver for its limits, sends phases to it, and tracks their state.
 
     Parameters
     ----------
@@ -73,19 +73,19 @@ class DriverClient:
     Attributes
     ----------
     limits : DriveLimits or None
-        What the driver accepts; None while there is no configured driver.
+        Limits of the driver; None while there is no configured driver.
     state, reason : str
-        Fate of the last phase: ``sending``, ``sent``, ``accepted``, ``playing``, ``done``, ``refused`` or ``stopped``.
+        State of the last phase: ``sending``, ``sent``, ``accepted``, ``playing``, ``done``, ``refused`` or ``stopped``.
     first_index : int
         Index of its first sample, once it plays.
     stopped : str
-        Why the driver takes no command; empty where it was not stopped.
+        Reason why the driver accepts no command; empty where it was not stopped.
     voltages : int
-        Messages of 'voltage' so far.
+        Number of messages on 'voltage' so far.
     owner : str
-        As whom this client claims the stage.
+        Name with which this client claims the stage.
     holder : str
-        Who holds the claim at present; empty where nobody does.
+        Present owner of the claim; empty where the stage is not claimed.
     """
 
     def __init__(self, node: GuardedNode, driver: str) -> None:
@@ -101,7 +101,7 @@ class DriverClient:
         self._pending: Future | None = None
         self._asked = self._answered = -math.inf
         self._parameters = AsyncParameterClient(node, driver)
-        self._stop = node.create_client(Trigger, f"{driver}/cancel")  # another one's stop stays as it is
+        self._stop = node.create_client(Trigger, f"{driver}/cancel")  # a stop by somebody else is not released
         self._command = CommandSender(node)
         subscribe(node, "command_status", self._on_status)
         subscribe(node, "voltage", self._on_voltage)
@@ -111,12 +111,12 @@ class DriverClient:
 
     @property
     def is_fresh(self) -> bool:
-        """True where the driver has answered within the last seconds: one that was killed is known for a while."""
+        """True where the driver has answered within the last seconds; ROS lists a killed driver for some time."""
         return time.monotonic() - self._answered < _FRESH
 
     @property
     def missing(self) -> str:
-        """What is still missing before a phase can be sent; empty when nothing is."""
+        """What is missing before a phase can be sent; empty where nothing is missing."""
         if self.limits is None:
             return f"a configured '{self._driver}' in {self._node.get_namespace()}"
         if not self._command.reaches(self._driver):
@@ -140,7 +140,7 @@ class DriverClient:
         return self.holder == self.owner
 
     def misplaced(self, voltage: float) -> str:
-        """Why a phase cannot begin at `voltage` [V]; empty where the stage is there, or its voltage is unknown."""
+        """Reason why a phase cannot begin at `voltage` [V]; empty where it can, or the voltage is unknown."""
         if self.limits is None or self._newest is None:
             return ""
         near = max(_SAFE_WITHIN, _PLACE_TOLERANCE * (self.limits.voltage_max - self.limits.voltage_min))
@@ -149,12 +149,12 @@ class DriverClient:
         return f"it begins at {voltage:.3g} V, and the stage is at {self._newest:.3g} V"
 
     def claim(self) -> None:
-        """Ask for the stage; once granted, the claim is renewed until it is released. An ended one stays ended."""
+        """Claim the stage. A granted claim is renewed until it is released; a claim that has ended is not renewed."""
         self._is_claiming, self._has_owned = True, False
         self._repeat_claim()
 
     def release(self) -> None:
-        """Give the claim up; the driver brings the stage to its safe voltage where it is not there."""
+        """Release the claim; the driver then brings the stage to its safe voltage."""
         if self._is_claiming:
             self._is_claiming = False
             send(self._claims, KeyValue(key=self.owner, value="release"))
@@ -168,7 +168,7 @@ class DriverClient:
         self._has_owned = self._has_owned or (self._is_claiming and self.owns)
 
     def send(self, phase: ProtocolPhase) -> None:
-        """Send a phase as a command, without waiting until it has left."""
+        """Send a phase as a command, without waiting until it is sent."""
         self._sent, self.state, self.reason = None, "sending", ""
 
         def leaving(stamp: Time) -> None:
@@ -180,9 +180,9 @@ class DriverClient:
         self._command.send(phase, self.owner if self.owns else "", leaving, lost)
 
     def stop(self) -> Future | None:
-        """Ask the driver to end what it plays and go to the safe voltage; None where there is no driver to ask.
+        """Ask the driver to end the present phase and go to the safe voltage; None where there is no driver.
 
-        A phase that is on its way arrives first.
+        A phase that is being sent arrives first.
         """
         try:
             self._command.call_off(has_arrived=self.state not in ("sending", "sent"))
@@ -195,7 +195,7 @@ class DriverClient:
         if self._pending is not None and not self._pending.done():
             if self._stop.service_is_ready() and time.monotonic() - self._asked < _FRESH:
                 return
-            self._pending.cancel()  # the driver was killed: the one that took its place has never heard the question
+            self._pending.cancel()  # the driver was killed, and its successor has not received the request
         self._pending = None
         if not self._parameters.services_are_ready():
             self.limits = None
@@ -209,7 +209,7 @@ class DriverClient:
             return
         values = [parameter_value_to_python(value) for value in answer.result().values]
         stopped = values.pop() if len(values) > len(_NAMES) else False
-        self.stopped = f"the driver was stopped, nothing moves; call {self._driver}/release first" if stopped else ""
+        self.stopped = f"the driver was stopped and moves nothing; call {self._driver}/release first" if stopped else ""
         self.limits, self._answered = None, time.monotonic()
         if len(values) == len(_NAMES) and values[0]:
             try:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ExperimentFolder`: where the recordings of the identification node are, and which one is meant."""
+"""`ExperimentFolder`: the folder of the recordings of the identification node, and the choice of one of them."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ class ExperimentFolder:
         return self.root / datetime.now(UTC).strftime("%Y%m%dT%H%M%S%fZ")
 
     def chosen(self, given: str) -> Path | None:
-        """The recording of this path; if it is empty, the last one. None if there is none."""
+        """The recording at this path. An empty path gives the last recording, or None if there is none."""
         if given or self.last is not None:
             return Path(given).expanduser() if given else self.last
         recorded = sorted(path.parent for path in self.root.glob("*/metadata.yaml"))
         return recorded[-1] if recorded else None
 
     def check(self, given: str) -> None:
-        """Refuse a path outside the folder: a diagnosis writes files beside its recording.
+        """Refuse a path outside the folder, because a diagnosis writes files beside its recording.
 
         Raises
         ------

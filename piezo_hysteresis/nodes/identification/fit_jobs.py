@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the identification node has fitted in another process: a model, or what is missing in one. No ROS."""
+"""The jobs that the identification node runs in another process: a fit, or a diagnosis. No ROS."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ..runtime.job_process import Report
 
 
 def identification(path: Path, model: str, report: Report) -> Outcome:
-    """Identify the model of a recorded experiment; the model so far does not count."""
+    """Identify the model of a recorded experiment; the present model is not used."""
     found = identify(read(path), progress=report)
     verdict = f"free-run error {found.free_run_percent:.3g} % of range ({found.free_run_error * 1e9:.3g} nm)"
     return Outcome(dumps(found.model), str(found), verdict)

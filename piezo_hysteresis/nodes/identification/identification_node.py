@@ -50,10 +50,10 @@ from .settings import IDENTIFICATION, PROTOCOLS
 from .status import ENDED, IdentificationStatus
 
 START = Model((HYSTERESIS(), Arx(), Offset()), 2e-5)
-"""Declared, not valid, before there is a result."""
+"""Model whose parameters are declared, as not valid, before there is a result."""
 
 _TICK = 0.02
-"""Time between two looks at the job under way [s]."""
+"""Time between two steps of the running job [s]."""
 
 
 class IdentificationNode(GuardedNode):
@@ -89,7 +89,7 @@ class IdentificationNode(GuardedNode):
         self.create_timer(_TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def end(self) -> None:
-        """Abort what is under way, while services still work."""
+        """Abort the running job while services still work."""
         self._lock.release()
         self._actions.end()
         if self._job is not None:
@@ -114,7 +114,7 @@ class IdentificationNode(GuardedNode):
         return self._on_drive(response, self._identify)
 
     def _on_drive(self, response: Trigger.Response, job: Callable[[Path], Generator[Progress]]) -> Trigger.Response:
-        """Begin a job that moves the stage, unless it is known already that it cannot."""
+        """Begin a job that moves the stage, unless it is already known to be impossible."""
         if self._driver.stopped:
             response.message = self._driver.stopped
             return response
@@ -155,7 +155,7 @@ class IdentificationNode(GuardedNode):
         return response
 
     def _result(self) -> dict[str, str]:
-        """Of the job that was done last, for those who asked by action."""
+        """Result of the last job, for clients of an action."""
         answer = Path(self._status.experiment) / "answer.json"
         model = self._served.model
         return {
@@ -177,7 +177,7 @@ class IdentificationNode(GuardedNode):
             self._status.failed(reason_of(error))
 
     def _end_job(self) -> str:
-        """Give up what is under way, whatever comes of it; what has become of stage and recording."""
+        """End the running job. Returns a sentence about the stage and the recording."""
         job, self._job = self._job, None
         try:
             if job is not None:
@@ -228,7 +228,7 @@ class IdentificationNode(GuardedNode):
         self._accept(protocols.outcome, path, diagnosis.__name__)
 
     def _accept(self, outcome: Outcome, path: Path, name: str) -> None:
-        """Serve, send and save the model of a job that is done."""
+        """Serve, publish and save the model of a job that has ended."""
         found = loads(outcome.model)
         self._served.serve(found)
         save(found, (path if path.is_dir() else path.parent) / f"{name}.yaml")
@@ -241,7 +241,7 @@ class IdentificationNode(GuardedNode):
         return PROTOCOLS[values["protocol"]](limits, values["seed"])
 
     def _planned(self, limits: DriveLimits) -> Protocol:
-        """What ~/plan describes: the protocol, or with live all that a live diagnosis plays in its fixed order."""
+        """What ~/plan describes: the protocol, or with `live` all phases of a live diagnosis in their fixed order."""
         values = read(self, IDENTIFICATION)
         return whole_plan(limits, values["seed"]) if values["live"] else self._protocol(limits)
 
@@ -250,7 +250,7 @@ class IdentificationNode(GuardedNode):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run an identification node; its exit code is 2 where its parameters make no sense."""
+    """Run an identification node; its exit code is 2 where its parameters are invalid."""
     return run(IdentificationNode, arguments, end=IdentificationNode.end)
 
 

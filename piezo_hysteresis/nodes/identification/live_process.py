@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`LiveProcess`: the decisions of a live diagnosis in a process of its own, so that the node answers. No ROS."""
+"""`LiveProcess`: makes the decisions of a live diagnosis in its own process, so that the node can answer. No ROS."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from ..runtime.fit_process import Outcome
 from ..runtime.job_process import Exchange, JobProcess, Report
 
 PATIENCE = 20.0
-"""Longest wait until what was recorded has reached the file [s]."""
+"""Longest wait until the recorded samples are in the file [s]."""
 _INTERVAL = 0.3
 """Time between two looks at the file [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class LiveSettings:
-    """What a user decides about a live diagnosis; as for `LiveDiagnosis`."""
+    """Settings of a live diagnosis, as for `LiveDiagnosis`."""
 
     error_rate: float
     longest: float
@@ -49,20 +49,20 @@ class LiveSettings:
 
     @classmethod
     def from_values(cls, values: Mapping[str, Any]) -> LiveSettings:
-        """From the parameters of the node."""
+        """Settings from the parameters of the node."""
         return cls(values["error_rate"], values["stage_time"], values["seed"])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Due:
-    """What is to be played next, and what is likely so far.
+    """The phases to be played next, and the likeliest explanations so far.
 
     Parameters
     ----------
     name : str
-        What the phases are, in a few words.
+        Short description of the phases.
     phases : tuple of ProtocolPhase
-        To be played.
+        Phases to be played.
     likely : str
         The likeliest explanations with their probabilities; empty before the first phases.
     """
@@ -73,12 +73,12 @@ class Due:
 
 
 class LiveProcess(JobProcess[Due | Outcome]):
-    """One live diagnosis; ends with this process.
+    """One live diagnosis. Its process ends when this process ends.
 
     Parameters
     ----------
     path : Path
-        The recording that grows meanwhile.
+        The recording, which grows during the diagnosis.
     limits : DriveLimits
         Of the stage.
     settings : LiveSettings
@@ -89,7 +89,7 @@ class LiveProcess(JobProcess[Due | Outcome]):
         super().__init__("diagnosis", _decide, path, limits, settings)
 
     def played(self, phases: Sequence[ProtocolPhase]) -> None:
-        """Say that these phases, the last ones of the recording, were played."""
+        """Report that these phases, the last ones of the recording, were played."""
         self.send((len(phases), phases[-1].duration))
 
 
@@ -106,7 +106,7 @@ def _decide(exchange: Exchange, path: Path, limits: DriveLimits, settings: LiveS
 
 
 def _recorded(path: Path, phases: int, last: float, report: Report) -> Experiment:
-    """The recording once it holds all phases that were played.
+    """Wait until the recording holds all played phases, and read it.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def _recorded(path: Path, phases: int, last: float, report: Report) -> Experimen
 
 
 def _is_whole(record: Record, duration: float) -> bool:
-    """Whether a phase of this duration [s] is complete but for what averaging cuts off."""
+    """Whether a phase of this duration [s] is complete, apart from the samples that averaging cuts off."""
     return record.duration > duration - 1.5 * record.sample_period
 
 

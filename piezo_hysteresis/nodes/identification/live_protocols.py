@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`LiveProtocols`: what a live diagnosis wants to be played, protocol by protocol, until it knows."""
+"""`LiveProtocols`: the protocols that a live diagnosis plays, one after the other, until it ends."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from .protocol_runner import Progress
 
 
 class LiveProtocols:
-    """For `run_protocols`: gives what is due next, and takes the outcome at the end.
+    """Gives `run_protocols` the phases that are due, and keeps the outcome at the end.
 
     Parameters
     ----------
     path : Path
-        Folder of the bag that is recorded meanwhile.
+        Folder of the bag that is being recorded.
     settings : LiveSettings
         Of the user.
     inform : callable
@@ -50,13 +50,13 @@ class LiveProtocols:
 
     @property
     def outcome(self) -> Outcome:
-        """What was found; IdentificationError before the end."""
+        """Result of the diagnosis; raises IdentificationError before the end."""
         if self._found is None:
             raise IdentificationError("the live diagnosis has not ended, expected its outcome")
         return self._found
 
     def following(self, limits: DriveLimits) -> Generator[Progress, None, Protocol | None]:
-        """Decide what is played next; None at the end."""
+        """Determine the next protocol; None at the end."""
         if self._process is None:
             self._process = LiveProcess(self._path, limits, self._settings)
         elif self._last is not None:
@@ -74,6 +74,6 @@ class LiveProtocols:
         return self._last
 
     def close(self) -> None:
-        """End the process, whatever it does."""
+        """End the process at once."""
         if self._process is not None:
             self._process.close()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ParameterCheck`: which changes of its parameters the identification node accepts."""
+"""`ParameterCheck`: decides which changes of its parameters the identification node accepts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ParameterCheck:
     Parameters
     ----------
     folder : ExperimentFolder
-        Inside which recordings have to be.
+        Folder in which recordings have to be.
     is_declared : callable
         Whether the node has a parameter of this name.
     """
@@ -50,7 +50,7 @@ class ParameterCheck:
                     rows[parameter.name].check(parameter.value)
                     self._check_place(parameter)
                 elif parameter.name.startswith(QOS_OVERRIDES):
-                    continue  # declared when a recording subscribes, which is after the start
+                    continue  # declared when a recording subscribes, after the start
                 elif not (parameter.name.startswith(PREFIX) or self._is_declared(parameter.name)):
                     raise ParameterError(f"{parameter.name} is no parameter of this node, expected {', '.join(rows)}")
         except PiezoError as error:
@@ -58,7 +58,7 @@ class ParameterCheck:
         return SetParametersResult(successful=True)
 
     def _check_place(self, parameter: Parameter) -> None:
-        """Others shall not choose where this node writes: a diagnosis leaves files beside its recording."""
+        """Refuse folders outside the experiment root, because a diagnosis writes files beside its recording."""
         if parameter.name in ("driver", "experiment_root"):
             raise ParameterError(f"{parameter.name} is read at start; give it then")
         if parameter.name == "experiment" and parameter.value:

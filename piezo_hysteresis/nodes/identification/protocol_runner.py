@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`run_protocol`: a protocol is played to the stage phase by phase, while everything is recorded."""
+"""`run_protocol`: plays a protocol to the stage phase by phase and records everything."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _SETTLING = 5.0
 """Longest wait for the voltage at which a phase begins [s]."""
 
 _NEWER = 2
-"""Messages of 'voltage' after the end of a phase, of which the first may have been on its way before."""
+"""Number of messages of 'voltage' to wait for after a phase; the first may have been sent before its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Progress:
     reason : str
         One line.
     fraction : float
-        Done of this state, 0 to 1.
+        Fraction of this state that is done, 0 to 1.
     phase : str
         ``"3 of 16 noise"`` while a phase is played.
     """
@@ -61,7 +61,7 @@ class Progress:
 
 
 Following = Callable[[DriveLimits], Generator[Progress, None, Protocol | None]]
-"""Finds out what is played next within the limits, and says meanwhile how far it has come; None at the end."""
+"""Generator that returns the next protocol within the limits, or None at the end, and yields its progress."""
 
 
 def run_protocol(
@@ -74,7 +74,7 @@ def run_protocol(
     node, driver, path
         As for `run_protocols`.
     plan : callable
-        Makes the protocol for the limits of the driver.
+        Returns the protocol for the limits of the driver.
     """
     planned: list[Protocol] = []
 
@@ -89,10 +89,10 @@ def run_protocol(
 
 
 def run_protocols(node: GuardedNode, driver: DriverClient, following: Following, path: Path) -> Generator[Progress]:
-    """Play and record one protocol after the other into one bag; to be resumed at short intervals until it ends.
+    """Play protocols and record them into one bag. The generator has to be resumed at short intervals until it ends.
 
-    Closing the iterator aborts: the driver is asked to go to its safe voltage, then the recording is finished. So does
-    every failure.
+    Closing the generator aborts: the driver is asked to go to its safe voltage, and the recording is finished. A
+    failure does the same.
 
     Parameters
     ----------
@@ -101,14 +101,14 @@ def run_protocols(node: GuardedNode, driver: DriverClient, following: Following,
     driver : DriverClient
         The stage.
     following : callable
-        Finds out what is played next. The stage rests at its safe voltage meanwhile, and stays claimed.
+        Determines the next protocol. Meanwhile the stage is at its safe voltage and stays claimed.
     path : Path
         Folder of the bag.
 
     Raises
     ------
     StageError
-        If there is no driver, a phase is refused or stopped, or the samples cease.
+        If there is no driver, a phase is refused or stopped, or no samples arrive.
     RecordingError
         If the bag cannot be written.
     IdentificationError
@@ -127,7 +127,7 @@ def run_protocols(node: GuardedNode, driver: DriverClient, following: Following,
             if recorder.failure is not None:
                 raise recorder.failure
             yield progress
-    except BaseException as error:  # that the iterator was closed, too
+    except BaseException as error:  # also where the generator was closed
         driver.stop()
         driver.release()
         _close_after(error, recorder)
@@ -155,7 +155,7 @@ def _close_after(error: BaseException, recorder: BagRecorder) -> None:
 
 
 def _claim(driver: DriverClient, recorder: BagRecorder) -> Generator[Progress]:
-    """Wait until the samples are recorded, claim the stage, and have it at its safe voltage."""
+    """Wait until samples are recorded, claim the stage, and wait until it is at its safe voltage."""
     seen = recorder.counts
     yield from _until(
         lambda: not driver.missing and seen["samples"] > 0 and seen["phase"] > 0,
@@ -178,7 +178,7 @@ def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol,
         yield from _go_to_start(driver, phase, progress)
         yield from _play(driver, recorder, phase, progress)
         done += phase.duration
-    # what is written lags behind the status while the computer is busy
+    # the recording lags behind the status while the computer is busy
     end = driver.first_index + protocol.phases[-1].voltage.size
     yield from _until(lambda: recorder.holds(end), lambda: "the last samples")
 
@@ -195,11 +195,11 @@ def _require_claim(driver: DriverClient) -> None:
     if driver.holder and not driver.owns:
         raise StageError(f"the stage is claimed by {printable(driver.holder)}; wait until it is released")
     if not driver.owns:
-        raise StageError("the claim on the stage has ended: this node stood still, or the driver was started again")
+        raise StageError("the claim on the stage has ended: this node was suspended or the driver restarted")
 
 
 def _go_to_start(driver: DriverClient, phase: ProtocolPhase, progress: Progress) -> Generator[Progress]:
-    """What is known of the voltage is a moment old: newer ones are waited for before a phase is sent."""
+    """Wait for new messages of 'voltage' before a phase is sent, because the known voltage may be outdated."""
     seen, deadline = driver.voltages, time.monotonic() + _SETTLING
     while True:
         reason = driver.misplaced(float(phase.voltage[0]))
@@ -214,7 +214,7 @@ def _go_to_start(driver: DriverClient, phase: ProtocolPhase, progress: Progress)
 def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, progress: Progress) -> Generator[Progress]:
     _require_claim(driver)
     driver.send(phase)
-    # a device that plays from its memory is silent meanwhile
+    # a device that plays from its memory sends nothing before the end
     longest_silence = PATIENCE + 2.0 * phase.duration
     deadline = time.monotonic() + PATIENCE
     played: float | None = None
@@ -225,7 +225,7 @@ def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, pro
             raise StageError(f"phase '{phase.name}': no answer on 'command_status' within {PATIENCE:g} s")
         if driver.limits is None:
             raise StageError(
-                f"phase '{phase.name}': {driver.missing} has gone; see /diagnostics and the log of the driver"
+                f"phase '{phase.name}': {driver.missing} is no longer there; see /diagnostics and the log of the driver"
             )
         _require_claim(driver)
         if recorder.silence > longest_silence:

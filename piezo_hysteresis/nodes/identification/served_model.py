@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ServedModel`: the identified model as parameters of a node and on the topic `model`, written by the node alone."""
+"""`ServedModel`: publishes the identified model as parameters of the node and on the topic `model`."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ from ..topics import advertise, subscribe
 
 
 class ServedModel:
-    """Parameters under ``model.``, all declared with values; a fit is set atomically and published.
+    """Parameters under ``model.``, all declared with values. A fit changes them in one step and is published.
 
-    A model that the model node has recalibrated is taken over, so that everybody follows it, late joiners too.
+    A model that the model node has recalibrated is published too, so that late joiners receive it.
 
     Parameters
     ----------
     node : rclpy.node.Node
-        Made with ``allow_undeclared_parameters``: another chain has other names.
+        Node with ``allow_undeclared_parameters``, because another chain has other names.
     start : Model
         Values to declare before there is a model; not valid.
 
     Attributes
     ----------
     model : Model or None
-        The model served; None while ``model.valid`` is false.
+        The present model; None while ``model.valid`` is false.
     """
 
     def __init__(self, node: Node, start: Model) -> None:
@@ -60,29 +60,29 @@ class ServedModel:
         subscribe(node, "recalibrated_model", self._on_recalibrated)
 
     def resume(self, given: Mapping[str, object]) -> None:
-        """Serve the model given at start, if there is one.
+        """Publish the model that was given at start, if there is one.
 
         Parameters
         ----------
         given : mapping
-            Parameters by name; those of a dump before any fit are not valid and do not count.
+            Parameters by name. The parameters of a dump before any fit are not valid and are ignored.
 
         Raises
         ------
         ModelError, ParameterError
-            If they are no model.
+            If they do not describe a model.
         """
         own = {name: value for name, value in given.items() if name.startswith(PREFIX)}
         if own and own.get(PREFIX + "valid", True) is not False:
             self.serve(from_parameters(own, "parameters given at start"))
 
     def serve(self, model: Model) -> None:
-        """Replace the whole model in one go, and publish it.
+        """Replace the whole model in one step, and publish it.
 
         Raises
         ------
         ModelError
-            If a parameter is refused; nothing has changed then.
+            If a parameter is refused. The model is then unchanged.
         """
         self.model = model
         self._set(model)
@@ -96,7 +96,7 @@ class ServedModel:
 
     def _set(self, model: Model) -> None:
         named = to_parameters(model, valid=self.model is not None)
-        # a parameter without a type is taken back
+        # a parameter without a type is removed
         gone = [name for name in self._node.get_parameters_by_prefix(PREFIX[:-1]) if PREFIX + name not in named]
         changes = [Parameter(PREFIX + name) for name in gone]
         changes += [Parameter(name, value=value) for name, value in named.items()]

@@ -42,15 +42,15 @@ class IdentificationStatus:
     Attributes
     ----------
     experiment : str
-        Path of the recording that is made or fitted.
+        Path of the recording that is being made or fitted.
     owner : str
-        As whom the stage is claimed while it is driven.
+        Name with which the stage is claimed while it is driven.
     goal : str
-        Identifier of the job under way or ended last; the answer of the service that began it ends with it.
+        Identifier of the present or last job; the answer of the service that began the job contains it.
     likely : str
         The likeliest explanations of a live diagnosis with their probabilities.
     listener : callable
-        Called with every status that is new.
+        Called with every new status.
     """
 
     def __init__(self, node: GuardedNode) -> None:
@@ -67,18 +67,18 @@ class IdentificationStatus:
 
     @property
     def state(self) -> str:
-        """The word of the state shown last."""
+        """The last published state."""
         return "" if self._shown is None else values_of(self._shown)["state"]
 
     def progress(self, progress: Progress) -> None:
-        """Report where the job under way stands; every new state and phase in the log, too."""
+        """Report the progress of the running job. New states and phases are also logged."""
         if (stage := (progress.state, progress.phase)) != self._logged:
             self._logged = stage
             self._node.get_logger().info(f"{progress.state}: {progress.phase or progress.reason}")
         self._show(DiagnosticStatus.OK, progress.state, progress.reason, progress.phase, progress.fraction)
 
     def set_likely(self, likely: str) -> None:
-        """Show with everything that follows how likely the explanations are."""
+        """Add the probabilities of the explanations to all further statuses."""
         self._node.get_logger().info(f"likely: {likely}")
         self.likely = likely
 
@@ -88,12 +88,12 @@ class IdentificationStatus:
         self._show(DiagnosticStatus.OK, "done", verdict, fraction=1.0)
 
     def failed(self, reason: str) -> None:
-        """Report what went wrong."""
+        """Report an error."""
         self._node.get_logger().error(reason)
         self._show(DiagnosticStatus.ERROR, "failed", reason)
 
     def aborted(self, reason: str) -> None:
-        """Report that the job was given up."""
+        """Report that the job was aborted."""
         self._node.get_logger().warning(f"aborted: {reason}")
         self._show(DiagnosticStatus.WARN, "aborted", reason)
 

@@ -66,7 +66,7 @@ def to_cloud(
 def from_cloud(
     cloud: PointCloud2, required: Mapping[str, str], optional: Mapping[str, str] | None = None
 ) -> dict[str, NDArray]:
-    """Unpack named fields of any cloud, ours or foreign, as contiguous arrays.
+    """Unpack named fields of any cloud, also of other software, as contiguous arrays.
 
     Parameters
     ----------
@@ -83,6 +83,6 @@ def from_cloud(
     Raises
     ------
     RecordError
-        On a missing field, a wrong type, sizes that contradict one another, no point, or a value that is not finite.
+        If a field is missing, a type is wrong, the sizes disagree, there is no point, or a value is not finite.
     """
     return unpacked(cloud.data, *stored_as(cloud, required, optional))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Streams of sensor_msgs/PointCloud2 as bytes: the parts that all messages share are serialised, or read, once."""
+"""Packs and unpacks streams of sensor_msgs/PointCloud2. The parts that all messages share are processed once."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from .cloud import from_cloud, to_cloud
 _STAMP = struct.Struct("=iI")
 """Stamp of a header: seconds and nanoseconds."""
 _STAMP_AT = 4
-"""A serialised message begins with four bytes on its encoding; the stamp comes next in a cloud."""
+"""Position of the stamp in a serialised cloud, after four bytes about the encoding."""
 _AFTER_STAMP = _STAMP_AT + _STAMP.size
 """Bytes of a message before the name of its frame."""
 _LONGEST_END = 4
-"""After the data comes `is_dense`, and up to three bytes that say nothing."""
+"""Largest number of bytes after the data: `is_dense`, and up to three bytes of padding."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -69,7 +69,7 @@ def read_cloud(cloud: PointCloud2, required: Mapping[str, str]) -> Columns:
 
 
 class CloudWriter:
-    """Packs columns as `to_cloud` does, into the bytes that a publisher would send for that message.
+    """Packs columns into the bytes that a publisher would send for the message of `to_cloud`.
 
     Parameters
     ----------
@@ -102,9 +102,9 @@ class CloudWriter:
 
 
 class CloudReader:
-    """Unpacks serialised clouds, ours or foreign, as `read_cloud` does.
+    """Unpacks serialised clouds, also of other software, as `read_cloud` does.
 
-    A message that equals the one before it, but for stamp, data and `is_dense`, is not deserialised.
+    A message that differs from the one before only in stamp, data and `is_dense` is not deserialised.
 
     Parameters
     ----------
@@ -122,13 +122,13 @@ class CloudReader:
         Raises
         ------
         RecordError
-            As from `read_cloud`, and on bytes that are no cloud.
+            As `read_cloud`, and if the bytes are not a cloud.
         """
         if self._known is not None and self._known.is_like(message):
             return self._known.read(message)
         try:
             cloud = deserialize_message(message, PointCloud2)
-        except RuntimeError as error:  # every error of a middleware is one
+        except RuntimeError as error:  # a middleware may raise any error
             raise RecordError(f"cloud: got {len(message)} bytes of something else, expected a cloud") from error
         columns = read_cloud(cloud, self._required)
         self._known = _Known(cloud, message, self._required)
@@ -136,7 +136,7 @@ class CloudReader:
 
 
 class _Known:
-    """Messages like one that was deserialised, which is spoilt."""
+    """Layout of the messages that are like one deserialised message; that message is modified."""
 
     def __init__(self, cloud: PointCloud2, message: bytes, required: Mapping[str, str]) -> None:
         self._dtype, self._wanted = stored_as(cloud, required)
@@ -147,7 +147,7 @@ class _Known:
         self._between = message[_AFTER_STAMP : self._start]
 
     def is_like(self, message: bytes) -> bool:
-        """True where only stamp, data and `is_dense` can differ; not where another encoding puts them elsewhere."""
+        """True where the message can differ only in stamp, data and `is_dense`, at the same positions."""
         return (
             message[_AFTER_STAMP : self._start] == self._between
             and message[:_STAMP_AT] == self._encoding
@@ -155,19 +155,19 @@ class _Known:
         )
 
     def read(self, message: bytes) -> Columns:
-        """Columns of one of them."""
+        """Columns of one such message."""
         seconds, rest = _STAMP.unpack_from(message, _STAMP_AT)
         values = unpacked(memoryview(message)[self._start : self._stop], self._dtype, self._wanted)
         return Columns(Time(sec=seconds, nanosec=rest), self._frame_id, bool(message[self._stop]), values)
 
 
 class _Frame:
-    """A serialised cloud without its data, and where they stand; `is_dense` comes next.
+    """A serialised cloud without its data, and the position of the data; `is_dense` follows them.
 
     Parameters
     ----------
     cloud : sensor_msgs.msg.PointCloud2
-        It is spoilt.
+        The cloud, whose data are removed.
     """
 
     def __init__(self, cloud: PointCloud2) -> None:

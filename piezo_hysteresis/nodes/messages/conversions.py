@@ -32,22 +32,22 @@ COMMAND = {"time": "f8", "voltage": "f8"}
 """Point of `command`; `time` is optional."""
 
 PERIOD_TOLERANCE = 0.01
-"""Largest departure of a sample from its place on the clock, in sample periods."""
+"""Largest deviation of a sample from its nominal time, in sample periods."""
 
 
 def command_to_cloud(voltage: ArrayLike, sample_period: float, phase: str, stamp: Time | None = None) -> PointCloud2:
-    """Message of `command`: a waveform that opens the phase named `phase`.
+    """Message of `command`: a waveform that begins the phase named `phase`.
 
     Parameters
     ----------
     voltage : (n,) array_like
         Drive voltage [V].
     sample_period : float
-        Time between samples [s]; the driver refuses another one than its own.
+        Time between samples [s]; it has to be that of the driver.
     phase : str
         Name of the phase.
     stamp : builtin_interfaces.msg.Time, optional
-        Now; without it the driver does not check the age of the command.
+        Time of sending; without it the driver does not check the age of the command.
     """
     values = np.asarray(voltage, dtype=np.float64)
     columns = {"time": sample_period * np.arange(values.size), "voltage": values}
@@ -80,7 +80,7 @@ def live(stamp: Time, frame_id: str, **values: float) -> JointState:
 
 
 def diagnostic(level: bytes, name: str, message: str, hardware_id: str = "", **values: object) -> DiagnosticStatus:
-    """Status with its values as text, floats with six digits; all of it can be printed, whoever wrote it."""
+    """Status with its values as text, floats with six digits. Characters that cannot be printed are replaced."""
     texts = {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in values.items()}
     return DiagnosticStatus(
         level=level,
@@ -108,7 +108,7 @@ def from_stamp(stamp: Time) -> int:
     Raises
     ------
     RecordError
-        On a full second or more of nanoseconds.
+        If the nanoseconds are a full second or more.
     """
     if stamp.nanosec >= 1_000_000_000:
         raise RecordError(f"stamp: got {stamp.nanosec} ns, expected less than a second")

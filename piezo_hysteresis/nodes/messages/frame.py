@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`frame_name`: the frame in which an axis measures, as REP 105 and tf2 want it."""
+"""`frame_name`: the name of the frame in which an axis measures, as REP 105 and tf2 require it."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ def frame_name(given: str, namespace: str) -> str:
     Parameters
     ----------
     given : str
-        As the user wants it; empty for the namespace of the axis.
+        Name given by the user; empty for the namespace of the axis.
     namespace : str
         Of the driver, e.g. ``/stage_x``.
 
     Raises
     ------
     ParameterError
-        If what was given is no name of a frame.
+        If the given name is not allowed for a frame.
 
     Examples
     --------

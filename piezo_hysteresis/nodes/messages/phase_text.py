@@ -21,16 +21,16 @@ import re
 from ...errors import RecordError
 
 _PHASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
-"""What a phase may be called."""
+"""Names that a phase may have."""
 
 
 def phase_name(frame_id: str) -> str:
-    """Name of a commanded phase; `command` where none is given.
+    """Name of a commanded phase; `command` where no name is given.
 
     Raises
     ------
     RecordError
-        On a name that could not stand in a file name.
+        If the name cannot be part of a file name.
     """
     if not frame_id:
         return "command"
@@ -47,7 +47,7 @@ def phase_and_owner(frame_id: str) -> tuple[str, str]:
     Raises
     ------
     RecordError
-        As from `phase_name`.
+        As `phase_name`.
     """
     name, _, owner = frame_id.partition("@")
     return phase_name(name), owner
@@ -59,7 +59,7 @@ def phase_from_text(text: str) -> tuple[int, str]:
     Raises
     ------
     RecordError
-        On any other text.
+        If the text has another form.
     """
     number, _, name = text.partition(" ")
     if not (number.isascii() and number.isdigit() and name):

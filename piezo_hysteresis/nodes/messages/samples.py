@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages of `samples` and `predicted_samples`: a `SampleBlock` on its way into and out of them."""
+"""Messages of `samples` and `predicted_samples`: conversion from and to `SampleBlock`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _LONGEST_FRAME = 200
 """Characters of the name of a frame that are passed on."""
 
 _LARGEST = {"voltage": 1e4, "displacement": 1.0}
-"""What no piezo stage is driven with [V], and no piezo stage moves [m]."""
+"""Limits that no piezo stage exceeds: drive voltage [V] and displacement [m]."""
 
 
 def samples_to_cloud(block: SampleBlock) -> PointCloud2:
@@ -68,25 +68,25 @@ class SampleWriter:
 
 
 def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
-    """Block of a message of `samples`, ours or foreign.
+    """Block of a message of `samples`, also of other software.
 
     Raises
     ------
     RecordError
-        On missing or wrong fields, wrong sizes, values that are not finite or that no stage has, or samples that do not
-        follow one another evenly.
+        If fields are missing or wrong, sizes are wrong, values are not finite or beyond all stages, or samples are not
+        evenly spaced.
     """
     return _block(read_cloud(cloud, SAMPLES))
 
 
 class SampleReader:
-    """Blocks of serialised messages of `samples`, ours or foreign."""
+    """Reads blocks from serialised messages of `samples`, also of other software."""
 
     def __init__(self) -> None:
         self._reader = CloudReader(SAMPLES)
 
     def read(self, message: bytes) -> SampleBlock:
-        """Block of one message; RecordError as from `samples_from_cloud`."""
+        """Block of one message; raises RecordError as `samples_from_cloud` does."""
         return _block(self._reader.read(message))
 
 
@@ -124,7 +124,7 @@ def _require_consecutive(block: SampleBlock) -> None:
 
 @lru_cache(maxsize=2)
 def _counting(size: int) -> tuple[NDArray[np.uint32], Samples]:
-    """0, 1, 2, … as index and as number: a stream brings blocks of one size."""
+    """0, 1, 2, … as index and as float; cached, because the blocks of a stream have one size."""
     index, number = np.arange(size, dtype=np.uint32), np.arange(size, dtype=np.float64)
     for values in (index, number):
         values.setflags(write=False)
@@ -145,7 +145,7 @@ class PredictionWriter:
         Parameters
         ----------
         block : SampleBlock
-            What was measured.
+            Measured samples.
         prediction, residual : (n,) ndarray
             Predicted displacement and measured minus predicted [m].
         model : int

@@ -63,7 +63,7 @@ CHANGE: tuple[Row, ...] = (
 """Parameters of the change watch."""
 
 STRONG = 4.0
-"""Statistic over its threshold from which a change is an ERROR."""
+"""Ratio of the statistic to its threshold from which a change is an ERROR."""
 
 
 class ChangeReporter:
@@ -83,9 +83,9 @@ class ChangeReporter:
     interval : float
         Wanted mean time between false alarms [s].
     folder : Path
-        Of what is kept.
+        Folder of the baselines and recalibrated models.
     status : DiagnosticStatus
-        What was published last.
+        The last published status.
     """
 
     def __init__(self, node: Node, values: Mapping[str, Any]) -> None:
@@ -121,16 +121,16 @@ class ChangeReporter:
             self._publish()
 
     def adopt(self, model: Model, baseline: Baseline) -> None:
-        """Watch a recalibrated model with the baseline of the one before, once it has taken over."""
+        """Watch a recalibrated model with the baseline of the model before, as soon as it is in use."""
         self._adopted = (model, baseline)
 
     def report_recalibration(self, message: str) -> None:
-        """Say in every status from now on what became of the last recalibration."""
+        """Add the result of the last recalibration to all further statuses."""
         self._recalibration = message
         self._publish()
 
     def restart(self) -> None:
-        """Learn the offset of the sensor anew."""
+        """Estimate the offset of the sensor again."""
         self.watch.restart()
 
     def _follow(self, model: Model) -> None:

@@ -35,14 +35,14 @@ from .change_reporter import ChangeReporter
 from .residual_alarm import ResidualAlarm
 
 _LONGEST_REASON = 500
-"""Characters of a reason that are reported again every second."""
+"""Largest number of characters of a reason that is repeated every second."""
 
 _LOG_INTERVAL = 0.1
-"""Shortest time between two lines of one kind in the log [s]: no stream of faults fills a disk."""
+"""Shortest time between two lines of one kind in the log [s]: a stream of faults must not fill the disk."""
 
 
 class ModelDiagnostics:
-    """Publishes rate, losses, latency, and the residual beside the free-run error of the model file.
+    """Publishes rate, losses, latency, and the residual with the free-run error of the model file.
 
     Parameters
     ----------
@@ -70,20 +70,20 @@ class ModelDiagnostics:
         node.create_timer(1.0, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def problem(self, message: str) -> None:
-        """Report one line of what went wrong, now and in the next report."""
+        """Report a problem in one line, now and in the next report."""
         if message[:_LONGEST_REASON] != self._problem:
             self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
         self._problem = message[:_LONGEST_REASON]
         self._problems += 1
 
     def refused(self, message: str) -> None:
-        """Report why a model was not taken, until another one is."""
+        """Report why a model was refused, until another model is accepted."""
         self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
         self._refused = message[:_LONGEST_REASON]
         self._problems += 1
 
     def model(self, model: Model) -> None:
-        """Report the model that is followed from now on."""
+        """Report the model in use from now on."""
         self._model, self._refused = model, ""
         try:
             self._free_run_error = float(model.provenance["free_run_error"])
@@ -93,12 +93,12 @@ class ModelDiagnostics:
         self._node.get_logger().info(message, throttle_duration_sec=_LOG_INTERVAL)
 
     def follow(self, predictor: Predictor) -> None:
-        """Report the figures of a predictor from now on."""
+        """Report the counters of a predictor from now on."""
         self._predictor, self._range = predictor, None
         self._seen = (time.monotonic(), 0, 0, 0)
 
     def saw(self, block: SampleBlock, now: int) -> None:
-        """Note the age of a block that has been dealt with at `now` [ns]."""
+        """Record the age of a block that was processed at `now` [ns]."""
         self._frame = block.frame
         self._latency = max(self._latency, (now - block.stamp) * 1e-9 - float(block.time[-1]))
         predictor = self._predictor
@@ -147,7 +147,7 @@ class ModelDiagnostics:
         predictor = self._predictor
         clock = self._node.get_clock()
         if clock.ros_time_is_active and clock.now().nanoseconds == 0:
-            yield DiagnosticStatus.WARN, "use_sim_time is true, and nothing comes on /clock"
+            yield DiagnosticStatus.WARN, "use_sim_time is true, and no message arrives on /clock"
         for message in filter(None, (self._refused, self._problem, self._node.recent_fault)):
             yield DiagnosticStatus.ERROR, message
         if predictor is None or not received:

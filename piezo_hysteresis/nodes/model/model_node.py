@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`model_node`: follows a stage with a model: prediction and residual of every sample, live."""
+"""`model_node`: runs a model with a stage, and publishes prediction and residual of every sample."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ from .recalibrator import Recalibrator
 from .residual_alarm import ALARM, ResidualAlarm
 
 _COLD = 3.0
-"""Time after which kernels are being compiled, and not only loaded [s]."""
+"""A start that takes longer than this is compiling kernels, not only loading them [s]."""
 
 _SOURCE = "model node"
 """Source of the parameters of the model node."""
@@ -102,7 +102,7 @@ class ModelNode(GuardedNode):
                 block.voltage,
                 block.displacement,
                 follows_gap=block.follows_gap,
-                settled=block.index[0] == 0 or block.phase[0] == 0,  # nothing was driven since the driver began
+                settled=block.index[0] == 0 or block.phase[0] == 0,  # not driven since the driver began
             )
         except PiezoError as error:
             self._diagnostics.problem(str(error))
@@ -115,7 +115,7 @@ class ModelNode(GuardedNode):
             self._recalibrator.add(counted, answer, predictor)
 
     def _predictor_for(self, block: SampleBlock) -> Predictor | None:
-        """The predictor of the stream, made anew for another sample period; None before that is known."""
+        """The predictor of the stream. Another sample period gives a new one; None while it is unknown."""
         before, self._before = self._before, block
         period = block.sample_period
         if period is None and before is not None:
@@ -141,7 +141,7 @@ class ModelNode(GuardedNode):
             self._diagnostics.refused(str(error))
 
     def _is_followed(self, model: Model) -> bool:
-        """True of the model that predicts already or soon, e.g. one that this node has recalibrated itself."""
+        """True where this model is in use or about to be, for example after a recalibration by this node."""
         predictor = self._predictor
         if predictor is None or self._model is None or model_hash(model) != model_hash(self._model):
             return False
@@ -154,7 +154,7 @@ class ModelNode(GuardedNode):
         self._diagnostics.model(model)
 
     def end(self) -> None:
-        """Give up a fit that is under way."""
+        """End a running fit."""
         self._recalibrator.end()
 
     def _load(self, path: str) -> None:
@@ -180,7 +180,7 @@ class ModelNode(GuardedNode):
         return response
 
     def _check(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """A model file is read before its name is accepted; the other parameters hold from the start."""
+        """Read a model file before its name is accepted. The other parameters cannot be changed after the start."""
         rows = {row.name: row for row in MODEL}
         try:
             for parameter in parameters:
@@ -199,7 +199,7 @@ class ModelNode(GuardedNode):
 
 
 def _read(path: str) -> Model:
-    """The model of a file; a pipe or a device would keep the node waiting."""
+    """Read the model of a file. A pipe or a device is refused, because the node would wait for it."""
     place = Path(path).expanduser()
     if place.exists() and not place.is_file():
         raise ModelError(f"{path}: got no regular file, expected a model file")
@@ -207,7 +207,7 @@ def _read(path: str) -> Model:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a model node; its exit code is 2 where its parameters make no sense."""
+    """Run a model node; its exit code is 2 where its parameters are invalid."""
     return run(ModelNode, arguments, end=ModelNode.end)
 
 

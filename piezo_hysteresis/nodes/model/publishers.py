@@ -31,7 +31,7 @@ from ..topics import advertise
 
 
 class ModelTopics:
-    """Publishers of a model node; the parameter `live_rate` is counted in samples, so that a replay does the same.
+    """Publishers of a model node. The parameter `live_rate` is counted in samples, so that a replay publishes the same.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class ModelTopics:
         self._live = advertise(node, "predicted_live")
 
     def publish(self, block: SampleBlock, answer: Prediction, predictor: Predictor) -> None:
-        """Publish what a model says about a block, all of whose samples count."""
+        """Publish prediction and residual of a block, all of whose samples are new."""
         assert answer.model is not None
         if self._named is None or self._named[0] is not answer.model:
             self._named = (answer.model, hash_number(answer.model))

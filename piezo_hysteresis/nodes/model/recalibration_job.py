@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the model node has fitted in another process: the group that moved, on the last minute of its stream. No ROS."""
+"""The job that the model node runs in another process: it fits the changed group to the last minute. No ROS."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class RecalibrationOutcome(Outcome):
     offset : float
         Sensor minus model [m].
     numbers : tuple of RecalibratedNumber
-        What has changed.
+        The changed numbers.
     """
 
     offset: float
@@ -53,7 +53,7 @@ class RecalibrationOutcome(Outcome):
 
 
 def write_task(folder: Path, minute: Minute, baseline: Baseline, group: str, interval: float, statistic: float) -> None:
-    """Write down what `recalibration` reads."""
+    """Write the files that `recalibration` reads."""
     drive = minute.drive
     np.savez(
         folder / _MINUTE,
@@ -68,7 +68,7 @@ def write_task(folder: Path, minute: Minute, baseline: Baseline, group: str, int
 
 
 def recalibration(folder: Path, model: str, report: Report) -> Outcome:
-    """Fit the group that moved to the minute in a folder."""
+    """Fit the changed group to the minute of samples in a folder."""
     report("reading", 0.0)
     with np.load(folder / _MINUTE, allow_pickle=False) as file:
         rest, start, slow_period, period = map(float, file["rest"])

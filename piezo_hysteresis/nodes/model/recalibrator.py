@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Recalibrator`: `~/recalibrate` of a model node: fits the group that moved to the last minute, swaps the model."""
+"""`Recalibrator`: `~/recalibrate` of a model node: fits the changed group to the last minute and changes the model."""
 
 from __future__ import annotations
 
@@ -46,17 +46,17 @@ from .change_reporter import ChangeReporter
 from .recalibration_job import RecalibrationOutcome, recalibration, write_task
 
 _TICK = 0.1
-"""Time between two looks at the fit [s]."""
+"""Time between two checks of the fit [s]."""
 
 _SHOWN = 100
 """Newest lines of the history that are published."""
 
 Swap = Callable[[Model, float | None], None]
-"""Takes the new model and its offset [m], None where that has to be averaged anew."""
+"""Function that takes the new model and its offset [m]; None where the offset has to be measured again."""
 
 
 class Recalibrator:
-    """Keeps the last minute of displacement, and the history of what was recalibrated.
+    """Keeps the last minute of displacement and the history of the recalibrations.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Recalibrator:
     changes : ChangeReporter
         Its change watch.
     swap : callable
-        Lets a model take over.
+        Function that changes the model.
     """
 
     def __init__(self, node: Node, changes: ChangeReporter, swap: Swap) -> None:
@@ -92,7 +92,7 @@ class Recalibrator:
             self._fit = None
 
     def add(self, block: SampleBlock, answer: Prediction, predictor: Predictor) -> None:
-        """Keep the displacement of a block that `answer` predicts, while there is a baseline to fit it to."""
+        """Keep the displacement of a block that `answer` predicts, while there is a baseline."""
         if predictor is not self._predictor or self._recent is None:
             self._predictor, self._recent = predictor, RecentDisplacement(predictor.sample_period)
         if answer.warming_up or self._changes.watch.baseline is None:
@@ -101,7 +101,7 @@ class Recalibrator:
             self._recent.add(int(block.index[0]), np.asarray(block.displacement))
 
     def _group(self) -> str:
-        """The group to fit; IdentificationError with what stands against a recalibration."""
+        """The group to fit; raises IdentificationError with the reason where a recalibration is impossible."""
         watch = self._changes.watch
         if self._fit is not None:
             raise IdentificationError("a recalibration is under way; wait")
@@ -195,7 +195,7 @@ class Recalibrator:
 
 
 class _Fit:
-    """A fit: its data are written by a thread, so that the stream is not held up, then its process runs."""
+    """A fit in another process. A thread writes its data, so that the stream does not wait."""
 
     def __init__(self, write: Callable[[Path], None], model: Model, predictor: Predictor, offset: float) -> None:
         self.model, self.predictor, self.offset = model, predictor, offset
@@ -213,7 +213,7 @@ class _Fit:
         self._thread.start()
 
     def poll(self) -> RecalibrationOutcome | None:
-        """The outcome, or None while the fit goes on; IdentificationError with the reason why there is none."""
+        """The outcome, or None while the fit is running; raises IdentificationError with the reason where it failed."""
         if self._thread.is_alive():
             return None
         if self._failure is not None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ResidualAlarm`: when the residual is a warning or an error on /diagnostics, and the parameters that set this."""
+"""`ResidualAlarm`: decides when the residual is a warning or an error on /diagnostics, with the parameters for this."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class ResidualAlarm:
         self._warn, self._error = float(values["residual_warn"]), float(values["residual_error"])
 
     def finding(self, rms: float | None, free_run_error: float | None) -> tuple[bytes, str] | None:
-        """Level and message of an alarm; None without one, or while one of the two values [m] is unknown."""
+        """Level and message of an alarm; None where there is none, or one of the two values [m] is unknown."""
         if rms is None or free_run_error is None or rms <= self._warn * free_run_error:
             return None
         level = DiagnosticStatus.ERROR if rms > self._error * free_run_error else DiagnosticStatus.WARN

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`AxisFeed`: subscriptions and service clients of one axis; messages in, `AxisState` out."""
+"""`AxisFeed`: the subscriptions and service clients of one axis, which keep its `AxisState`."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ PATIENCE = 5.0
 """Longest wait for the answer of a service [s]."""
 
 _LONGEST_TEXT = 2000
-"""Characters of a text from a message that are shown."""
+"""Largest number of characters of a text from a message."""
 
 
 class AxisFeed:
-    """Follows one axis for as long as the node lives.
+    """Follows one axis as long as the node runs.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class AxisFeed:
     Attributes
     ----------
     state : AxisState
-        What is known of the axis.
+        The present state of the axis.
     """
 
     def __init__(self, node: GuardedNode, axis: str) -> None:
@@ -89,7 +89,7 @@ class AxisFeed:
         return reply
 
     def expire(self) -> None:
-        """Give up calls that were not answered in time."""
+        """End calls that were not answered in time."""
         for asked, reply, service in list(self._waiting):
             if reply.done():
                 self._waiting.remove((asked, reply, service))
@@ -97,7 +97,7 @@ class AxisFeed:
                 _resolve(reply, Answer(False, f"{self._prefix}/{service} did not answer within {PATIENCE:g} s"))
 
     def report(self, status: DiagnosticStatus) -> bool:
-        """Take a status of /diagnostics if it is one of this axis; whether it was."""
+        """Take a status of /diagnostics if it belongs to this axis; returns whether it does."""
         node = status.name.partition(":")[0]
         if f"/{node}".rpartition("/")[0] != self._prefix:
             return False
@@ -145,7 +145,7 @@ class AxisFeed:
 
 
 def to_status(message: DiagnosticStatus) -> Status:
-    """A status without ROS, short enough to be shown."""
+    """A status without ROS types, shortened for display."""
     level = message.level
     return Status(
         printable(message.name[:_LONGEST_TEXT]),

@@ -45,10 +45,10 @@ PAGE: tuple[Row, ...] = (
 """Parameters of the page node, all read at start."""
 
 _SEARCH_INTERVAL = 1.0
-"""Time between two looks for new axes [s]."""
+"""Time between two searches for new axes [s]."""
 
 _MOST_AXES = 16
-"""Axes that are found by themselves at most."""
+"""Largest number of axes that are found automatically."""
 
 
 class PageNode(GuardedNode):
@@ -113,7 +113,7 @@ def _split(text: str) -> list[str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a page node; its exit code is 2 where its parameters make no sense, or its port is taken."""
+    """Run a page node; its exit code is 2 where its parameters are invalid or its port is in use."""
     return run(PageNode, arguments, end=PageNode.end)
 
 

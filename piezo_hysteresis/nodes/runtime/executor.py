@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`make_executor` and `spin_until`: what serves the callbacks of a node, one after the other, in one thread."""
+"""`make_executor` and `spin_until`: run the callbacks of a node one after the other in one thread."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from .guarded_node import GuardedNode
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor
-except ImportError:  # before Kilted there is none
+except ImportError:  # not available before Kilted
     EventsExecutor = SingleThreadedExecutor
 
 _LONGEST_SPIN = 60.0
-"""The events executor of some builds waits for ever, and for nothing, where it is given no time [s]."""
+"""Longest wait of one spin [s]. Without a limit the events executor of some builds waits for ever."""
 
 
 def make_executor() -> Executor:
-    """The executor of callbacks as they come, where the distribution has it.
+    """The events executor, where the distribution has it.
 
-    The other one puts together the set of all that may happen anew for every message, which takes longer than most of
-    the callbacks.
+    The other executor builds the set of all possible events again for every message, which takes longer than most
+    callbacks.
     """
     return EventsExecutor()
 
@@ -42,7 +42,7 @@ def make_executor() -> Executor:
 def spin_until(executor: Executor, done: Future, node: GuardedNode) -> None:
     """Serve the callbacks of a node until `done`, which may be set from any thread.
 
-    The node reports every exception, also one of the executor itself, and goes on serving.
+    The node reports every exception, also those of the executor itself, and continues.
     """
     while not done.done():
         try:

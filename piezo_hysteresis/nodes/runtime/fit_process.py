@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`FitProcess`: a fit in a process of its own. No ROS."""
+"""`FitProcess`: runs a fit in its own process. No ROS."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ class Outcome:
 
 
 Job = Callable[[Path, str, Report], Outcome]
-"""Takes the path of the data, the text of the model so far, and what takes progress."""
+"""Function of the path of the data, the text of the present model, and a callback for progress."""
 
 
 class FitProcess(JobProcess[Outcome]):
-    """One fit, from its start to its outcome; ends with this process.
+    """One fit, from its start to its outcome. Its process ends when this process ends.
 
     Parameters
     ----------

@@ -34,27 +34,27 @@ _REMEMBERED = 10.0
 """Time for which a fault is shown on /diagnostics [s]."""
 
 _LOG_INTERVAL = 0.1
-"""Shortest time between two lines about faults in the log [s]: no stream of faults fills a disk."""
+"""Shortest time between two lines about faults in the log [s]: a stream of faults must not fill the disk."""
 
 
 def _refuse_another_clock(parameters: list[Parameter]) -> SetParametersResult:
-    """Whoever may set parameters could stop a node by dates on /clock, or let it stamp what nobody expects."""
+    """Refuse a change of the clock at run time, because /clock could then stop the node."""
     if any(parameter.name == "use_sim_time" for parameter in parameters):
         return SetParametersResult(successful=False, reason="use_sim_time is read at start; give it then")
     return SetParametersResult(successful=True)
 
 
 class GuardedNode(Node):
-    """Passes on what callbacks raise to `fault`, and goes on; keeps the clock that it was started with.
+    """Passes exceptions of callbacks to `fault` and continues. Its clock cannot be changed after the start.
 
-    Subscriptions, services and timers are guarded where they are made, which is also where rclpy makes those of its
-    own (``/clock``, parameter services). A service that failed answers, with ``success`` false and the reason where its
-    response has such fields.
+    Subscriptions, services and timers are guarded when they are made, also those that rclpy makes itself (``/clock``,
+    parameter services). A service that fails still answers; where its response has such fields, ``success`` is false
+    and the reason is given.
 
     Attributes
     ----------
     faults : int
-        Exceptions that left a callback so far.
+        Number of exceptions of callbacks so far.
     """
 
     faults = 0
@@ -67,11 +67,11 @@ class GuardedNode(Node):
 
     @property
     def recent_fault(self) -> str:
-        """The newest fault in one line, for some seconds; empty where there was none."""
+        """The newest fault of the last seconds in one line; empty where there was none."""
         return self._newest_fault if time.monotonic() - self._fault_time < _REMEMBERED else ""
 
     def fault(self, error: Exception) -> None:
-        """Count an exception that left a callback, and show it with the place where it was raised."""
+        """Count an exception of a callback, and report it with the place where it was raised."""
         places = traceback.extract_tb(error.__traceback__)
         place = f" ({places[-1].filename}:{places[-1].lineno})" if places else ""
         self.faults += 1
@@ -79,7 +79,7 @@ class GuardedNode(Node):
         self.get_logger().error(f"{self._newest_fault}{place}", throttle_duration_sec=_LOG_INTERVAL)
 
     def reported(self, status: DiagnosticStatus) -> DiagnosticArray:
-        """A status for /diagnostics, stamped, with the faults so far; a recent one raises its level and is named."""
+        """A stamped status for /diagnostics with the faults so far. A recent fault raises its level."""
         fault = self.recent_fault
         told = diagnostic(
             max(status.level, DiagnosticStatus.WARN) if fault else status.level,
@@ -94,7 +94,7 @@ class GuardedNode(Node):
         return array
 
     def guarded(self, callback: Callable[..., Any]) -> Callable[..., Any]:
-        """`callback` with its exceptions passed on to `fault`: for tasks and for what is called when a future is done.
+        """Wrap `callback` so that its exceptions go to `fault`; for tasks and for the callbacks of futures.
 
         The events executor of some builds crashes where a task raises.
         """

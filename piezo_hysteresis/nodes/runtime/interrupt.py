@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An interrupt that comes while a node starts, remembered even where a library swallows its exception.
+"""Remembers an interrupt during the start of a node, also where a library discards its exception.
 
-A `KeyboardInterrupt` that is raised in a destructor, or where a library catches everything, is lost, and the node would
-go on.
+A `KeyboardInterrupt` in a destructor, or in a library that catches all exceptions, is lost, and the node would
+continue.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ _asked: list[int] = []
 
 
 def remember_interrupts() -> None:
-    """Remember every SIGINT from now on, and raise `KeyboardInterrupt` as Python does; ignored ones stay ignored."""
+    """Remember every SIGINT from now on, and raise `KeyboardInterrupt` as Python does; ignored signals stay ignored."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _on_interrupt)
 
 
 def was_interrupted() -> bool:
-    """Whether a SIGINT has come since `remember_interrupts`."""
+    """Whether a SIGINT has arrived since `remember_interrupts`."""
     return bool(_asked)
 
 

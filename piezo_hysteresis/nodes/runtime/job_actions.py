@@ -41,27 +41,27 @@ INTERFACES = "piezo_hysteresis_interfaces"
 SUCCEEDED = ("done", "planned")
 """States of a job that ended well."""
 _SUFFIX = "_actions"
-"""After the name of the node: the name of the node that serves its actions."""
+"""Suffix that makes the name of the action node from the name of the node."""
 
 
 class JobActions:
-    """Actions under the name of a node, on a node and threads of their own.
+    """Actions under the name of a node, on their own node and threads.
 
-    A goal waits for the end of its job in one thread, while another one takes requests to cancel it. What touches the
-    job is done in the thread of the node itself.
+    A goal waits for the end of its job in one thread, while another thread takes requests to cancel it. All operations
+    on the job run in the thread of the node itself.
 
     Parameters
     ----------
     node : GuardedNode
-        Whose jobs these are.
+        Node that runs the jobs.
     begin : mapping
-        Name of the action to what begins the job of a goal; it answers as a service does.
+        For each action the function that begins the job of a goal; it answers as a service does.
     abort : callable
-        Ends the job under way.
+        Ends the running job.
     ended : collection of str
-        States in which a job has ended; `SUCCEEDED` are those of a success.
+        States in which a job has ended; those in `SUCCEEDED` mean success.
     result : callable
-        Further fields of a result, by name, once a job has succeeded.
+        Returns further fields of a result, by name, after a job has succeeded.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class JobActions:
         threading.Thread(target=self._executor.spin, name="actions", daemon=True).start()
 
     def report(self, status: DiagnosticStatus) -> None:
-        """Pass a status of the job under way on to the goal that began it."""
+        """Pass a status of the running job to the goal that began it."""
         goal = self._goal
         if goal is not None:
             if values_of(status)["state"] in self._ended:
@@ -109,9 +109,9 @@ class JobActions:
             goal.put(status)
 
     def end(self) -> None:
-        """Give up the goal that waits and serve nothing any more; harmless when repeated.
+        """End the waiting goal and the actions; may be repeated.
 
-        A thread that went on waiting would keep the process from ending.
+        A thread that continues to wait would keep the process from ending.
         """
         goal, self._goal = self._goal, None
         if goal is not None:
@@ -122,7 +122,7 @@ class JobActions:
             self._node.destroy_node()
 
     def _execute(self, name: str, kind: Any, handle: Any) -> Any:
-        """Follow one goal to its end, in a thread of the actions; the result in the type of the action."""
+        """Follow one goal to its end in a thread of the actions, and return the result in the type of the action."""
         reports: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._in_main(lambda: self._start(name, handle.request, reports))
         while True:
@@ -167,11 +167,11 @@ class JobActions:
 def by_service(
     callback: Callable[[Trigger.Request, Trigger.Response], Trigger.Response],
 ) -> Callable[..., Trigger.Response]:
-    """What the callback of a service does, for a goal whose fields do not matter."""
+    """Adapt the callback of a service to a goal without fields."""
     return lambda *goal: callback(Trigger.Request(), Trigger.Response())
 
 
 def _filled(kind: Any, values: Mapping[str, str]) -> Any:
-    """A message of this type from the values that have the name of a field."""
+    """A message of this type, filled from the values that have the name of a field."""
     fields = {name: text for name, text in kind.get_fields_and_field_types().items() if name in values}
     return kind(**{name: float(values[name]) if text == "double" else values[name] for name, text in fields.items()})

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`JobProcess`: long work in a process of its own, so that the node goes on answering. No ROS."""
+"""`JobProcess`: runs a long job in its own process, so that the node can answer. No ROS."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ Report = Callable[[str, float], None]
 
 
 class JobProcess(Generic[Message]):
-    """One job, from its start to its result; ends with this process.
+    """One job, from its start to its result. Its process ends when this process ends.
 
     Parameters
     ----------
     name : str
-        What the job is, in one word, for messages.
+        One word for the job, for messages.
     job : callable
         A function of a module, so that the other process finds it. It is called with an `Exchange` and `arguments`;
         what it returns is its last message.
@@ -64,7 +64,7 @@ class JobProcess(Generic[Message]):
         return self._process.pid
 
     def send(self, answer: object) -> None:
-        """Say something to the job.
+        """Send a message to the job.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class JobProcess(Generic[Message]):
         while self._connection.poll():
             try:
                 kind, content = self._connection.recv()
-            except (EOFError, ConnectionError):  # the second where it died with something unread
+            except (EOFError, ConnectionError):  # it died with an unread message
                 raise self._death() from None
             if kind == _FAILURE:
                 raise IdentificationError(content)
@@ -104,14 +104,14 @@ class JobProcess(Generic[Message]):
         self._connection.close()
 
     def _death(self) -> IdentificationError:
-        self._process.join(1.0)  # its end of the connection closes before its exit code is there
+        self._process.join(1.0)  # its end of the connection closes before its exit code is known
         return IdentificationError(
             f"the {self._name} ended without a result (exit code {self._process.exitcode}); out of memory?"
         )
 
 
 class Exchange:
-    """What a job says and hears while it works.
+    """The messages between a job and the node.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class Exchange:
         self._connection = connection
 
     def report(self, word: str, fraction: float) -> None:
-        """Say what is computed, and the fraction done."""
+        """Report the present computation and the fraction done."""
         self._connection.send((_PROGRESS, (word, fraction)))
 
     def send(self, message: object) -> None:
@@ -131,20 +131,20 @@ class Exchange:
         self._connection.send((_MESSAGE, message))
 
     def receive(self) -> Any:
-        """Wait for what `JobProcess.send` says."""
+        """Wait for a message of `JobProcess.send`."""
         return self._connection.recv()
 
     def fail(self, reason: str) -> None:
-        """Say why there is no result."""
+        """Report why there is no result."""
         self._connection.send((_FAILURE, reason))
 
 
 _PROGRESS, _MESSAGE, _FAILURE = range(3)
-"""Kinds of what goes from the job to the node."""
+"""Kinds of messages from the job to the node."""
 
 
 def _end_with_parent() -> None:
-    """Also where the node is killed: a job without anybody to take its result would go on for minutes."""
+    """End this process when the node dies, also by SIGKILL, because the job would continue for minutes."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
@@ -153,7 +153,7 @@ def _end_with_parent() -> None:
 
 def _work(connection: Connection, name: str, job: Callable[..., object], arguments: tuple[object, ...]) -> None:
     threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the node, which ends this process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the signal is meant for the node, which ends this process
     exchange = Exchange(connection)
     try:
         exchange.send(job(exchange, *arguments))

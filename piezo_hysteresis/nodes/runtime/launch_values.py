@@ -40,15 +40,15 @@ CHOSEN = ("FASTDDS_BUILTIN_TRANSPORTS", "FASTDDS_DEFAULT_PROFILES_FILE", "FASTRT
 
 
 def transports(environment: Mapping[str, str], config: Path) -> dict[str, str]:
-    """Variables for the nodes of a launch file, beside those of `environment`; none where the user has chosen.
+    """Environment variables for the nodes of a launch file, added to `environment`; none where the user has set them.
 
-    A reader that is killed outright keeps its part of the shared memory until it is found dead, a second later. With
-    room for that second it costs the other readers nothing.
+    A killed reader keeps its part of the shared memory until it is detected a second later. With enough memory for that
+    second the other readers are not affected.
 
     Parameters
     ----------
     environment : mapping
-        Of the launch.
+        Environment variables of the launch.
     config : Path
         Folder of the configuration files.
     """
@@ -63,7 +63,7 @@ def switch(name: str, text: str) -> bool:
     Raises
     ------
     ParameterError
-        On any other word.
+        If the word is another one.
     """
     if text not in SWITCH:
         raise ParameterError(f"{name}: got '{printable(text)}', expected one of {', '.join(SWITCH)}")
@@ -71,12 +71,12 @@ def switch(name: str, text: str) -> bool:
 
 
 def parameter_file(name: str, text: str) -> list[str]:
-    """The file that an argument names, as a list of one; of none where it is empty.
+    """The file that an argument names, in a list; an empty argument gives an empty list.
 
     Raises
     ------
     ParameterError
-        If there is no such file: nodes would start with their defaults, on a simulated stage.
+        If there is no such file, because the nodes would start with their defaults, on a simulated stage.
     """
     if not text:
         return []
@@ -110,7 +110,7 @@ def _converted(name: str, text: str, kind: Callable[[str], Number], expected: st
 
 
 def replayed(stage: str) -> str:
-    """The back end that plays a recording, where none or this one is named.
+    """The back end that plays a recording, where the argument is empty or names it.
 
     Raises
     ------

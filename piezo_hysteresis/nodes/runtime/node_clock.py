@@ -25,7 +25,7 @@ from rclpy.node import Node
 def now(node: Node) -> int:
     """Time on the clock of a node [ns].
 
-    rclpy makes several objects to show it: that is left to simulated time.
+    rclpy makes several objects for this, which is only done for simulated time.
     """
     clock = node.get_clock()
     if isinstance(clock, ROSClock) and not clock.ros_time_is_active:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""ROS parameters from the tables: names, defaults, units, bounds and descriptions are written down once."""
+"""ROS parameters from the tables: names, defaults, units, bounds and descriptions stand there once."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def declare(node: Node, rows: Iterable[Row], prefix: str = "", *, read_only: boo
     prefix : str
         Put before the names, e.g. ``"model.bouc_wen."``.
     read_only : bool
-        Whether they are read at start alone; setting them later is refused.
+        Whether they are read only at start; later changes are refused.
     """
     for row in rows:
         value = list(row.value) if isinstance(row.value, tuple) else row.value

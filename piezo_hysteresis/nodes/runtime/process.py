@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`run` and `run_together`: the life of a node process, from command line to exit code."""
+"""`run` and `run_together`: run node processes from command line to exit code."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _BAD_START = (
     PiezoError,
     rclpy_implementation.RCLError,
 )
-"""What rclpy raises on parameters or arguments that do not fit."""
+"""Exceptions that rclpy raises on wrong parameters or arguments."""
 
 AnyNode = TypeVar("AnyNode", bound=GuardedNode)
 
@@ -55,11 +55,11 @@ class NodeLife(Generic[AnyNode]):
     Parameters
     ----------
     make : callable
-        Makes the node; nothing may be set in motion yet, a signal ends it at once.
+        Makes the node. It must not move the stage yet, because a signal ends it at once.
     begin : callable
         Called once, before the node spins.
     end : callable
-        Called once, when it has stopped spinning for whatever reason.
+        Called once, after it has stopped spinning for any reason.
     """
 
     make: Callable[[], AnyNode]
@@ -74,23 +74,22 @@ def run(
     begin: Callable[[AnyNode], None] = lambda node: None,
     end: Callable[[AnyNode], None] = lambda node: None,
 ) -> int:
-    """As `run_together`, for one node."""
+    """Run one node as `run_together` does."""
     return run_together([NodeLife(make, begin, end)], arguments)
 
 
 def run_together(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None = None) -> int:
     """Make nodes and spin them in one thread until SIGINT or SIGTERM.
 
-    The handlers of rclpy would invalidate the context before anything can be done about it: here both signals only end
-    the spinning, further ones are ignored, and `end` still publishes and serves. No exception out of a callback ends
-    a node: it is reported, and the node goes on.
+    The handlers of rclpy would invalidate the context at once. Here both signals only end the spinning, further signals
+    are ignored, and `end` can still publish and serve. An exception of a callback is reported, and the node continues.
 
     Parameters
     ----------
     lives : sequence of NodeLife
-        Of every node; they begin in this order and end in the opposite one.
+        Functions of every node. The nodes begin in this order and end in the opposite order.
     arguments : sequence of str, optional
-        Command line; default that of the process.
+        Command line; by default that of the process.
 
     Returns
     -------
@@ -112,7 +111,7 @@ def run_together(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None
         rclpy.try_shutdown()
         return 2
     gc.collect()
-    gc.freeze()  # what was made so far stays: the collector need not walk over it while a stream waits
+    gc.freeze()  # the garbage collector need not walk over the objects of the start while a stream waits
     executor = make_executor()
     with ExitStack() as ending:
         ending.callback(rclpy.try_shutdown)
@@ -127,7 +126,7 @@ def run_together(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None
 
 
 def _signalled() -> Future:
-    """Done when the process is asked to end, at once even while the executor waits outside Python."""
+    """A future that is done when the process receives a signal, also while the executor waits outside Python."""
     stop = Future()
     ours, theirs = socket.socketpair()
     theirs.setblocking(False)

@@ -14,8 +14,7 @@
 
 """`send`: publishes a message. If the middleware is out of time, the message is lost and the node continues.
 
-`is_heard` spares the making of messages that nobody takes, `is_taken_by` the sending of those that the one who has to
-act on them would miss.
+`is_heard` shows whether a message is worth making, `is_taken_by` whether a certain node would receive it.
 """
 
 from __future__ import annotations
@@ -27,11 +26,12 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 ATTEMPTS = 5
-"""Fast DDS gives up a message when it has not got its own lock for 0.1 s, which happens where all cores are taken."""
+"""Number of attempts. Fast DDS drops a message when it has waited 0.1 s for its own lock, which happens on a busy
+computer."""
 
 
 def send(publisher: Publisher, message: Any) -> bool:
-    """Publish a message; False where the middleware did not take it, so that it is lost to all."""
+    """Publish a message; returns False where the middleware did not accept it, so that it is lost."""
     for _ in range(ATTEMPTS):
         try:
             publisher.publish(message)
@@ -42,11 +42,11 @@ def send(publisher: Publisher, message: Any) -> bool:
 
 
 def is_heard(publisher: Publisher) -> bool:
-    """Whether anybody is there to take what a publisher sends."""
+    """Whether a publisher has a subscriber."""
     return bool(publisher.get_subscription_count())
 
 
 def is_taken_by(taker: str, node: Node, publisher: Publisher) -> bool:
-    """Whether the node `taker` of the namespace of `node` subscribes to what its publisher sends."""
+    """Whether the node `taker` in the namespace of `node` subscribes to the topic of its publisher."""
     takers = node.get_subscriptions_info_by_topic(publisher.topic_name)
     return (taker, node.get_namespace()) in {(one.node_name, one.node_namespace) for one in takers}

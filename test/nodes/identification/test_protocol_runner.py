@@ -118,7 +118,7 @@ def test_a_stage_that_was_moved_between_two_phases_ends_the_protocol(lab, stage,
 def test_a_protocol_does_not_begin_while_a_stop_holds(lab, stage):
     """Asked for before the release: nothing is recorded or played, and the reason is the stop."""
     ended_with = lab.wait(begun(lab, np.full(200, 1.0), first=lambda: lab.call(Trigger, "driver_node/stop")), "the end")
-    assert str(ended_with) == "the driver was stopped, nothing moves; call driver_node/release first"
+    assert str(ended_with) == "the driver was stopped and moves nothing; call driver_node/release first"
     assert not (lab.folder / "run").exists()
     assert stage.voltage == 0.0
 
@@ -132,7 +132,7 @@ def test_a_stop_between_two_phases_ends_the_protocol_with_its_reason(lab, stage)
 
     ended_with = lab.wait(begun(lab, np.zeros(200), stop, phases=2), "the end of the protocol")
     assert "phase 'long' was refused: " in str(ended_with)
-    assert "the driver was stopped, nothing moves; call ~/release first" in str(ended_with)
+    assert "the driver was stopped and moves nothing; call ~/release first" in str(ended_with)
     assert {record.phase for record in read(lab.folder / "run")} == {"long"}
     lab.call(Trigger, "driver_node/release")
     lab.wait(lambda: stage.voltage == 0.0, "the safe voltage")
