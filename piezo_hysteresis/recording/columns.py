@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Experiments as columns of arrays, and back: what a pandas DataFrame or an xarray Dataset is made of.
+"""Converts experiments to columns of arrays and back, for a pandas DataFrame or an xarray Dataset.
 
 >>> table = pandas.DataFrame(to_columns(experiment))          # doctest: +SKIP
 >>> experiment = from_columns(table[table.time_s < 2.0])      # doctest: +SKIP
 
-Neither library is imported: a DataFrame, a Dataset and a dict all give their columns by name.
+Neither library is imported, because a DataFrame, a Dataset and a dict all give their columns by name.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from .table.table import resolve, table_records
 
 
 class TableColumns(Protocol):
-    """TableColumns by name: a mapping, a DataFrame, a Dataset."""
+    """Columns by name: a mapping, a DataFrame, a Dataset."""
 
     def __iter__(self) -> Any:
         """Names of the columns."""
 
     def __getitem__(self, name: Any, /) -> Any:
-        """One column, as anything that `numpy.asarray` takes."""
+        """One column, in any type that `numpy.asarray` accepts."""
 
 
 def to_columns(given: Record | Iterable[Record]) -> dict[str, NDArray[Any]]:
-    """Samples of all records one below the other, with the titles and units that `from_columns` reads.
+    """Samples of all records one after the other, with the titles and units that `from_columns` reads.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def to_columns(given: Record | Iterable[Record]) -> dict[str, NDArray[Any]]:
 
 
 def experiment_from(columns: TableColumns, options: ReadOptions) -> Experiment:
-    """The records of a table in memory; what `from_columns` begins with."""
+    """The records of a table in memory, which `from_columns` checks."""
     with naming(Path("columns"), "columns of equal length"):
         titles = [str(name) for name in columns]
         arrays = [np.asarray(columns[name]).ravel() for name in columns]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Bag`: the messages of a rosbag2 recording, whole or cut."""
+"""`Bag`: the messages of a complete or truncated rosbag2 recording."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from .mcap_file import McapFile
 from .sqlite_file import SqliteFile
 
 REORDERING_HORIZON = 2_000_000_000
-"""Messages of a file are at most this far from time order [ns]; recorders write them as they arrive."""
+"""Largest deviation of the messages of a file from time order [ns]; recorders write them as they arrive."""
 
 _LONGEST_METADATA = 1 << 22
-"""Bytes of ``metadata.yaml`` in which the compression is looked for."""
+"""Number of bytes of ``metadata.yaml`` in which the entry about compression is searched."""
 
 
 class Message(NamedTuple):
@@ -52,7 +52,7 @@ class BagFile(Protocol):
     """One storage file of a bag."""
 
     notices: list[Notice]
-    """What was wrong with the file; complete after the last message."""
+    """Findings about the file; complete after the last message."""
     definitions: dict[str, str]
     """Message type to its definition in the notation of .msg files, as far as the file carries it."""
 
@@ -67,7 +67,7 @@ STORAGES: dict[str, type[McapFile] | type[SqliteFile]] = {".mcap": McapFile, ".d
 class Bag:
     """A rosbag2 directory, or one of its .mcap or .db3 files.
 
-    Needs neither ``metadata.yaml`` nor an index, so that the bag of a killed recorder opens too.
+    Neither ``metadata.yaml`` nor an index is needed, so that the bag of a killed recorder can be read.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Bag:
     Attributes
     ----------
     notices : list of Notice
-        Damage that was found, complete once the messages were read to the end.
+        Damage that was found; complete after the last message.
 
     Raises
     ------

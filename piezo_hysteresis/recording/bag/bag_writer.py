@@ -100,7 +100,7 @@ class BagWriter:
     def add_topic(
         self, name: str, type: str, *, depth: int = 100, reliable: bool = True, transient_local: bool = False
     ) -> BagWriter:
-        """Announce a topic; needed before its first message.
+        """Add a topic; required before its first message.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class BagWriter:
         Raises
         ------
         RecordingError
-            On an unknown topic, after `close`, or when the disk refuses the bytes.
+            On an unknown topic, after `close`, or if the disk cannot store the message.
         """
         self._check_open()
         if topic not in self._channels:
@@ -176,7 +176,7 @@ class BagWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Hand everything written so far to the operating system, so that killing this process cannot lose it."""
+        """Pass all messages so far to the operating system, so that they survive a kill of this process."""
         self._check_open()
         with self._ending_on_failure():
             self._write_chunk()
@@ -184,7 +184,7 @@ class BagWriter:
         self._flushed = time.monotonic()
 
     def close(self) -> None:
-        """Finish the index and the metadata; a second call does nothing."""
+        """Write the index and the metadata; a second call does nothing."""
         if not self._open:
             return
         with self._ending_on_failure():
@@ -196,7 +196,7 @@ class BagWriter:
         self._open = False
 
     def _write_chunk(self) -> None:
-        """Write what waits, all at once: one by one, each between two blocks, takes longer."""
+        """Write all waiting chunks together, which is faster than one after the other."""
         waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
         for message in waiting:
             self._mcap.add_message(*message)
@@ -215,7 +215,7 @@ class BagWriter:
             with suppress(OSError):  # closing flushes once more what the disk has just refused
                 self._stream.close()
             raise RecordingError(
-                f"{self.path}: {error.strerror or error}; the recording ended, what is left of it is readable"
+                f"{self.path}: {error.strerror or error}; the recording ended; its part before that is readable"
             ) from error
 
     def _write_metadata(self) -> None:

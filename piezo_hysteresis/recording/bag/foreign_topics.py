@@ -36,11 +36,11 @@ from ..table.time_column import TimeColumn
 from .bag import Bag
 
 _PLACE = re.compile(r"(?P<topic>/[^.\[\]]+)(\.(?P<fields>[\w.]+))?(\[(?P<element>\d{1,9})\])?")
-"""Where a channel stands: ``/topic.field[element]``."""
+"""Form of the place of a channel: ``/topic.field[element]``."""
 
 
 class TopicField(NamedTuple):
-    """Where in a bag a channel is."""
+    """The place of a channel in a bag."""
 
     topic: str
     fields: tuple[str, ...]
@@ -60,7 +60,7 @@ class TopicField(NamedTuple):
         return cls(match["topic"], tuple((match["fields"] or "data").split(".")), int(element) if element else None)
 
     def value(self, message: Any) -> NDArray[np.float64]:
-        """The numbers at this place of a message, as one dimension."""
+        """The numbers at this place of a message, as a one-dimensional array."""
         for name in self.fields:
             message = getattr(message, name)
         values = np.atleast_1d(np.asarray(message, np.float64))
@@ -85,14 +85,14 @@ class _Series:
 def read_topics(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[Notice]]:
     """The record that `ReadOptions.columns` describes.
 
-    Samples are those of the displacement's topic. A channel of another topic has, at each of them, its newest value: a
-    drive that is held between its messages. Times are the stamps in the messages' headers, or else those of reception.
-    A message may carry an array of samples; then `ReadOptions.sample_period` is needed.
+    The samples are those of the displacement's topic. A channel of another topic has its newest value at each of them,
+    because a drive is held between its messages. Times are the stamps in the headers, or the times of reception where
+    there are none. A message may carry an array of samples; then `ReadOptions.sample_period` is needed.
 
     Raises
     ------
     RecordingError
-        If a topic or field is not there, or voltage or displacement is not mapped.
+        If a topic or field does not exist, or voltage or displacement is not mapped.
     """
     places = {
         name: TopicField.parse(str(text))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`McapFile`: messages of an MCAP file, read from front to back up to where it is cut or damaged."""
+"""`McapFile`: reads the messages of an MCAP file up to the place where it is truncated or damaged."""
 
 from __future__ import annotations
 
@@ -37,23 +37,23 @@ _HEAD = struct.Struct("<BQ")
 """Kind and length of a record."""
 
 _LARGEST_RATIO = 1000
-"""Bytes that one compressed byte of a chunk may hold."""
+"""Largest number of bytes that one compressed byte of a chunk may contain."""
 
 _IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-"""Kinds of records that a chunk may hold."""
+"""Kinds of records that a chunk may contain."""
 
 LARGEST_CHUNK = 1 << 26
-"""Bytes that one chunk may unpack to."""
+"""Largest size of an unpacked chunk [byte]."""
 
 LARGEST_EXPANSION = 100
-"""Bytes that a file may unpack to, for each of its own, beyond one `LARGEST_CHUNK`; samples compress to a tenth."""
+"""Largest ratio of unpacked to stored bytes of a file, after the first `LARGEST_CHUNK`; samples compress to a tenth."""
 
 
 class McapFile:
     """One .mcap file.
 
-    Records are framed here, so that a cut or a wrong length costs what is behind it and no memory; what is inside them
-    is decoded by the `mcap` package.
+    The record boundaries are read here, so that a truncated record or a wrong length only loses the records after it
+    and takes no memory. The `mcap` package decodes the contents.
     """
 
     def __init__(self, path: Path) -> None:
@@ -84,7 +84,7 @@ class McapFile:
                 ended = whole and opcode == Opcode.FOOTER
                 try:
                     yield from self._opened(opcode, body, whole)
-                except Exception:  # decoders and decompressors raise whatever they like on damaged bytes
+                except Exception:  # decoders and decompressors raise any error on damaged bytes
                     damaged += 1
                 if ended:
                     break
@@ -137,7 +137,7 @@ class McapFile:
 
 
 def unpacked(chunk: Chunk) -> bytes:
-    """The records of a chunk, never more bytes than it declares.
+    """The records of a chunk, with at most the number of bytes that it declares.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def unpacked(chunk: Chunk) -> bytes:
     """
     size = chunk.uncompressed_size
     if chunk.compression == "zstd":
-        import zstandard  # as mcap does: only needed for bags that are compressed
+        import zstandard  # only needed for compressed bags, as in the mcap package
 
         with zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).stream_reader(chunk.data) as stream:
             data = stream.read(size + 1)
@@ -168,7 +168,7 @@ def _framed(file: BinaryIO, size: int) -> Iterator[tuple[int, bytes, bool]]:
     while len(head := file.read(_HEAD.size)) == _HEAD.size:
         opcode, length = _HEAD.unpack(head)
         left = size - file.tell()
-        if left < 0:  # the file has grown since; what came is read the next time
+        if left < 0:  # the file has grown; the new part is read the next time
             return
         yield opcode, file.read(min(length, left)), length <= left
         if length > left:

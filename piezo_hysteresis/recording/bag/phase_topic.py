@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`PhaseNames`: what the topic `phase` said, ``"<number> <name>"`` at every change."""
+"""`PhaseNames`: the names from the topic `phase`, which carries ``"<number> <name>"`` at every change."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class PhaseNames:
         return bool(self._names)
 
     def add(self, raw: bytes, received_ns: int) -> None:
-        """Take in one serialised String.
+        """Add one serialised String.
 
         Raises
         ------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`records_of`: the segments of a bag become records, named, averaged, and split at lost samples."""
+"""`records_of`: makes records from the segments of a bag: names, averages, and splits them at lost samples."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ from ..table.read_options import ReadOptions
 from .phase_topic import PhaseNames
 
 IDLE, HOLD = "idle", "hold"
-"""What the stage does before the first and after every phase; left out unless `ReadOptions.include` names it."""
+"""Names of the time before the first and after every phase; left out unless `ReadOptions.include` names them."""
 
 _MOVED = 0.01
-"""Share of the largest movement below which a segment counts as resting."""
+"""Share of the largest movement below which a segment counts as rest."""
 _SEVERE_SHARE = 0.05
-"""Share of lost samples from which a phase is not to be trusted."""
+"""Share of lost samples from which a phase cannot be trusted."""
 
 
 def records_of(
     segments: list[Segment], averages: list[int], names: PhaseNames, options: ReadOptions
 ) -> tuple[list[Record], list[Notice]]:
-    """Records of a bag from its segments, and what was noticed.
+    """Records of a bag from its segments, and the findings.
 
     Parameters
     ----------

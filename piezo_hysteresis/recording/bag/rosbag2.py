@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A rosbag2 recording of the topics `samples` and `phase` as an experiment, and back."""
+"""Reads a rosbag2 recording of the topics `samples` and `phase` as an experiment, and writes one."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class Rosbag2:
     """rosbag2 directory, .mcap or .db3 file, as the nodes or ``ros2 bag record -a`` write them.
 
     Phases recorded in one go continue each other: from the second one on `Record.continues` holds, also where the
-    `hold` between them is left out. There the drive stands still at its last voltage for as long as the `start_time` of
-    the next phase shows, so whoever carries a slow state (creep) holds that voltage for that time. A hold in which the
-    drive moves is kept: the state cannot be carried without it. The first phase starts settled at the voltage of the
-    `idle` before it. A phase behind lost samples continues and is `truncated`: its state can be carried, but not
-    exactly. So is one whose beginning is not in the bag.
+    `hold` between them is left out. During such a hold the drive keeps its last voltage until the `start_time` of the
+    next phase, so that slow states (creep) can be computed over it. A hold in which the drive moves is kept, because
+    the state depends on it. The first phase starts settled at the voltage of the `idle` before it. A phase after lost
+    samples continues and is `truncated`, because its state is known only approximately. The same holds for a phase
+    whose beginning is not in the bag.
     """
 
     def recognises(self, path: Path) -> bool:
@@ -92,7 +92,7 @@ class Rosbag2:
 
 
 def recorded_model(path: str | Path, *, axis: str | None = None) -> str | None:
-    """The last model file that a bag carries on the topic `model`.
+    """The last model file on the topic `model` of a bag.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[No
                 streams.setdefault(space, SampleStream(options.sample_period)).add(block, message.time_ns)
             elif message.type == STRING:
                 names.setdefault(space, PhaseNames()).add(message.raw, message.time_ns)
-        except Exception:  # the decoder raises whatever it likes on damaged bytes
+        except Exception:  # the decoder raises any error on damaged bytes
             damaged += 1
         if len(streams) > 1:
             raise RecordingError(f"holds several stages, expected one; give `axis`: {', '.join(sorted(streams))}")
@@ -164,7 +164,7 @@ def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[No
 
 
 def _write_blocks(bag: BagWriter, record: Record, number: int, clock_ns: int, index: int) -> tuple[int, int]:
-    """Send one record; return the time and the index behind it."""
+    """Write one record; return the time and the index after it."""
     longest = max(1, round(_BLOCK_DURATION / record.sample_period))
     channels = {"voltage": record.voltage, "displacement": record.displacement, **record.channels}
     for a in range(0, record.size, longest):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`SampleStream`: blocks of the topic `samples`, in the order of arrival, become segments of one phase each."""
+"""`SampleStream`: makes segments of one phase each from the blocks of the topic `samples`."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from ..table.time_column import round_period
 from .block_message import BlockMessage
 
 PERIOD_TOLERANCE = 0.01
-"""Blocks whose sample periods differ by more than this share do not belong together."""
+"""Largest relative difference of the sample periods of blocks that belong together."""
 
 UNEVEN = 0.1
 """Deviation of a step in the times of a block from their mean, as a share of it, above which it is reported."""
 
 LONGEST_SILENCE = 60.0
-"""An index that runs ahead of the clock by more than this is no gap but another start of the driver [s]."""
+"""An index that runs ahead of the clock by more than this shows a restart of the driver, not a gap [s]."""
 
 
 @dataclass
@@ -61,7 +61,7 @@ class SampleStream:
     Parameters
     ----------
     sample_period : float, optional
-        Goes before what the blocks say about their times [s].
+        Sample period [s] that replaces the times in the blocks.
     """
 
     def __init__(self, sample_period: float | None = None) -> None:
@@ -144,7 +144,7 @@ class SampleStream:
     def _block_periods(self) -> NDArray[np.float64]:
         periods = np.array(self._periods)
         known = np.isfinite(periods)
-        if not known.any():  # one sample per block: the stamps are all there is
+        if not known.any():  # one sample per block: only the stamps give the period
             steps = np.diff(np.array(self._times_ns)) * 1e-9 / np.diff(np.array(self._starts))
             if not (steps > 0).any():
                 raise RecordError("got no field 'time' and no stamps that grow, expected either; give `sample_period`")
@@ -225,7 +225,7 @@ class SampleStream:
             )
 
     def _marks_pauses(self, pieces: list[tuple[int, int, int]]) -> bool:
-        """False where blocks are said to follow a pause though nothing is missing: that mark means something else."""
+        """False where blocks are marked as following a pause although no sample is missing."""
         begin, end = pieces[0][1], max(b for _, _, b in pieces)
         announced = {start for start in self._after_pause if begin < start < end}
         return announced <= {a for _, a, _ in pieces}

@@ -38,10 +38,10 @@ _SIDECARS = ("-wal", "-shm", "-journal")
 """Endings of the files that SQLite may keep beside a database."""
 
 _STEPS_BETWEEN_CHECKS = 1000
-"""Steps of the database engine between two looks at their number."""
+"""Steps of the database engine between two checks of their number."""
 
 _STEPS, _STEPS_PER_BYTE = 1_000_000, 20
-"""Steps of the database engine that reading may take; a row takes about twenty, and no row is shorter than a byte."""
+"""Largest number of steps of the database engine, constant part and per byte; a row takes about twenty steps."""
 
 
 class SqliteFile:
@@ -74,7 +74,7 @@ class SqliteFile:
                 for topic, time_ns, data in rows:
                     if topic in topics and isinstance(data, bytes) and isinstance(time_ns, int):
                         size -= len(data)
-                        if size < 0:  # pages or default values that are used again and again
+                        if size < 0:  # pages or default values that are used repeatedly
                             raise sqlite3.DatabaseError("its messages are longer than the file")
                         yield *topics[topic], time_ns, data
             except (sqlite3.Error, MemoryError) as error:
@@ -89,7 +89,7 @@ class SqliteFile:
         return sum(file.stat().st_size for file in files if file.exists())
 
     def _connection(self, size: int) -> sqlite3.Connection:
-        """The database, allowed only as much memory and as many steps as a file of `size` bytes can need."""
+        """Open the database with limits on memory and steps that suffice for a file of `size` bytes."""
         place = f"file:{quote(str(self.path.absolute()))}?mode=ro"
         try:
             connection = sqlite3.connect(place, uri=True)
@@ -117,7 +117,7 @@ def _kinds(database: sqlite3.Connection) -> dict[str, str]:
 
 
 def _require_tables(database: sqlite3.Connection) -> None:
-    """Views, virtual tables and computed columns run what their author wrote: RecordingError on them."""
+    """Raise RecordingError on views, virtual tables and computed columns, because they run code of their author."""
     kinds = _kinds(database)
     for name in ("topics", "messages", "message_definitions"):
         kind = kinds.get(name, "table")

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`check_in_place`: whether a file that is being written is still where it was begun."""
+"""`check_in_place`: checks that a file is still at the place where its writing began."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from typing import BinaryIO
 
 
 def check_in_place(stream: BinaryIO, path: Path) -> None:
-    """Bytes written to a file that was deleted or moved are refused by nobody: look whether it is there.
+    """Check that the file still exists, because writing to a deleted or moved file raises no error.
 
     Parameters
     ----------
     stream : binary file
         The file that is written.
     path : Path
-        Where it was opened.
+        Path at which it was opened.
 
     Raises
     ------

@@ -23,7 +23,7 @@ from ...record import Notice, Record, Samples
 from .split_at_gaps import segments
 
 FEWEST_LEVELS = 1000
-"""Quantisation is reported where a channel uses fewer levels than this; below a sixteenth of it nothing rests on it."""
+"""Quantisation is reported where a channel uses fewer levels than this; it is severe below a sixteenth of it."""
 
 _DRIVE_MOVES = 0.05
 """Share of the range by which the drive must move for a constant displacement to be a defect."""
@@ -64,12 +64,12 @@ def _runs_of_equal(values: Samples, shortest: int) -> NDArray[np.int64]:
 
 def _extremes(values: Samples, runs: NDArray[np.int64]) -> tuple[Samples, Samples]:
     """Lowest and highest value in every run."""
-    padded = np.append(values, values[-1])  # a run may end behind the last sample
+    padded = np.append(values, values[-1])  # a run may end after the last sample
     return np.minimum.reduceat(padded, runs.ravel())[::2], np.maximum.reduceat(padded, runs.ravel())[::2]
 
 
 def _stuck(record: Record) -> list[Notice]:
-    """Displacement that stands still while the drive moves: at its extremes it is clipped, elsewhere stuck."""
+    """Displacement that is constant while the drive moves: clipped at its extremes, stuck elsewhere."""
     y, u = record.displacement, record.voltage
     runs = _runs_of_equal(y, 5)
     if not len(runs):
@@ -78,7 +78,7 @@ def _stuck(record: Record) -> list[Notice]:
     low, high = _extremes(u, runs)
     first, last = u[runs[:, 0]], u[runs[:, 1] - 1]
     beyond = np.maximum(high - np.maximum(first, last), np.minimum(first, last) - low)
-    # behind a turning point of the drive a stage with backlash stands still too; across it, it does not
+    # with backlash a stage also stands still after a turning point of the drive, but not across it
     moved = (high - low > _DRIVE_MOVES * np.ptp(u)) | (at_rail & (beyond > _DRIVE_RETURNS * np.ptp(u)))
     runs, at_rail = runs[moved], at_rail[moved]
     notices = []
@@ -94,7 +94,7 @@ def _stuck(record: Record) -> list[Notice]:
 
 
 def _clipped_voltage(record: Record) -> list[Notice]:
-    """Voltage that stands at its extreme while the displacement goes on and comes back: its recording is cut off."""
+    """Voltage that is constant at its extreme while the displacement goes on and returns: it is clipped."""
     y, u = record.displacement, record.voltage
     samples = 0
     direction = np.sign(np.dot(u - u.mean(), y - y.mean()) or 1.0)
@@ -119,7 +119,7 @@ def _clipped_voltage(record: Record) -> list[Notice]:
 
 
 def _means(values: Samples) -> Samples:
-    """Means of at most `_PARTS` equal parts: an arc is no noise."""
+    """Means of at most `_PARTS` equal parts, which distinguish an arc from noise."""
     starts = np.unique(np.linspace(0, values.size, min(_PARTS, values.size), endpoint=False).astype(np.int64))
     return np.asarray(np.add.reduceat(values, starts) / np.diff(starts, append=values.size))
 
@@ -157,7 +157,7 @@ def _dropouts(record: Record) -> list[Notice]:
 
 
 def _ramps(values: Samples) -> bool:
-    """Whether samples that move go on as they moved before; those of a rounded ramp stop now and then."""
+    """Whether a drive consists of ramps: most moving samples repeat the increment before; rounding makes exceptions."""
     moves = np.diff(values[:200_000])
     goes_on = np.abs(np.diff(moves)) < 1e-6 * np.abs(moves).max(initial=0.0)
     return bool(goes_on[moves[1:] != 0.0].mean() > _CONSTANT_SPEED)

@@ -25,10 +25,10 @@ from ...errors import PiezoError, RecordError, RecordingError
 
 @contextmanager
 def naming(path: Path, expected: str) -> Iterator[None]:
-    """Turn every failure inside into an error that names the file.
+    """Convert every failure in the block into an error that names the file.
 
-    Decoders of foreign formats raise whatever their authors thought of when the bytes are damaged, so the catch is as
-    wide as that; programming errors in here surface in the tests, which read intact files.
+    Decoders of other formats raise any kind of error on damaged bytes, so that all errors are caught. The tests read
+    intact files and therefore show programming errors.
 
     Parameters
     ----------

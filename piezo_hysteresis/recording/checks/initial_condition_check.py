@@ -24,7 +24,7 @@ from ..segmentation.waveform import turning_points
 _OPENING = 0.1
 """Share of the range of the drive up to which it counts as hardly moved."""
 _EXCERPT = 1 << 20
-"""Samples that are looked at."""
+"""Number of samples that are examined."""
 _SWING = 0.02
 """Least swing of a turning point, share of the range."""
 _INSIDE = 0.1
@@ -54,11 +54,11 @@ _AHEAD = (0.5, 1.0)
 
 
 def is_within_its_loop(record: Record) -> bool:
-    """True where a periodic record begins in motion, its displacement already where it is a period later.
+    """True where a periodic record begins in motion, with the displacement that it has a period later.
 
-    A stage that had settled at the first voltage begins between the branches of its loop, and a little after the drive;
-    one that was cycling before begins on a branch, in motion. Where both are the same, at the end of a swing, the stage
-    is taken to have settled.
+    A stage that had settled at the first voltage begins between the branches of its loop, and a little after the drive.
+    A stage that was cycling before begins on a branch, in motion. At the end of a swing both are the same; the stage is
+    then assumed to have settled.
     """
     if record.continues or record.truncated or record.initial_voltage is not None or record.size < 64:
         return False
@@ -87,8 +87,9 @@ def is_within_its_loop(record: Record) -> bool:
 def not_at_rest(record: Record) -> list[Notice]:
     """Notice ``not_at_rest`` where the displacement moves at the start although the drive hardly does.
 
-    A record that continues another one, or whose beginning is missing, claims no rest and is not judged; nor is one
-    whose drive leaves its settled voltage with the first sample, because the stage then rightly answers.
+    A record that continues another one, or whose beginning is missing, need not begin at rest and is not checked. A
+    record whose drive leaves its settled voltage with the first sample is not checked either, because the stage then
+    has to move.
     """
     if record.continues or record.truncated or record.size < 20:
         return []
@@ -107,7 +108,7 @@ def not_at_rest(record: Record) -> list[Notice]:
     first = float(y[0]) if abs(later - y[0]) > _JUMP * y_span else float(y[:few].mean())
     drift = abs(later - first)
     explained = 3.0 * float(np.abs(u[:opening] - u[0]).max()) * (y_span / u_span if u_span > 0.0 else 0.0)
-    # creep and drift move a resting stage too: only what is large against the phase contradicts rest
+    # creep and drift also move a resting stage: only a movement that is large against the phase counts
     if drift <= explained + _NOISE * noise / np.sqrt(few) + (0.05 * y_span if u_span > 0.0 else np.inf):
         return []
     text = (
@@ -195,7 +196,7 @@ def origins(experiment: Experiment) -> list[Notice]:
         if not alike:
             continue
         apart = abs(float(record.displacement[0] - alike[0].displacement[0]))
-        # the noise of a long record takes longest, and most records begin alike
+        # estimating the noise of a long record is slow, and most records begin alike
         if apart > _APART * stroke and all(apart > _NOISE * _noise(r.displacement) for r in (record, alike[0])):
             text = (
                 f"begins at {record.voltage[0]:.4g} V as {alike[0].phase} does, but {apart:.3g} m "

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Delay between drive and displacement: dynamics of the stage, or a channel that is late."""
+"""Delay between drive and displacement, caused by the dynamics of the stage or by a delayed channel."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ...record import Notice, Record, Samples
 from ..segmentation.waveform import turning_points
 
 LATE = 3e-3
-"""Lag that no stage has by itself [s]; a slow sensor filter, or a shifted channel, has."""
+"""Lag [s] beyond that of any stage; a slow sensor filter or a shifted channel causes it."""
 
 _SWING = 0.2
 """Least swing of a turning point, share of the range."""
@@ -35,11 +35,11 @@ _WINDOWS = 24
 _POINTS = 96
 """Points around every turning point."""
 _EXCERPT = 1 << 20
-"""Samples that are looked at."""
+"""Number of samples that are examined."""
 _FEWEST = 6
 """Smallest number of samples on each side of a turning point."""
 _FEWEST_TURNS = 2
-"""One turning point alone may look like a lead by the way its loop bends."""
+"""Fewest turning points, because the curvature of a loop at a single one may look like a lead."""
 _EXPLAINED = 0.999
 """Share of the variance that the lines must explain."""
 _SURE = 4.0
@@ -49,7 +49,8 @@ _JUMP = 0.3
 _BENT = 0.01
 """Lag that a bent loop may show, share of the swing."""
 _SLOWER, _ALIKE, _SHARED = 10.0, 1.2, 2.0
-"""Swings, in lags and in swings of the phase, of others that a lag is compared with; how far it may differ."""
+"""Records for comparison have swings longer than the first value times the lag and the second times the own swing; the
+third is the largest ratio of a lag to theirs."""
 _SLOW = 20e-3
 """A drive that turns faster [s] may pass a resonance, behind which a lag of over half a period looks like a lead."""
 
@@ -75,11 +76,11 @@ class Lag:
 
 
 def lag_of(record: Record) -> Lag | None:
-    """Lag at the turning points of the drive; None where it has none, or the displacement does not follow it.
+    """Lag at the turning points of the drive; None where there are none, or the displacement does not follow the drive.
 
-    Hysteresis alone turns where the drive turns, and has another slope behind a turn than ahead of it. So around every
-    turning point the displacement is a line in the drive of some time before, with a slope for each side; the time that
-    fits best, over all turns, is the lag.
+    With hysteresis alone, the displacement turns where the drive turns, and its slope changes there. Around every
+    turning point the displacement is therefore a linear function of the delayed drive, with a slope for each side. The
+    delay that fits best over all turns is the lag.
     """
     u, y = record.voltage[:_EXCERPT], record.displacement[:_EXCERPT]
     span = float(np.ptp(u))
@@ -92,7 +93,7 @@ def lag_of(record: Record) -> Lag | None:
     wide &= np.maximum(sudden[:-1], sudden[1:]) < _JUMP * np.minimum(
         np.abs(u[at] - u[before]), np.abs(u[after] - u[at])
     )
-    if wide.any():  # those that the record cuts off are too short for the others
+    if wide.any():  # those at the ends of the record are shorter than the others
         length = np.minimum(at - before, after - at)
         wide &= length >= 0.6 * np.median(length[wide])
         wide &= (at >= length) & (at + length < u.size)
@@ -118,7 +119,7 @@ def lag_of(record: Record) -> Lag | None:
 def lag_notices(records: Sequence[Record]) -> list[Notice]:
     """Notices ``leads`` where the displacement moves before the drive does, ``late`` where it lags beyond `LATE`.
 
-    A late channel and a slow filter lag in all that is slow beside the lag; hysteresis that bends a loop does not.
+    A delayed channel and a slow filter have the same lag in all slow records; the curvature of a loop does not.
     """
     lags = [lag_of(record) for record in records]
     notices = []
@@ -141,7 +142,7 @@ def lag_notices(records: Sequence[Record]) -> list[Notice]:
 
 
 def _between(values: Samples, place: Samples) -> Samples:
-    """Values at fractional places, by straight lines."""
+    """Values at fractional positions, by linear interpolation."""
     place = np.clip(place, 0.0, values.size - 1.0)
     lower = np.minimum(place.astype(np.int64), values.size - 2)
     share = place - lower
@@ -149,7 +150,7 @@ def _between(values: Samples, place: Samples) -> Samples:
 
 
 def _misfit(away: Samples, ahead: NDArray[np.bool_], measured: Samples) -> float:
-    """Mean square of what a constant and a parabola on each side leave of every row."""
+    """Mean square of the residual of every row after a fit of a constant and a parabola on each side."""
     sides = np.where(ahead, away, 0.0), np.where(ahead, 0.0, away)
     basis = np.stack((np.ones(away.shape), *sides, *(side**2 for side in sides)), axis=1)
     scale = np.maximum(np.linalg.norm(basis, axis=2, keepdims=True), 1e-300)
@@ -161,7 +162,7 @@ def _misfit(away: Samples, ahead: NDArray[np.bool_], measured: Samples) -> float
 
 
 def _lowest(cost: Callable[[float], float], reach: float) -> tuple[float, float, float]:
-    """Place, value and curvature of the minimum within ±reach, from a grid that closes in on it."""
+    """Position, value and curvature of the minimum within ±reach, by successively finer grids."""
     middle, width = 0.0, reach
     for points in (65, 9, 9, 9):
         grid = middle + width * np.linspace(-1.0, 1.0, points)

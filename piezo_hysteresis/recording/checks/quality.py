@@ -34,7 +34,7 @@ VOLTAGE_RANGE = (1e-3, 1.2e3)
 GAIN_RANGE = (1e-10, 3e-4)
 """Range of displacement per volt that a piezo stage can have, with or without an amplifier [m/V]."""
 FAINT = (4e-8, 1e-12)
-"""A smaller displacement per volt [m/V], read by a sensor of less noise [m], is rather one in another unit."""
+"""A displacement per volt below the first value [m/V] with noise below the second [m] suggests a wrong unit."""
 
 _SCALE_MISMATCH = 100.0
 """Ratio of two gains from which a unit must be wrong."""
@@ -51,14 +51,14 @@ _SINE = re.compile(r"sine_(\d+(?:\.\d+)?(?:e[+-]?\d+)?)hz")
 
 
 def inspect(experiment: Experiment) -> tuple[Notice, ...]:
-    """Judge every channel of every record, and the records against each other.
+    """Check every channel of every record, and compare the records with each other.
 
     Returns
     -------
     tuple of Notice
         Kinds: ``units``, ``scale``, ``constant``, ``sample_period``, ``time_base``, ``clipped``, ``stuck``,
         ``dropout``, ``quantisation``, ``leads``, ``late``, ``polarity``, ``not_at_rest``,
-        ``origins_differ``. What reading finds (``gap``, ``duplicate``, …) stands in `Experiment.notices`.
+        ``origins_differ``. The findings of the readers (``gap``, ``duplicate``, …) are in `Experiment.notices`.
     """
     spans = np.array([[np.ptp(r.voltage), np.ptp(r.displacement)] for r in experiment])
     largest = float(spans[:, 0].max())
@@ -95,7 +95,7 @@ def _units(experiment: Experiment, spans: Samples) -> list[Notice]:
 
 
 def _gain(experiment: Experiment, gain: float) -> list[Notice]:
-    """A displacement per volt that both channels alone would not betray."""
+    """Notice about the displacement per volt, where each channel alone looks normal."""
     if not GAIN_RANGE[0] <= gain <= GAIN_RANGE[1]:
         text = f"displacement per volt {gain:.2g} m/V, expected 0.1 nm/V to 300 µm/V{_likely(gain, GAIN_RANGE)}"
         return [Notice("units", text)]
@@ -111,7 +111,7 @@ def _gain(experiment: Experiment, gain: float) -> list[Notice]:
 
 
 def _likely(value: float, bounds: tuple[float, float]) -> str:
-    """The power of a thousand that puts a value well inside its bounds."""
+    """The power of a thousand that brings a value well inside its bounds."""
     middle = float(np.sqrt(bounds[0] * bounds[1]))
     power = 3 * round(float(np.log10(middle / value)) / 3)
     return f"; a unit may be off by 1e{power:+d}" if power else ""
@@ -138,10 +138,10 @@ def _scale(experiment: Experiment, spans: Samples) -> list[Notice]:
 
 
 def _order(experiment: Experiment) -> list[Notice]:
-    """Phases that begin before the one before them has ended."""
+    """Phases that begin before the end of the previous one."""
     starts = [r.start_time for r in experiment]
     if sorted(set(starts)) != starts:
-        return []  # no times of a common clock
+        return []  # the phases have no common clock
     notices = []
     for before, after in zip(experiment.records, experiment.records[1:], strict=False):
         overlap = before.start_time + before.duration - after.start_time
@@ -152,12 +152,12 @@ def _order(experiment: Experiment) -> list[Notice]:
 
 
 def _named_frequency(record: Record) -> list[Notice]:
-    """A phase called sine of a frequency that moves at another one has a wrong name or a wrong sample period."""
+    """Notice where the frequency in the name of a sine differs from that of its drive."""
     named, found = _SINE.fullmatch(record.phase), _SINE.fullmatch(phase_name(record.voltage, record.sample_period))
     if named is None or found is None or abs(float(found[1]) / float(named[1]) - 1) < _FREQUENCY_MISMATCH:
         return []
     if float(found[1]) * record.duration < _FEWEST_PERIODS:
-        return []  # the ends of a single period have a say in its frequency
+        return []  # in a single period the ends influence the frequency
     text = f"the drive moves at {found[1]} Hz; the name or the sample period {record.sample_period:g} s is wrong"
     return [Notice("sample_period", text, record.phase, severe=True)]
 
@@ -175,7 +175,7 @@ def _fundamental(record: Record) -> tuple[float, float]:
 
 
 def _polarity_and_lead(moving: list[Record]) -> list[Notice]:
-    """A stage lags its drive; a displacement that leads it comes from shifted columns."""
+    """Notices about polarity, and about a displacement that leads its drive, which shifted columns cause."""
     slowest = min(moving, key=lambda r: _fundamental(r)[0], default=None)
     if slowest is None or slowest.size < 64:
         return []
@@ -184,7 +184,7 @@ def _polarity_and_lead(moving: list[Record]) -> list[Notice]:
     u, y = (np.fft.rfft((x[part] - x[part].mean()) * window) for x in (slowest.voltage, slowest.displacement))
     at = int(np.abs(u[1:]).argmax()) + 1
     if at < 4 or np.abs(u[at]) ** 2 < 0.2 * float(np.sum(np.abs(u[1:]) ** 2)):
-        return []  # no period to speak of
+        return []  # too short for an estimate of the period
     angle = float(np.degrees(np.angle(y[at] / u[at]))) if u[at] != 0 else 0.0
     falls = abs(angle) > 90.0
     notices = []

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`checked_starts`: what the records of a recording claim about their beginning, checked and completed."""
+"""`checked_starts`: checks and completes the initial conditions of the records of a recording."""
 
 from __future__ import annotations
 
@@ -24,36 +24,36 @@ from ..table.read_options import ReadOptions
 from .initial_condition_check import departures, is_within_its_loop, steps_from
 
 _WITHIN = "begins on a branch of its loop: what came before is not recorded; a settled stage needs `initial_voltage`"
-"""Message of a record that begins in motion on its loop."""
+"""Message about a record that begins in motion on its loop."""
 _CONTINUES = (
     "continues a phase that was not read: its initial state is unknown, and a simulation is wrong at first; read the "
     "whole experiment"
 )
-"""Message of a first record that continues one which is not there."""
+"""Message about a first record that continues a missing record."""
 _IN_MOTION = "{phases}: the first sample lies on a ramp from {levels}, taken as where the stage had settled"
-"""Message of records that begin on a ramp."""
+"""Message about records that begin on a ramp."""
 _STEP_BEFORE = (
     "{phases}: the displacement jumps although the drive is held from the first sample on; taken as a step from "
     "{levels}, where the stage had settled; otherwise give `initial_voltage`"
 )
-"""Message of records that begin behind a step."""
+"""Message about records that begin after a step."""
 _INFERRED = (("in_motion", _IN_MOTION, departures), ("step_before", _STEP_BEFORE, steps_from))
 """Notices of levels at which a stage had settled, their messages, and where the levels come from."""
 
 
 def checked_starts(experiment: Experiment, options: ReadOptions) -> Experiment:
-    """An experiment with the state at the beginning of every record, as far as options, file and samples say it.
+    """The experiment with the initial state of every record, as far as options, file and samples determine it.
 
     Parameters
     ----------
     experiment : Experiment
         As a format read it.
     options : ReadOptions
-        Its `initial_voltage` goes before what the samples suggest.
+        Its `initial_voltage` has priority over what the samples suggest.
     """
     records = experiment.records
     more_notices = []
-    if records[0].continues:  # what it continues is not here
+    if records[0].continues:  # the record that it continues is missing
         records = (replace(records[0], continues=False, truncated=True), *records[1:])
         experiment = experiment.noting(Notice("truncated", _CONTINUES, records[0].phase))
     if options.initial_voltage is not None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Records from channels with holes: split at every hole; each hole is reported, and nothing is interpolated."""
+"""Makes records from channels with gaps. Nothing is interpolated."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SHORTEST_SHARE = 1 / 64
 
 
 LARGEST = 1e30
-"""Numbers beyond this are damage, in whatever unit [V, m]."""
+"""Numbers beyond this count as damaged, in any unit [V, m]."""
 
 PERIODS = (1e-9, 1e6)
 """Sample periods that a recording can have [s]."""
@@ -59,7 +59,7 @@ def split_at_gaps(
     ----------
     channels : mapping of str to (n,) ndarray
         `voltage` [V] and `displacement` [m], NaN or infinite where nothing was measured; others, as in
-        `Record.channels`, are left out where they have holes.
+        `Record.channels`, are left out where they have gaps.
     sample_period : float
         Time between samples [s].
     breaks : mapping of int to int, optional
@@ -72,8 +72,8 @@ def split_at_gaps(
     Returns
     -------
     records : list of Record
-        A record behind a hole `continues` and is `truncated`: its state can be carried, but not exactly. Behind a pause
-        it is not `truncated`.
+        A record after a gap `continues` and is `truncated`, because its state is known only approximately. After a
+        pause it is not `truncated`.
     notices : list of Notice
         What was dropped.
 
@@ -85,7 +85,7 @@ def split_at_gaps(
     phase = str(labels.get("phase", "record"))
     voltage, displacement = channels["voltage"], channels["displacement"]
     if voltage.ndim != 1 or voltage.shape != displacement.shape or voltage.size == 0:
-        return [Record(voltage, displacement, sample_period, **labels)], []  # raises, and says what is wrong
+        return [Record(voltage, displacement, sample_period, **labels)], []  # raises the error for the channel
     notices = []
     kept = {}
     for name in channels.keys() - {"voltage", "displacement"}:

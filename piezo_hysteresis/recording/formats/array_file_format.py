@@ -27,16 +27,16 @@ from .records_from_arrays import records_from_arrays
 
 
 class ArrayFileFormat:
-    """One record from the arrays of a file; `ReadOptions.columns` says which is which where their names do not.
+    """One record from the arrays of a file; `ReadOptions.columns` assigns the channels where their names are not clear.
 
     Parameters
     ----------
     endings : tuple of str
         Of the names of such files.
     expected : str
-        What such a file is, in messages.
+        Description of such a file for messages.
     opened : callable
-        From the path to the arrays by name.
+        Function from the path to the arrays by name.
     """
 
     def __init__(self, endings: tuple[str, ...], expected: str, opened: Callable[[Path], NamedArrays]) -> None:
@@ -47,7 +47,7 @@ class ArrayFileFormat:
         return path.is_file() and path.suffix.lower() in self._endings
 
     def read(self, path: Path, options: ReadOptions) -> Experiment:
-        """The arrays as phases named by what the drive looks like, unless `ReadOptions.phases` says otherwise."""
+        """The arrays as phases, which are named by the shape of the drive unless `ReadOptions.phases` names them."""
         with naming(path, self._expected), self._opened(path) as arrays:
             records, notices = records_from_arrays(arrays, "", options)
             return Experiment(tuple(records), str(path), tuple(notices))

@@ -36,9 +36,9 @@ _ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _ROWS = 1 << 15
 """Rows that are written in one go."""
 _LOOK = 1 << 12
-"""Bytes by which a text is distinguished from other files."""
+"""Number of first bytes by which a text is distinguished from other files."""
 _EPOCH = 1e8
-"""A clock that shows more [s] counts from an epoch, not from the start of the experiment."""
+"""Times beyond this [s] count from an epoch, not from the start of the experiment."""
 
 
 class Csv:
@@ -46,8 +46,8 @@ class Csv:
 
     Written with the header ``time_s,voltage_V,displacement_m,phase`` and, only where the records need them, the columns
     `record` (between neighbours of one name), `continues`, `truncated`, `initial_voltage_V`, `sample_period_s`,
-    those of `Record.channels` with their unit, e.g. `other_displacement_m` and `temperature_K`. Numbers are written in
-    full, so that reading gives the same ones.
+    those of `Record.channels` with their unit, e.g. `other_displacement_m` and `temperature_K`. Numbers are written
+    with all digits, so that reading returns the same values.
     """
 
     def recognises(self, path: Path) -> bool:
@@ -55,7 +55,7 @@ class Csv:
         return path.is_file() and (path.suffix.lower() in _ENDINGS or _is_table(path))
 
     def read(self, path: Path, options: ReadOptions) -> Experiment:
-        """The table as phases: labelled ones, or else what the drive looks like."""
+        """The table as phases: those of its labels, or phases proposed from the shape of the drive."""
         with naming(path, "a text table"):
             dialect = Dialect.sniff(path)
             found = resolve(dialect.header, dialect.width, options)
@@ -108,7 +108,7 @@ def _is_table(path: Path) -> bool:
 
 
 def _labels(experiment: Experiment) -> list[str]:
-    """Label columns without which the records would not come back as they are."""
+    """Label columns that are needed to read the same records again."""
     labels = ["phase"]
     pairs = list(zip(experiment.records, experiment.records[1:], strict=False))
     if any(a.phase == b.phase for a, b in pairs):

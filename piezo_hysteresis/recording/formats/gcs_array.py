@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""PI GCS arrays: what controllers answer to ``DRR?`` and what PIMikroMove saves."""
+"""PI GCS arrays, which controllers send as the answer to ``DRR?`` and PIMikroMove saves."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ _END = "# END_HEADER"
 class GcsArrayFormat:
     """Text with ``# KEY = value`` lines up to ``# END_HEADER``, then rows of numbers.
 
-    Without a mapping the first column whose name speaks of a voltage is the drive [V], and the first one that speaks of
-    a position, other than a commanded or target one, is the displacement [µm].
+    Without a mapping, the first column named as a voltage is the drive [V]. The first column named as a position, other
+    than a commanded or target position, is the displacement [µm].
     """
 
     def recognises(self, path: Path) -> bool:
@@ -48,7 +48,7 @@ class GcsArrayFormat:
             return _END.encode() in file.read(BLOCK_BYTES // 16)
 
     def read(self, path: Path, options: ReadOptions) -> Experiment:
-        """The array as phases named by what the drive looks like, unless `ReadOptions.phases` says otherwise."""
+        """The array as phases, which are named by the shape of the drive unless `ReadOptions.phases` names them."""
         with naming(path, "a GCS array"):
             header, skipped = _header(path)
             width = int(header.get("DIM", "0"))
@@ -101,7 +101,7 @@ def _header(path: Path) -> tuple[dict[str, str], int]:
 
 
 def _first(titles: list[str], words: str) -> int | None:
-    """Number, from 1, of the first measured column that speaks of one of the `words`."""
+    """Number, from 1, of the first measured column whose title contains one of the `words`."""
     wanted, target = re.compile(words, re.IGNORECASE), re.compile("command|target|error", re.IGNORECASE)
     hits = [i for i, title in enumerate(titles, 1) if wanted.search(title)]
     return next((i for i in hits if not target.search(titles[i - 1])), hits[0] if hits else None)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Hdf5Arrays`: the arrays of an HDF5 file, which a MATLAB 7.3 file is, too; read one by one."""
+"""`Hdf5Arrays`: the arrays of an HDF5 file, also of a MATLAB 7.3 file, read one by one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _LARGEST_EXPANSION = 1100
 """Largest number of bytes that one compressed byte can contain."""
 
 LARGEST_CHUNK = 1 << 26
-"""Bytes that are unpacked at once from a compressed array."""
+"""Largest number of bytes that are unpacked together from a compressed array."""
 
 
 def is_hdf5(path: Path) -> bool:
@@ -69,7 +69,7 @@ class Hdf5Arrays(NamedArrays):
                 "is an HDF5 file, for which h5py is needed: pip install h5py; or save it in MATLAB with -v7"
             ) from None
         self._file = h5py.File(path, "r")
-        self._rows_last = self._file.userblock_size > 0  # MATLAB stores the transpose behind its own header
+        self._rows_last = self._file.userblock_size > 0  # MATLAB stores the transpose after its own header
         self._names: list[str] = []
         try:
             self._file.visititems(
@@ -112,12 +112,12 @@ class Hdf5Arrays(NamedArrays):
             raise KeyError(name)
         dataset = self._file[name.replace(".", "/")]
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # a type of the file that numpy doubts is no type of ours
+            warnings.simplefilter("error")  # a type that numpy cannot represent is not supported
             kind = dataset.dtype
         if kind.kind not in "fiub":
             raise RecordingError(f"{name}: got {kind}, expected numbers or text")
         if dataset.external or dataset.is_virtual:
-            raise RecordingError(f"{name}: its numbers lie in other files, expected a file that holds them")
+            raise RecordingError(f"{name}: its numbers are in other files, expected a file that contains them")
         if dataset.chunks is not None and math.prod(dataset.chunks) * kind.itemsize > LARGEST_CHUNK:
             raise RecordingError(
                 f"{name}: got chunks of {dataset.chunks}, expected at most {LARGEST_CHUNK} bytes in one"

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`FORMATS`: every file format that is read, and `Format`: what each of them can do.
+"""`FORMATS`: the table of all file formats; `Format`: the interface of a format.
 
 A further format is a file in this folder and one line of `FORMATS`.
 """
@@ -43,7 +43,7 @@ class Format(Protocol):
         """True if the file or folder looks like this format."""
 
     def read(self, path: Path, options: ReadOptions) -> Experiment:
-        """The experiment at `path`, in SI units, with notices about what was found."""
+        """The experiment at `path`, in SI units, with the findings as notices."""
 
 
 @runtime_checkable
@@ -64,4 +64,4 @@ FORMATS: Mapping[str, Format] = {
     "gcs_array": GcsArrayFormat(),
     "csv": Csv(),
 }
-"""Reader of every format by its name, in the order in which they are asked whether they recognise a path."""
+"""Reader of every format by its name. The readers are tried in this order until one recognises a path."""

@@ -33,7 +33,7 @@ from .mat5_sizes import COMPRESSED, HEADER, MATRIX, ORDERS, Inflated, check_size
 from .named_arrays import NamedArrays
 
 _LONG = 1 << 20
-"""Numbers from which a matrix is read in part."""
+"""Number of elements from which a matrix is read in pieces."""
 _REAL = range(6, 16)
 """Classes of numeric MAT 5 arrays."""
 _COMPLEX = 0x800
@@ -44,13 +44,13 @@ _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"
 
 @dataclass(frozen=True, slots=True)
 class _Matrix:
-    """Where the numbers of a matrix lie, one column after the other."""
+    """Position of the numbers of a matrix, one column after the other."""
 
     position: int
-    """Of its element in the file."""
+    """Position of its element in the file."""
     shape: tuple[int, ...]
     offset: int
-    """Of its first number in the element, inflated."""
+    """Offset of its first number in the uncompressed element."""
     kind: np.dtype[Any]
 
 
@@ -112,7 +112,7 @@ class Mat5Arrays(NamedArrays):
     def _variable(self, top: str) -> dict[str, NDArray[Any]]:
         """Everything in one variable, by dotted names."""
         if self._loaded[0] != top:
-            self._loaded = ("", {})  # before the next one comes
+            self._loaded = ("", {})  # before the next one is read
             flat: dict[str, NDArray[Any]] = {}
             _flatten("", self._load(self._path, simplify_cells=True, variable_names=[top]), flat)
             self._loaded = (top, flat)
@@ -131,28 +131,28 @@ def _flatten(prefix: str, content: Mapping[str, Any], flat: dict[str, NDArray[An
 
 
 def _add_signals(prefix: str, signals: Sequence[Mapping[str, Any]], flat: dict[str, NDArray[Any]]) -> None:
-    """Signals of a dSPACE capture by their names, with their units; one without a name is the time."""
+    """Signals of a dSPACE capture by their names, with their units. The signal without a name is the time."""
     for signal in signals:
         path = [part.strip('" ') for part in (_text(signal["Name"]) or "time").split("/")]
         unit = _text(signal.get("Unit", "")).strip("[] ")
         end = f" ({unit})" if unit and unit.isascii() else ""
         title, count = path[-1].translate(_BRACKETS), 1
         while (name := f"{prefix}{title}{f' {count}' if count > 1 else ''}{end}") in flat:
-            count += 1  # signals of different blocks may have one name
+            count += 1  # signals of different blocks may have the same name
         flat[name] = np.asarray(signal["Data"])
 
 
 def _text(value: Any) -> str:
-    """A text, also where MATLAB has an empty array for none."""
+    """A text; an empty array stands for an empty text."""
     return value if isinstance(value, str) else ""
 
 
 _BRACKETS = str.maketrans("[]", "()")
-"""Brackets stand for the column of a matrix."""
+"""Replacement for brackets, which denote the column of a matrix."""
 
 
 def _long_matrices(path: Path) -> dict[str, _Matrix]:
-    """Real matrices of many numbers, by name; a file whose sizes have been checked."""
+    """Long real matrices by name, in a file whose sizes have been checked."""
     found = {}
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -170,7 +170,7 @@ def _long_matrices(path: Path) -> dict[str, _Matrix]:
 
 
 def _opened(file: BinaryIO, position: int, order: str) -> BinaryIO | Inflated:
-    """The element at a position of the file, inflated, from its tag on."""
+    """The uncompressed element at a position of the file, beginning with its tag."""
     file.seek(position)
     kind, length = struct.unpack(order + "II", file.read(8))
     if kind == COMPRESSED:
@@ -180,7 +180,7 @@ def _opened(file: BinaryIO, position: int, order: str) -> BinaryIO | Inflated:
 
 
 def _described(stream: BinaryIO | Inflated, position: int, order: str) -> tuple[str, _Matrix | None]:
-    """Name of a variable, and where its numbers are, if it is a long matrix of real numbers."""
+    """Name of a variable, and the position of its numbers if it is a long matrix of real numbers."""
     head = stream.read(8 + 16)
     if len(head) < 24:
         return "", None
@@ -201,7 +201,7 @@ def _described(stream: BinaryIO | Inflated, position: int, order: str) -> tuple[
 
 
 def _small_or_long(stream: BinaryIO | Inflated, order: str) -> tuple[bytes, int]:
-    """Bytes of an element, and how many it took with its tag and padding."""
+    """Bytes of an element, and its length with tag and padding."""
     tag = stream.read(8)
     if len(tag) < 8:
         return b"", len(tag)
@@ -213,7 +213,7 @@ def _small_or_long(stream: BinaryIO | Inflated, order: str) -> tuple[bytes, int]
 
 
 def _read(path: Path, matrix: _Matrix, first: int, count: int, buffer: DecimatingBuffer) -> None:
-    """Take `count` numbers from the number `first` on."""
+    """Read `count` numbers, beginning with number `first`."""
     with path.open("rb") as file:
         order = ORDERS[file.read(HEADER)[126:]]
         stream = _opened(file, matrix.position, order)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Lengths in a MATLAB 5 file, checked before anything is allocated by them."""
+"""Checks the lengths in a MATLAB 5 file before memory is allocated."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ HEADER = 128
 MATRIX, COMPRESSED = 14, 15
 """Kinds of MAT 5 elements: matrix, compressed element."""
 ORDERS = {b"IM": "<", b"MI": ">"}
-"""Last bytes of the header to the order of bytes behind it."""
+"""Last bytes of the header to the byte order of the file."""
 
 _INT32 = 5
 """Kind of a MAT 5 element: 32 bit integers."""
@@ -45,7 +45,7 @@ def check_sizes(path: Path) -> None:
     Raises
     ------
     RecordingError
-        If an element declares more bytes, or an array more items, than there is room for.
+        If an element declares more bytes, or an array more items, than the file can contain.
     """
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -67,7 +67,7 @@ def check_sizes(path: Path) -> None:
 
 
 class Inflated:
-    """Bytes of one compressed variable, a little at a time."""
+    """Bytes of one compressed variable, uncompressed in small pieces."""
 
     def __init__(self, file: BinaryIO, length: int) -> None:
         self._file, self._left = file, length
@@ -95,7 +95,7 @@ class _Elements:
         self._stream, self._order = stream, order
 
     def check(self, room: int, depth: int) -> int:
-        """Pass one element that has at most `room` bytes; return how many it took."""
+        """Check one element of at most `room` bytes, and return its length."""
         tag = self._stream.read(8)
         if len(tag) < 8 or room < 8:
             raise RecordingError("a variable ends within its own description")

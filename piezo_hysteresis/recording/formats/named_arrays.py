@@ -33,7 +33,7 @@ class NamedArrays(Mapping[str, NDArray[Any]]):
     """Mapping of dotted names to arrays. It is a context manager, and the file is open until it ends."""
 
     kind = "the variables"
-    """What messages call the names."""
+    """Word for the names in messages."""
 
     def __enter__(self) -> Self:
         return self
@@ -83,7 +83,7 @@ class NamedArrays(Mapping[str, NDArray[Any]]):
         size : int
             Length of the column.
         options : ReadOptions
-            Pieces outside its `rows` are not read.
+            Pieces outside its `rows` are skipped.
         piece : callable
             From a slice of the column to its numbers.
 

@@ -35,7 +35,7 @@ class NpyArrays(NamedArrays):
     Parameters
     ----------
     path : Path
-        The file; what is not looked at is not read.
+        The file; only the requested columns are read.
 
     Raises
     ------

@@ -98,7 +98,7 @@ class Npz:
 
 
 def _places(values: NpzMembers, options: ReadOptions) -> tuple[dict[str, str], dict[str, str]]:
-    """Channel or label to the key that holds it, and those of them that were inferred_columns."""
+    """Key of every channel and label, and the channels whose keys were inferred."""
     place = {name: str(options.columns.get(name, name)) for name in (*CHANNELS, *options.columns, *LABELS)}
     open_ = [c for c in ("voltage", "displacement") if c not in options.columns and c not in values]
     names = [name for name in values if name not in place.values()]
@@ -109,7 +109,7 @@ def _places(values: NpzMembers, options: ReadOptions) -> tuple[dict[str, str], d
 
 
 def _size(file: Path, options: ReadOptions) -> int:
-    """Samples that a layout keeps of a file, before they are averaged."""
+    """Number of samples that the options select from a file, before averaging."""
     with zipfile.ZipFile(file) as archive:
         values = NpzMembers(archive, file.stat().st_size)
         part = options.part(values.size(_places(values, options)[0]["voltage"]))
@@ -117,7 +117,7 @@ def _size(file: Path, options: ReadOptions) -> int:
 
 
 def _phase(file: Path, options: ReadOptions, average: int, end: float) -> tuple[list[Record], list[Notice]]:
-    """Records of one file; `end` is where the one before it ended [s]."""
+    """Records of one file; `end` is the end of the previous file [s]."""
     with zipfile.ZipFile(file) as archive:
         values = NpzMembers(archive, file.stat().st_size)
         place, inferred = _places(values, options)
@@ -170,7 +170,7 @@ def _time_base(
     if found := inferred_period(values):
         value = values.number(found[0])
         return (1.0 / value if found[1] else value) * average, {}, []
-    return values.number(place["sample_period"]), {}, []  # raises, and says what the file holds
+    return values.number(place["sample_period"]), {}, []  # raises the error that lists the keys
 
 
 def _keys(record: Record) -> dict[str, Any]:

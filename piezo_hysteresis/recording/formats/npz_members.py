@@ -64,12 +64,12 @@ class NpzMembers:
         return math.prod(shape)
 
     def samples(self, name: str, part: slice, average: int) -> Samples:
-        """A part of a one-dimensional array, so many samples averaged into one, without reading it as a whole.
+        """A part of a one-dimensional array, averaged while it is read in pieces.
 
         Raises
         ------
         RecordingError
-            If it is no array of real numbers, or no part of it is there.
+            If it is not an array of real numbers, or the part is empty.
         """
         with self._archive.open(self._member(name)) as stream:
             shape, dtype = self._header(name, stream)
@@ -85,7 +85,7 @@ class NpzMembers:
         return buffer.column(0)
 
     def number(self, name: str) -> float:
-        """The only number of an array."""
+        """The number in an array of one element."""
         value = self._array(name)
         if value.size != 1:
             raise RecordingError(f"{name}: got shape {value.shape}, expected one number")
@@ -93,7 +93,7 @@ class NpzMembers:
         return float(value.reshape(()))
 
     def text(self, name: str, default: str) -> str:
-        """The only text of an array, or the default where there is no such array."""
+        """The text in an array of one element, or the default where there is no such array."""
         if name not in self:
             return default
         value = self._array(name)

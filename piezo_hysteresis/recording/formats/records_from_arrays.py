@@ -31,13 +31,13 @@ from ..table.table import table_records
 from .named_arrays import NamedArrays
 
 _PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
-"""Where a channel stands: ``name[column]``."""
+"""Form of the place of a channel: ``name[column]``."""
 
 
 def records_from_arrays(
     arrays: NamedArrays, prefix: str, options: ReadOptions, before: Sequence[Record] = ()
 ) -> tuple[list[Record], list[Notice]]:
-    """Records of what a file holds under names.
+    """Records from the named arrays of a file.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def records_from_arrays(
     prefix : str
         Beginning of the names of one record, e.g. ``"phase_01."``; empty for all.
     options : ReadOptions
-        Its `columns` go before the names.
+        Its `columns` have priority over the names.
     before : sequence of Record
-        Records that come before.
+        Earlier records.
 
     Raises
     ------

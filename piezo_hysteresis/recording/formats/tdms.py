@@ -29,7 +29,7 @@ from ..table.read_options import ReadOptions
 from .named_arrays import NamedArrays
 
 _BRACKETS = str.maketrans("[]", "()")
-"""Brackets stand for the column of a matrix."""
+"""Replacement for brackets, which denote the column of a matrix."""
 
 
 class TdmsArrays(NamedArrays):

@@ -29,7 +29,7 @@ from ..table.units import si_factor
 Array = NDArray[np.float64]
 
 JITTER = 1e-3
-"""Deviation of a time from its place, in sample periods, above which the times are not even."""
+"""Largest deviation of a time from its nominal value, in sample periods."""
 
 
 def read_path(path: str | Path) -> tuple[Array, float | None]:

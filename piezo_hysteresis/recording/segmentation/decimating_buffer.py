@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`DecimatingBuffer`: samples of a large file, selected and averaged before they are kept."""
+"""`DecimatingBuffer`: selects and averages the samples of a large file while they are read."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from ...record import Notice, Samples
 from ..table.read_options import ReadOptions
 
 PIECE = 1 << 18
-"""Numbers that are looked at, or moved, at a time."""
+"""Number of values that are processed together."""
 
 ENOUGH = 1 << 24
-"""Samples of a recording above which they are averaged, where nothing is said: below 2 GB while they are judged."""
+"""Largest number of samples of a recording without averaging by default; checking them takes less than 2 GB."""
 
 MOST = 1 << 26
-"""Samples that are kept of a recording at a rate that was asked for: some 5 GB while they are judged."""
+"""Largest number of samples at a rate that the user chose; checking them takes about 5 GB."""
 
 
 def averaged_notice(average: int, sample_period: float, phase: str = "") -> Notice:
-    """What was lost where a recording was averaged because it is long; `sample_period` [s] is the one reached."""
+    """Notice about a long recording that was averaged; `sample_period` [s] is the resulting one."""
     return Notice(
         "averaged",
         f"the recording has more than {ENOUGH} samples; {average} were averaged into one, to a sample period of "
@@ -50,14 +50,14 @@ def averaged_notice(average: int, sample_period: float, phase: str = "") -> Noti
 
 
 def shared_averages(sizes: Sequence[int], average: int | None) -> list[int]:
-    """Samples averaged into one in each of several phases; the longest give way first.
+    """Number of samples averaged into one in each of several phases; the longest phases are averaged first.
 
     Parameters
     ----------
     sizes : sequence of int
         Samples of every phase.
     average : int or None
-        What was asked for.
+        Average chosen by the user.
 
     Raises
     ------
@@ -95,10 +95,10 @@ class DecimatingBuffer:
     width : int
         Number of columns.
     start, stop : int
-        First row to keep and the one after the last; no stop keeps all.
+        First row to keep and the one after the last; None keeps all.
     average : int or None
         Rows averaged into one; an incomplete last group is dropped. None begins with 1 and doubles whenever `ENOUGH`
-        rows are kept: the mean of two means is the mean of all, so it does not matter when.
+        rows are kept: the time of doubling does not matter, because the mean of two means is the mean of all.
 
     Raises
     ------
@@ -118,7 +118,7 @@ class DecimatingBuffer:
     average: int | None = 1
     rows: int = 0
     factor: int = 1
-    """Rows averaged into one so far."""
+    """Present number of rows averaged into one."""
     _columns: list[array[float]] = field(default_factory=list)
     _rest: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
 
@@ -129,17 +129,17 @@ class DecimatingBuffer:
 
     @classmethod
     def of(cls, width: int, options: ReadOptions) -> DecimatingBuffer:
-        """For columns of which a layout keeps a part."""
+        """Buffer for columns of which the options select a part."""
         start, stop = options.from_the_beginning
         return cls(width, start, stop, options.average)
 
     @property
     def is_full(self) -> bool:
-        """True once no further row is wanted."""
+        """True when all selected rows have been read."""
         return self.stop is not None and self.rows >= self.stop
 
     def add(self, values: Samples) -> None:
-        """Take a block of rows, shape (n, width)."""
+        """Add a block of rows, shape (n, width)."""
         first = self.rows
         self.rows += len(values)
         stop = len(values) if self.stop is None else max(0, self.stop - first)
@@ -160,7 +160,7 @@ class DecimatingBuffer:
         self._rest = values.copy()
 
     def add_column(self, values: NDArray[Any]) -> None:
-        """Take numbers of one column, shape (n,), a piece at a time."""
+        """Add numbers of one column, shape (n,), in pieces."""
         for first in range(0, values.size, PIECE):
             self.add(values[first : first + PIECE].astype(np.float64, copy=False)[:, None])
 
@@ -176,20 +176,20 @@ class DecimatingBuffer:
         for column in self._columns:
             values = np.frombuffer(column, np.float64)
             values[:half] = (values[0 : 2 * half : 2] + values[1 : 2 * half : 2]) / 2.0
-            del values  # an array that is looked at cannot be cut
+            del values  # an array with a view cannot be resized
             del column[half:]
 
     def kept_row(self, row: int) -> int:
-        """Where a row of the file has come to lie; that of the first one kept for rows before it."""
+        """Position of a row of the file in the buffer; rows before the first selected one have its position."""
         return max(0, row - self.start) // self.factor
 
     def column(self, at: int) -> Samples:
-        """A column as it has been kept.
+        """A column of the buffer.
 
         Raises
         ------
         RecordingError
-            Where a part was asked for that holds no sample.
+            If the selected part holds no sample.
         """
         if not self._columns[at] and (self.start or self.stop is not None):
             asked = f"{self.start}:{'' if self.stop is None else self.stop}"

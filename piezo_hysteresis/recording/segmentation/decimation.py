@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`decimation`: which phases of a bag are meant to be averaged on reading; a node records them at the full rate."""
+"""`decimation`: the phases of a bag that are averaged on reading; the node records them at the full rate."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from ...errors import RecordingError
 from ...yaml_file import read_yaml
 
 FILE = "decimate.yaml"
-"""Beside the storage files in the folder of the bag."""
+"""Name of the file in the folder of the bag."""
 
 
 def save_decimation(folder: Path, factors: Mapping[str, int]) -> None:
-    """Write phase names and how many samples become one (`Record.decimate`)."""
+    """Write phase names and the numbers of samples that are averaged into one (`Record.decimate`)."""
     text = "# Samples averaged into one on reading, by phase.\n" + yaml.safe_dump(dict(factors))
     try:
         (folder / FILE).write_text(text, encoding="utf-8")

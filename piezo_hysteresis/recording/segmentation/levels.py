@@ -25,7 +25,7 @@ from ...record import Samples
 from .waveform import turning_points
 
 LARGEST_NOISE = 0.02
-"""Voltages closer than this share of the range are one level."""
+"""Voltages within this share of the range are one level."""
 
 _BLOCKS = 20_000
 """Approximate number of blocks into which the drive is cut."""
@@ -62,7 +62,7 @@ def pieces_of(voltage: Samples) -> list[Piece]:
     length = max(_SHORTEST, voltage.size // _BLOCKS)
     noise = float(np.quantile(np.std(_blocks(voltage, 4 * length), axis=1), 0.01))
     tolerance = min(max(_NOISE_WIDTH * noise, 1e-6 * span), LARGEST_NOISE * span)
-    length = max(length, int(voltage.size * tolerance / span))  # no drive is slower than once through its range
+    length = max(length, int(voltage.size * tolerance / span))  # the slowest drive passes its range once
     levels = _joined(voltage, _levels_of(voltage, _blocks(voltage, length), length, tolerance), 4 * tolerance)
     turns = turning_points(voltage, max(4 * tolerance, 0.01 * span))
     levels = _without_peaks(levels, turns, voltage.size)
@@ -70,7 +70,7 @@ def pieces_of(voltage: Samples) -> list[Piece]:
     end = 0
     for level in levels:
         if level.start > 0:
-            pieces.append(Piece(end, level.start))  # of no size where the drive jumps
+            pieces.append(Piece(end, level.start))  # empty where the drive jumps
         pieces.append(level)
         end = level.stop
     if end < voltage.size:
@@ -115,7 +115,7 @@ def _levels_of(voltage: Samples, blocks: Samples, length: int, tolerance: float)
 
 
 def _joined(voltage: Samples, levels: list[Piece], tolerance: float) -> list[Piece]:
-    """Levels with nothing but a level between them, as on the flat top of a wave."""
+    """Merge levels that follow one another, as on the flat top of a wave."""
     joined: list[Piece] = []
     for level in levels:
         if joined and float(np.ptp(voltage[joined[-1].stop - 1 : level.start + 1])) <= tolerance:
@@ -134,7 +134,7 @@ def _without_peaks(levels: list[Piece], turns: NDArray[np.int64], size: int) -> 
         after = min(
             int(turns[turns > level.stop].min(initial=size)), levels[i + 1].start if i + 1 < len(levels) else size
         )
-        # a movement that the record cuts off says nothing about its length
+        # the length of a movement at the end of the record is unknown
         moves = [level.start - before] * (before > 0) + [after - level.stop] * (after < size - 1)
         if level.start == 0 or level.stop == size or level.size >= _PEAK * min(moves, default=0):
             kept.append(level)

@@ -37,21 +37,21 @@ _MOST = 100
 def labelled(
     parts: Sequence[Record], phases: str | Sequence[tuple[float, str]] | None
 ) -> tuple[list[Record], list[Notice]]:
-    """A record in one piece, or in the parts that its holes left, as phases.
+    """Divide a record, or its parts between gaps, into phases.
 
     Parameters
     ----------
     parts : sequence of Record
-        What was recorded in one go.
+        The parts of one recording.
     phases : str or sequence of (float, str) or None
         Name of the only phase; or time from the first sample [s] and name of every phase; or None for a proposal.
 
     Returns
     -------
     records : list of Record
-        Every piece; those cut off here continue the one before.
+        The phases; those divided here continue the phase before.
     notices : list of Notice
-        What was proposed.
+        The proposed names.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def _named(parts: Sequence[Record], phases: Sequence[tuple[float, str]]) -> list
         for (a, b), (_, name) in zip(itertools.pairwise([*starts, part.size]), phases, strict=True):
             if (start := max(a, 0)) < (stop := min(b, part.size)):
                 piece = replace(part[start:stop], phase=name)
-                if start and not records:  # what came before is left out
+                if start and not records:  # samples before the first start time are left out
                     piece = replace(piece, continues=False, truncated=True)
                 records.append(replace(piece, initial_voltage=None) if start else piece)
     if not records:
@@ -159,7 +159,7 @@ def _movement(voltage: Samples, start: int, sample_period: float) -> list[tuple[
 
 
 def _chain_end(pieces: list[Piece], i: int, voltage: Samples) -> int:
-    """One behind the last piece of the chain movement, level, movement, level … that begins at `i`."""
+    """Index after the last piece of the sequence movement, level, movement, level … that begins at `i`."""
     while i + 1 < len(pieces) and pieces[i].moves and _monotone(voltage, pieces[i]):
         i += 2
     return i

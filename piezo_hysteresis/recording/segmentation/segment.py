@@ -30,7 +30,7 @@ class Segment:
     """Samples of one phase number and one sample period."""
 
     channels: dict[str, Samples]
-    """Voltage [V], displacement [m] and what else the blocks hold."""
+    """Voltage [V], displacement [m] and the further channels of the blocks."""
     sample_period: float
     phase: int
     start_time: float
@@ -52,7 +52,7 @@ class Segment:
         return self.channels["voltage"].size
 
     def averaged(self, average: int) -> Segment:
-        """The same with `average` samples in one, never across missing ones; incomplete last groups are dropped."""
+        """The segment with `average` samples averaged into one, not across gaps; the incomplete rest is dropped."""
         if average == 1:
             return self
         holes = sorted({**self.breaks, **self.pauses}.items())

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ...record import Samples
 
 COARSEST = 40_000
-"""Samples in which turning points are searched one by one."""
+"""Largest number of samples in which turning points are searched one by one."""
 _LEAST_SWING = 0.05
 """Least swing of a turning point, share of the range."""
 _REGULAR = 0.1
@@ -43,8 +43,7 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     """Propose the phase name of a drive signal without pauses.
 
     A swing is the movement from one turning point to the next. Straight swings make a triangle, swings of equal
-    duration with periods that a sine fits make a sine; what repeats itself otherwise is a multisine, and what does not
-    is noise.
+    duration with periods that a sine fits make a sine; other periodic drives are a multisine, and all others are noise.
 
     Parameters
     ----------
@@ -70,7 +69,7 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     turns = turning_points(voltage, _LEAST_SWING * span)
     if turns.size <= 2:
         return _transition(voltage)
-    wave = voltage[turns[1] : turns[-2] + 1]  # without what leads into it and out of it
+    wave = voltage[turns[1] : turns[-2] + 1]  # without the motion before and after it
     if _has_levels(wave):
         return "steps"
     if _is_chirp(wave):
@@ -80,12 +79,12 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
         voltage = wave[max(0, middle - COARSEST // 2) : middle + COARSEST // 2]
         turns = turning_points(voltage, _LEAST_SWING * span)
     straight = _straightness(voltage, turns)
-    reversals = turns[1:-1]  # the ends of the record are none
+    reversals = turns[1:-1]  # the ends of the record are no turning points
     periods = reversals[2:] - reversals[:-2]
     swings = np.diff(reversals if reversals.size > 1 else turns)  # those of the ends may be parts of swings
     usual = float(np.median(periods)) if periods.size else 2.0 * float(swings[0])
     like = periods[np.abs(periods - usual) <= _REGULAR * usual]
-    regular = like.size >= 0.8 * periods.size - 1  # one may belong to what leads in or out
+    regular = like.size >= 0.8 * periods.size - 1  # one may belong to the motion before or after
     if straight < _STRAIGHT:
         return "triangle" if regular else "minor_loops"
     period = float(np.mean(like)) if like.size else usual
@@ -158,7 +157,7 @@ def _straightness(voltage: Samples, turns: NDArray[np.int64]) -> float:
 
 
 def _is_sine(voltage: Samples, period: float) -> bool:
-    """True where single periods are sines, whatever their amplitude and level; `period` in samples."""
+    """True where single periods are sines of any amplitude and level; `period` in samples."""
     length = max(3, round(period))
     starts = np.arange(0, voltage.size - length, max(length, voltage.size // 200))
     if not starts.size:
@@ -174,7 +173,7 @@ def _is_sine(voltage: Samples, period: float) -> bool:
 
 
 def _frequency(voltage: Samples, start: float) -> float:
-    """Frequency of a sine [1/sample], from the turn of its phase between two halves of the record."""
+    """Frequency of a sine [1/sample], from the phase difference between two halves of the record."""
     half = voltage.size // 2
     if half * start < 1.0:
         return start
@@ -207,7 +206,7 @@ def _crossings(voltage: Samples) -> int:
 
 
 def _repeats(voltage: Samples) -> bool:
-    """True where the autocorrelation comes back, for odd multisines also with the other sign."""
+    """True where the autocorrelation returns to a high value, for odd multisines also with the opposite sign."""
     x = voltage[: 1 << 20] - voltage[: 1 << 20].mean()
     size = 1 << (2 * x.size - 1).bit_length()
     overlap = np.fft.irfft(np.abs(np.fft.rfft(x, size)) ** 2, size)[: x.size // 2 + 1]

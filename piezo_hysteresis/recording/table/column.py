@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Column`: numbers that come block by block and may become more than the memory holds."""
+"""`Column`: numbers that are added in blocks and may exceed the memory."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ..segmentation.decimating_buffer import ENOUGH, PIECE
 class Column:
     """Numbers of one type. Beyond `ENOUGH` numbers they are stored in a temporary file that is mapped into memory.
 
-    The file has no name and goes with the column. It lies where ``TMPDIR`` says; that should be no memory disk.
+    The file has no name and is deleted with the column. Its folder is ``TMPDIR``, which should not be a RAM disk.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Column:
             self.extend(np.full(min(PIECE, count - first), value))
 
     def array(self) -> NDArray[Any]:
-        """All numbers, shape (n,), as long as no more are appended."""
+        """All numbers, shape (n,); valid until more are appended."""
         if self._file is None:
             return np.frombuffer(bytes(self._recent), self._kind)
         self._move_out()
@@ -76,13 +76,13 @@ class Column:
     def _move_out(self) -> None:
         if self._file is None:
             self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- open as long as the column
-            weakref.finalize(self, self._file.close)  # an array that is still in use keeps its own hold
+            weakref.finalize(self, self._file.close)  # an array that is still in use keeps the mapping
         self._file.write(self._recent)
         self._recent.clear()
 
 
 def changes(values: NDArray[Any], step: int) -> NDArray[np.int64]:
-    """Positions at which integers are not by `step` larger than the one before, modulo their size.
+    """Positions at which an integer does not exceed the one before by `step`, modulo its type.
 
     >>> changes(np.array([4, 5, 6, 9, 10], np.uint32), 1)
     array([3])

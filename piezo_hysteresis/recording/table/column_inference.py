@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which column of a foreign file is which channel, if its titles are clear.
+"""Infers the channels of a file of other software from its column titles.
 
 The result is reported and can be overridden.
 """
@@ -26,13 +26,13 @@ from ...record import Notice
 from .units import plain, units_of
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$|[\s_,/:]\s*([^\s_,/:\[\]()]+)\s*$")
-"""Unit at the end of a title: in brackets, or behind a separator."""
+"""Unit at the end of a title, in brackets or after a separator."""
 _WORDS = {
     "time": r"time|zeit|\bt\b|\bx value\b|\bx-axis\b",
     "voltage": r"volt|drive|spannung|input|\bu\b|\bv\b|\bu_?in\b|\bv_?in\b",
     "displacement": r"disp|posi|sensor|stroke|weg\b|elong|output|\by\b|\bx\b",
 }
-"""What the title of a channel speaks of."""
+"""Words in the title of a channel."""
 _PERIODS = ("sampleperiod", "ts", "dt", "sampletime", "samplingperiod", "samplingtime", "deltat")
 """Names of a sample period."""
 _RATES = ("fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate")
@@ -53,16 +53,16 @@ def unit_in(title: str, channel: str) -> str | None:
 
 
 def inferred_columns(names: Sequence[str], taken: Iterable[int], wanted: Iterable[str]) -> dict[str, int]:
-    """Position of the only column that a channel can be, for each of `wanted` that has one.
+    """Position of the column of each wanted channel that has exactly one candidate.
 
-    A column counts by the unit in its title, or else by its words; two that count the same leave the channel open.
+    A candidate is found by the unit in its title, or else by its words. Two equal candidates leave the channel open.
 
     Parameters
     ----------
     names : sequence of str
         Titles of columns, or names of variables.
     taken : iterable of int
-        Positions that serve another channel.
+        Positions of columns that are used already.
     wanted : iterable of str
         Channels to look for, among time, voltage and displacement.
 
@@ -103,7 +103,7 @@ def inferred_period(names: Iterable[str]) -> tuple[str, bool] | None:
 
 
 def inference_notice(found: Mapping[str, str], units: Mapping[str, str | None]) -> tuple[Notice, ...]:
-    """What was inferred_columns: channel to title, and the unit that the title names."""
+    """Notice about inferred columns: their channels, titles and units."""
     if not found:
         return ()
     message = ", ".join(f"{c} = '{title}'{f' in {units[c]}' if units.get(c) else ''}" for c, title in found.items())

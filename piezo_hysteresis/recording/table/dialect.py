@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Dialect`: how the numbers of a text file are written, found from its first lines."""
+"""`Dialect`: the notation of the numbers in a text file, detected from its first lines."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from ...errors import RecordingError
 from .units import is_unit, plain
 
 SNIFFED_BYTES = 1 << 18
-"""Text at the beginning of a file from which its dialect is found."""
+"""Number of bytes at the beginning of a file from which its dialect is detected."""
 COMMENT = ("#", "%")
 """Beginnings of comment lines."""
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?Z?")
@@ -39,7 +39,7 @@ _YEAR_2000 = np.datetime64("2000-01-01", "ns")
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """How the numbers of a text file are written.
+    """Notation of the numbers in a text file.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Dialect:
             block = file.read(SNIFFED_BYTES)
             lines = decoded(block).splitlines()
             if file.read(1) and len(lines) > 1:
-                lines.pop()  # it may be cut
+                lines.pop()  # it may be incomplete
         best: tuple[float, int, Dialect] | None = None
         for delimiter, comma in (
             (",", False),

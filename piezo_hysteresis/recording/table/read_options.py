@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ReadOptions`: how a recording is to be read, where the file itself does not say."""
+"""`ReadOptions`: options for reading a recording, for information that the file does not contain."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from ...record import Samples
 from .units import si_factor
 
 CHANNELS = ("time", "voltage", "displacement")
-"""What a recording must hold, unless its sample period is given; `is_channel` decides what else it may hold."""
+"""Channels that a recording must have, unless its sample period is given; `is_channel` decides about further ones."""
 
 LONGEST_PERIOD = 60.0
 """Sample period that may be given by hand [s]; a larger number is a rate in Hz."""
 
 LABELS = ("phase", "record", "continues", "truncated", "initial_voltage", "sample_period", "start_time")
-"""What is constant within a record."""
+"""Properties that are constant within a record."""
 
 Column = str | int
 """Title or name of a column, or its number from 1."""
@@ -51,7 +51,7 @@ def is_channel(name: str) -> bool:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """Where the channels of a recording are and what the file does not say about them.
+    """Places of the channels of a recording, and information that the file does not contain.
 
     Parameters
     ----------
@@ -63,14 +63,14 @@ class ReadOptions:
     units : mapping of str to str or float
         Channel to its unit (``um``, ``nm``, ``mV``, ``ms``, …) or to the SI value of one count.
     sample_period : float, optional
-        Time between samples [s]; goes before what the file says.
+        Time between samples [s]; it replaces that of the file.
     initial_voltage : float, optional
         Voltage at which the stage had settled before every phase that does not continue another [V].
     rows : (int, int), optional
         First sample and the one after the last of a table or of a record in one piece; as a Python slice. Without its
         first samples, and without `initial_voltage`, a record is `truncated`.
     phases : str or sequence of (float, str), optional
-        Name of the only phase, or start time [s] and name of each one, instead of what the data propose.
+        Name of the only phase, or start time [s] and name of each one; default: names proposed from the data.
     average : int, optional
         Samples averaged into one while they are read. Default 1, and in a recording that is too long for the memory
         as few as it takes; 1 keeps every sample, or refuses.
@@ -80,7 +80,7 @@ class ReadOptions:
     Raises
     ------
     RecordingError
-        On an unknown channel or unit, or a number that is not physical.
+        On an unknown channel or unit, or an impossible number.
     """
 
     axis: str | None = None
@@ -121,21 +121,21 @@ class ReadOptions:
         object.__setattr__(self, "columns", columns)
 
     def in_si(self, channel: str, values: Samples, unit: str | None = None) -> Samples:
-        """Values of a channel in SI units, by the unit given for it or else by the `unit` the file names."""
+        """Values of a channel in SI units, by the given unit or else by the `unit` in the file."""
         given = self.units.get(channel, unit)
         factor = 1.0 if given is None else si_factor(channel, given)
         return values if factor == 1.0 else np.asarray(values * factor)
 
     @property
     def from_the_beginning(self) -> tuple[int, int | None]:
-        """`rows` as far as a reader can apply them on its way through a file: those not counted from the end."""
+        """The part of `rows` that a reader can apply while it reads: bounds that do not count from the end."""
         start, stop = self.rows or (None, None)
         if (start or 0) < 0 or (stop is not None and stop < 0):
             return 0, None
         return start or 0, stop
 
     def after_reading(self, average: int) -> ReadOptions:
-        """What is left to do once `from_the_beginning` has been applied and `average` samples became one."""
+        """The part of `rows` that remains after `from_the_beginning` and the averaging."""
         rows = None if self.rows is None or self.from_the_beginning != (0, None) else self.rows
         period = None if self.sample_period is None else self.sample_period * average
         if rows is not None and average > 1:
@@ -159,7 +159,7 @@ class ReadOptions:
 
     @property
     def passes_over(self) -> bool:
-        """True where reading begins behind the first row, with an unknown initial state."""
+        """True where reading begins after the first row, with an unknown initial state."""
         return bool(self.from_the_beginning[0]) and self.initial_voltage is None
 
     def with_period(self, sample_period: float | None) -> ReadOptions:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Columns of numbers and labels, from whatever file, as an experiment."""
+"""Makes an experiment from columns of numbers and labels."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ def named_column(title: str) -> tuple[str, str | None]:
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Where the channels of a table are.
+    """Places of the channels of a table.
 
     Parameters
     ----------
     columns : dict of str to (int, str or None)
         Channel or label to its column, counted from 0, and the unit that its title names.
     notices : tuple of Notice
-        What was guessed from titles of other software.
+        Findings about inferred columns.
     """
 
     columns: dict[str, tuple[int, str | None]]
@@ -75,12 +75,12 @@ def resolve(titles: Sequence[str], width: int, options: ReadOptions) -> Places:
     width : int
         Number of columns.
     options : ReadOptions
-        Its `columns` go before the titles.
+        Its `columns` have priority over the titles.
 
     Raises
     ------
     RecordingError
-        If voltage or displacement is nowhere, or a column that was named does not exist.
+        If voltage or displacement is not found, or a named column does not exist.
     """
     parsed = [named_column(title) for title in titles]
     places: dict[str, tuple[int, str | None]] = {}
@@ -98,7 +98,7 @@ def resolve(titles: Sequence[str], width: int, options: ReadOptions) -> Places:
         places[channel] = (at, unit_in(titles[at], channel) if titles else None)
     open_ = [c for c in ("time", "voltage", "displacement") if c not in places]
     if "time" in open_ and options.sample_period is not None:
-        open_.remove("time")  # a guess is not worth a contradiction
+        open_.remove("time")  # an inferred column must not contradict the others
     found = inferred_columns(titles, (at for at, _ in places.values()), open_)
     places |= {channel: (at, unit_in(titles[at], channel)) for channel, at in found.items()}
     for channel in ("voltage", "displacement"):
@@ -136,13 +136,13 @@ def table_records(
     columns : mapping of str to (n,) ndarray
         Channels in SI units, `time` among them where the table has it.
     marks : sequence of Mark
-        Where records begin, and their labels; empty for a table in one piece without any.
+        First rows of the records, and their labels; empty for a table without labels.
     options : ReadOptions
         Its `rows`, `phases`, `sample_period` apply; its `average` has been applied.
     before : sequence of Record
-        Records of tables that come before.
+        Records of earlier tables.
     truncated : bool
-        True where rows before the first one were passed over.
+        True where rows before the first one were skipped.
 
     Returns
     -------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Numbers and words from the columns of a text file, block by block, so that memory grows with the numbers only."""
+"""Reads numbers and words from the columns of a text file block by block, so that only the numbers take memory."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ from .dialect import COMMENT, Dialect, cells_of, decoded, number_in
 from .read_options import ReadOptions
 
 BLOCK_BYTES = 1 << 20
-"""Text that is parsed at a time; no line may be longer."""
+"""Number of bytes that are parsed together; no line may be longer."""
 
 
 _NO_ROW = (b"#", b"%", b"\n\n", b"\n\r", b"\r\r", b"\n ", b"\n\t", b"\f", b"\v")
-"""Bytes without which every line is a row: looking at each line takes longer than reading its numbers."""
+"""If a block contains none of these, every line is a row; checking each line would take longer than reading it."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cells:
-    """What was read of a text file."""
+    """Content of a text file."""
 
     columns: dict[str, Samples]
     """The numbers, each of shape (n,); NaN where a cell is empty or no number."""
     marks: list[tuple[int, dict[str, str]]]
     """The words and the first row kept at which they are those; empty without words."""
     bad: int
-    """Cells that are no number."""
+    """Number of cells that do not hold a number."""
     average: int
     """Rows that were averaged into one."""
 
@@ -61,7 +61,7 @@ def read_cells(
     path : Path
         The file.
     dialect : Dialect
-        How it is written.
+        Its notation.
     numbers, words : mapping of str to int
         Name of every column to read to its position, counted from 0.
     options : ReadOptions
@@ -81,7 +81,7 @@ def read_cells(
             values, wrong = _parsed(lines, dialect, list(numbers.values()))
             bad += wrong
         else:
-            values = np.empty((len(lines), len(numbers)))  # passed over
+            values = np.empty((len(lines), len(numbers)))  # skipped
         buffer.add(values)
         if words and behind > buffer.start:
             cells = _labels(lines, dialect, list(words.values()))

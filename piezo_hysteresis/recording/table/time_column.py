@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The time base of a recording: its sample period, and the places where time stands still, jumps or runs back."""
+"""The time base of a recording: its sample period, and the places where time stands still, jumps or decreases."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ class TimeColumn:
     period : float
         Time between samples [s].
     breaks : ndarray of int
-        Samples before which some are missing or time runs back.
+        Samples before which some are missing or time decreases.
     lost : ndarray of int
-        Samples missing before each break; 0 where time runs back.
+        Samples missing before each break; 0 where time decreases.
     jitter : float
         Deviation of the other steps from the period, rms, in periods.
     """
@@ -78,7 +78,7 @@ class TimeColumn:
         Raises
         ------
         RecordError
-            With fewer than two times, or where they do not grow.
+            If there are fewer than two times, or they do not increase.
         """
         steps = np.diff(time)
         forward = steps[steps > 0]
@@ -121,7 +121,7 @@ class TimeColumn:
             )
 
     def notices(self, phase: str = "") -> list[Notice]:
-        """What a reader of the data should know about their times."""
+        """Findings about the times."""
         message = []
         if self.jitter > JITTER:
             message.append(
