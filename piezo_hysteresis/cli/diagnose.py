@@ -56,10 +56,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="seconds after which the search ends with the best answer so far; default: no limit",
     )
     parser.add_argument(
-        "--explicit-step",
-        action=argparse.BooleanOptionalAction,
-        help="subtract the error of the explicit step of Eq. (7), which only simulated data contain; with --no-… such "
-        "data are not looked for; default: they are recognised and no effect is named",
+        "--no-explicit-step",
+        action="store_true",
+        help="do not look for the explicit step of Eq. (7), which only simulated data can hold",
     )
     add_stage_arguments(parser)
     add_results(parser, report="write the HTML page, and its figures beside it", json="write the answer as JSON")
@@ -123,6 +122,6 @@ def _of_recording(args: argparse.Namespace) -> Diagnosis:
             experiment,
             start,
             progress=report_progress,
-            explicit_step=args.explicit_step,
+            explicit_step=not args.no_explicit_step,
             time_limit=args.time,
         )

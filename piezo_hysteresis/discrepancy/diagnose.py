@@ -28,7 +28,7 @@ from ..identification.one_core import on_one_core
 from ..model.model import Model
 from ..record import Experiment
 from .diagnosis import Diagnosis
-from .passes import PASSES, DiagnosisState, check_explicit_step
+from .passes import PASSES, DiagnosisState, subtract_explicit_steps
 
 
 @on_one_core
@@ -38,7 +38,7 @@ def diagnose(
     *,
     effects: Collection[type[Effect]] = CATALOGUE,
     progress: Progress | None = None,
-    explicit_step: bool | None = None,
+    explicit_step: bool = True,
     time_limit: float = np.inf,
 ) -> Diagnosis:
     """Find where simulation and measurement disagree, name the missing effect, add it, and show the gap shrink.
@@ -53,10 +53,9 @@ def diagnose(
         The library to choose from; the whole catalogue by default.
     progress : callable, optional
         Called with a word and the fraction done.
-    explicit_step : bool, optional
-        What is done with data of a simulation that integrates the loop by the explicit step of Eq. (7). By default
-        they are recognised and the verdict is "unknown". True subtracts the error of this step and goes on. False
-        does not look for it.
+    explicit_step : bool
+        Whether the explicit step of Eq. (7) is looked for, which only simulations take, and what it changes is taken
+        out before anything is named.
     time_limit : float
         Time after which the search ends with the best answer so far [s]; the baseline before it and the last fit after
         it are always made.
@@ -78,10 +77,9 @@ def diagnose(
     if not time_limit > 0.0:
         raise ParameterError(f"diagnose: got a time limit of {time_limit:g} s, expected more than 0 s")
     end = time.monotonic() + time_limit
-    report = progress or (lambda word, fraction: None)
-    state = DiagnosisState(experiment, model, effects, report, end, bool(explicit_step))
+    state = DiagnosisState(experiment, model, effects, progress or (lambda word, fraction: None), end)
     with np.errstate(over="ignore", invalid="ignore"):  # diverging trials show in their cost
-        for run in (p for p in PASSES if explicit_step is not False or p is not check_explicit_step):
+        for run in (p for p in PASSES if explicit_step or p is not subtract_explicit_steps):
             found = run(state)
             if isinstance(found, Diagnosis):
                 return found

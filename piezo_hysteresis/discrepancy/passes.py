@@ -33,7 +33,7 @@ from ..record import Experiment, Notice
 from .changes.same_stage import same_stage
 from .conclusion import concluded
 from .diagnosis import Diagnosis, Verdict
-from .residual.explicit_step import EXPLICIT_STEP, KIND, explicit_model, without_steps
+from .residual.explicit_step import KIND, explicit_model, without_steps
 from .residual.localise import ResidualShare, localise
 from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
 from .search.baseline_setup import BaselineSetup, prepare_baseline
@@ -49,7 +49,7 @@ Array = NDArray[np.float64]
 VOLTAGE_NOISE = "voltage_noise"
 """Kind of the notice of an experiment whose voltage is followed but for its noise."""
 STEPS_LEAVE = 10.0
-"""Largest cost after the error of an explicit step is subtracted, where that is done before the search."""
+"""Cost that may be left once the changes of an explicit step are taken out before anything is named."""
 IDLE = ("idle", "hold", *CONDITIONING)
 """Phases that only bring the stage from one state to another."""
 
@@ -70,8 +70,6 @@ class DiagnosisState:
         Called with a word and the fraction done.
     end : float
         When the search for effects has to end, on the clock of `time.monotonic` [s].
-    subtracts_explicit_steps : bool
-        Whether the error of an explicit step is subtracted; otherwise the diagnosis ends where it is recognised.
     setup : BaselineSetup or None
         Floors, records, and the baseline that was fitted to them.
     where : tuple of ResidualShare
@@ -85,7 +83,6 @@ class DiagnosisState:
     effects: Collection[type[Effect]]
     progress: Progress
     end: float = np.inf
-    subtracts_explicit_steps: bool = False
     setup: BaselineSetup | None = None
     where: tuple[ResidualShare, ...] = ()
     selection: Selection | None = None
@@ -211,30 +208,28 @@ def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
     return state
 
 
-def check_explicit_step(state: DiagnosisState) -> DiagnosisState | Diagnosis:
-    """Recognise data of a simulation with the explicit step of Eq. (7): subtract its error, or end with "unknown"."""
+def subtract_explicit_steps(state: DiagnosisState) -> DiagnosisState:
+    """Subtract the error that an explicit step of the loop has left in the data of a simulation; no stage has it.
+
+    Before the search only where nothing else is missing; after it with the first effects behind which the data show it.
+    """
     setup, selection = state.fitted, state.selection
     training_data, model = setup.training_data, setup.baseline.model
     if any(n.kind == KIND for n in state.experiment.notices) or setup.score.excess <= ADEQUATE:
         return state
     if selection is None:
         explicit = explicit_model(model, training_data, STEPS_LEAVE)
-        return state if explicit is None else _with_explicit_step(state, explicit)
+        return state if explicit is None else fit_baseline(_freed(state, explicit))
     for step in (s.best for s in selection.accepted if selection.in_time):
         leaves_a_gap = step.score.excess > ADEQUATE
         explicit = explicit_model(step.fit.model, step.training_data) if leaves_a_gap else None
         if explicit is not None:
-            return _with_explicit_step(state, explicit)
+            return search_effects(fit_baseline(_freed(state, explicit)))
     return state
 
 
-def _with_explicit_step(state: DiagnosisState, explicit: Model) -> DiagnosisState | Diagnosis:
-    if state.subtracts_explicit_steps:
-        freed = replace(state, experiment=without_steps(state.experiment, explicit), selection=None)
-        return fit_baseline(freed) if state.selection is None else search_effects(fit_baseline(freed))
-    model, experiment = state.fitted.baseline.model, state.experiment.noting(EXPLICIT_STEP)
-    reason = f"No effect is named: {EXPLICIT_STEP.message}."
-    return Diagnosis(Verdict.UNKNOWN, reason, model, model, None, None, state.where, None, None, experiment)
+def _freed(state: DiagnosisState, model: Model) -> DiagnosisState:
+    return replace(state, experiment=without_steps(state.experiment, model), selection=None)
 
 
 def conclude(state: DiagnosisState) -> Diagnosis:
@@ -249,9 +244,9 @@ PASSES: tuple[Pass, ...] = (
     compare_with_given_model,
     answer_few_records,
     fit_baseline,
-    check_explicit_step,
+    subtract_explicit_steps,
     search_effects,
-    check_explicit_step,
+    subtract_explicit_steps,
     search_again_with_sharper_samples,
     conclude,
 )

@@ -91,7 +91,7 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
             error_rate=args.error_rate,
             longest=args.stage_time,
             seed=args.seed,
-            explicit_step=args.explicit_step,
+            explicit_step=not args.no_explicit_step,
         )
         _show_plan(session, live)
         started = time.monotonic()

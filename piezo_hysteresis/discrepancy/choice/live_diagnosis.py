@@ -61,7 +61,7 @@ class LiveDiagnosis:
         Stage time that may be used [s].
     seed : int
         Of everything random in the phases.
-    explicit_step : bool, optional
+    explicit_step : bool
         As for `diagnose`.
     effects : tuple of Effect classes
         The library to choose from.
@@ -92,7 +92,7 @@ class LiveDiagnosis:
     error_rate: float = ERROR_RATE
     longest: float = LONGEST
     seed: int = 0
-    explicit_step: bool | None = None
+    explicit_step: bool = True
     effects: tuple[type[Effect], ...] = CATALOGUE
     chooses: bool = True
     due: tuple[ProtocolPhase, ...] = ()

@@ -56,14 +56,7 @@ from .sampling import at_period, less
 Array = NDArray[np.float64]
 
 KIND = "explicit_step"
-"""Kind of the notice about data of an explicit step."""
-EXPLICIT_STEP = Notice(
-    KIND,
-    "the data look like a simulation that integrates the hysteresis loop by one explicit step per sample, Eq. (7), "
-    "which no real stage does; simulate with smaller steps, or say --explicit-step to subtract the error of this step",
-    severe=True,
-)
-"""What a user learns who has not asked for the subtraction."""
+"""Of the notice of an experiment from which the changes are taken."""
 SEEN = 0.5
 """Change of a record in floors from which it can be reported."""
 BETTER = 0.9

@@ -12,15 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Data of simulations with the explicit step of Eq. (7) are recognised, and its error is subtracted on request."""
+"""Data of simulations with the explicit step of Eq. (7) are recognised, and the error of the step is subtracted."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy import Verdict, passes
 from piezo_hysteresis.discrepancy.residual.explicit_step import KIND, explicit_model, step_changes, without_steps
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
 from piezo_hysteresis.effects import Arx, AsymmetricHysteresis, BoucWen, HysteresisExponent, PublishedBoucWen
@@ -74,44 +72,6 @@ def test_slow_records_have_many_steps_behind_every_sample():
 def test_data_of_an_explicit_step_are_recognised():
     assert explicit_model(model(BoucWen), training_data(answered(PublishedBoucWen))) is not None
     assert explicit_model(model(BoucWen), training_data(answered(BoucWen))) is None
-
-
-def state_before_the_search(records, subtracts):
-    """A diagnosis whose fitted baseline is the true model and leaves a gap."""
-    setup = SimpleNamespace(
-        training_data=training_data(records),
-        baseline=SimpleNamespace(model=model(BoucWen)),
-        score=SimpleNamespace(excess=5.0),
-    )
-    return passes.DiagnosisState(
-        Experiment(records), None, (), lambda word, part: None, subtracts_explicit_steps=subtracts, setup=setup
-    )
-
-
-def test_without_a_request_such_data_end_the_diagnosis_without_a_name():
-    found = passes.check_explicit_step(state_before_the_search(answered(PublishedBoucWen), subtracts=False))
-    assert found.verdict is Verdict.UNKNOWN and found.names == ()
-    assert "--explicit-step" in found.reason
-    (notice,) = found.experiment.notices
-    assert notice.kind == KIND and notice.severe
-
-
-def test_on_request_the_error_of_the_step_is_subtracted_before_the_search(monkeypatch):
-    monkeypatch.setattr(passes, "fit_baseline", lambda state: state)
-    before = state_before_the_search(answered(PublishedBoucWen), subtracts=True)
-    after = passes.check_explicit_step(before)
-    assert [n.kind for n in after.experiment.notices] == [KIND]
-    left = [
-        np.std(r.displacement - y)
-        for r, y in zip(after.experiment, model(BoucWen).simulate(list(before.experiment)), strict=True)
-    ]
-    assert max(left) < 2.0 * NOISE
-
-
-@pytest.mark.parametrize("subtracts", [False, True])
-def test_data_of_an_exact_loop_go_on_to_the_search_unchanged(subtracts):
-    state = state_before_the_search(answered(BoucWen), subtracts)
-    assert passes.check_explicit_step(state) is state
 
 
 def test_without_the_steps_the_exact_loop_answers():
