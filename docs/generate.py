@@ -72,10 +72,15 @@ def default(row: Parameter) -> str:
 
 
 def parameters() -> str:
-    """Symbols of all effects, in chain order."""
-    return table(
-        "effect | symbol | in code | unit | meaning",
-        ((f"`{e.name}`", p.symbol, f"`{p.name}`", p.unit, p.meaning) for e in CHAIN for p in e.parameters),
+    """Symbols of all effects, in chain order; symbols of other pages link here."""
+    return "\n".join(
+        f"### `{e.name}`\n\n"
+        + table(
+            f"symbol of [`{e.name}`](catalogue.md#{e.name}) | in code | unit | meaning",
+            ((p.symbol, f"`{p.name}`", p.unit, p.meaning) for p in e.parameters),
+        )
+        for e in CHAIN
+        if e.parameters
     )
 
 
@@ -89,7 +94,7 @@ def section(effect: type[Effect]) -> str:
         facts.append(f"needs the channel `{effect.channel}`")
     rows = (
         (
-            p.symbol,
+            f"[{p.symbol}](nomenclature.md#{effect.name})",
             f"`{p.name}`",
             p.unit,
             default(p),

@@ -98,6 +98,19 @@ def test_links_lead_somewhere(page):
     assert not dead
 
 
+def slugs(page):
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", [ROOT / "docs" / "model.md", ROOT / "docs" / "catalogue.md"], ids=name)
+def test_symbols_lead_to_their_entries(page):
+    entries = slugs(ROOT / "docs" / "nomenclature.md")
+    links = re.findall(r"\[[^\]]*\]\(nomenclature\.md#([^)]*)\)", page.read_text())
+    assert len(links) > 50
+    assert [link for link in links if link not in entries] == []
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_modules_that_are_named_exist(page):
     """Relative to the repository, to the package, or to the page."""

@@ -81,6 +81,7 @@ SEPARATED = "Zeit;Spannung;Weg\n[ms];[V];[µm]\n\n"
 def test_titles_and_a_row_of_units_above_an_empty_line(tmp_path):
     rows = np.column_stack((1e3 * TIME, VOLTAGE, 1e3 * VOLTAGE))
     pico = table(tmp_path / "pico.csv", PICOSCOPE, rows)
+    assert refused("import", pico, "-o", tmp_path / "out").endswith("e.g. displacement=3")
     words = ["--column", "displacement=Channel B [mV]", "--column", "voltage=2", "--unit", "displacement=1.2e-8"]
     done = piezo("import", pico, "-o", tmp_path / "out", *words, "--phase", "sine_1hz")
     assert done.returncode == 0, done.stderr

@@ -103,8 +103,11 @@ def resolve(titles: Sequence[str], width: int, options: ReadOptions) -> Places:
     places |= {channel: (at, unit_in(titles[at], channel)) for channel, at in found.items()}
     for channel in ("voltage", "displacement"):
         if channel not in places:
+            taken = {at for at, _ in places.values()}
+            free = next((at for at in range(1, width) if at not in taken), 1) + 1
             raise RecordingError(
-                f"got {_listed(titles, width)}, expected a column for {channel}; name it by `columns`, e.g. {channel}=2"
+                f"got {_listed(titles, width)}, expected a column for {channel}; name it by `columns`, e.g. "
+                f"{channel}={free}"
             )
     names = {channel: titles[at].strip() for channel, at in found.items()}
     return Places(places, inference_notice(names, {channel: places[channel][1] for channel in found}))
