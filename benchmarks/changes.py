@@ -44,10 +44,11 @@ LEAST = 0.95
 """Share of the changed stages whose family has to be right; of the unchanged ones none may get a name."""
 
 
-def played(stage: Nanopositioner) -> Experiment:
-    """A recording: a step from rest, a hold, growing sines, at every frequency."""
-    drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD, (0.4, 0.7, 1.0))) for f in FREQUENCIES)
-    return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
+def played(stage: Nanopositioner, triangles: bool) -> Experiment:
+    """A recording: a step from rest, a hold, growing sines or triangles, at every frequency."""
+    drives = (growing_sine(f, PERIOD, (0.4, 0.7, 1.0), triangle=triangles) for f in FREQUENCIES)
+    names = ("triangle",) * len(FREQUENCIES) if triangles else tuple(f"sine_{f:g}hz" for f in FREQUENCIES)
+    return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in zip(names, drives, strict=True)))
 
 
 def changes(day: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanopositioner]]:
@@ -74,9 +75,9 @@ def changes(day: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanop
         yield f"resonance × {factor:g}", "dynamics", (factor - 1.0) * day.mode, replace(day, mode=factor * day.mode)
 
 
-def named(model: Model, stage: Nanopositioner) -> tuple[str, float, tuple[float, float]] | None:
+def named(model: Model, stage: Nanopositioner, triangles: bool) -> tuple[str, float, tuple[float, float]] | None:
     """Family, size and interval of the change that the model's own search finds."""
-    records = played(stage).records
+    records = played(stage, triangles).records
     least = np.maximum(floors(records), float(model.provenance["free_run_error"]))
     change = find_change(model, records, range(len(records)), least.tolist())
     return None if change is None else (change.kind.family, change.size, change.interval_95)
@@ -86,6 +87,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """How many stages."""
     parser.add_argument("--stages", type=int, default=8)
     parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
+    parser.add_argument("--triangles", action="store_true", help="triangles instead of sines")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
@@ -95,11 +97,11 @@ def run(options: argparse.Namespace) -> list[Figures]:
     for seed in range(options.first, options.first + options.stages):
         rng = np.random.default_rng(seed)
         stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)))
-        model = identify(played(stage), memory=True).model
+        model = identify(played(stage, options.triangles), memory=True).model
         for _ in range(2):
-            false += named(model, stage.on_another_day(rng)) is not None
+            false += named(model, stage.on_another_day(rng), options.triangles) is not None
         for what, family, size, changed in changes(stage.on_another_day(rng)):
-            answer = named(model, changed)
+            answer = named(model, changed, options.triangles)
             right = answer is not None and answer[0] == family
             holds = error = None
             if right and size is not None and answer is not None:

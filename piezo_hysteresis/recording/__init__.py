@@ -205,6 +205,8 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     chosen.write(experiment, place)
 
 
+_SEEN = {".aws": " (the binary stream of an attocube interferometer: export it as text; its positions are in pm)"}
+"""What files of other software are, by the end of their names."""
 _BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
 """Format for each ending of a file name."""
 
@@ -226,6 +228,7 @@ def _format(path: Path, name: str | None) -> Format:
         if chosen.recognises(path):
             return chosen
     seen = "a folder" if path.is_dir() else f"a file ending '{path.suffix}'"
+    seen += _SEEN.get(path.suffix.lower(), "")
     raise RecordingError(
         f"{path}: got {seen}, not a recording this package knows; expected one of {', '.join(FORMATS)}; "
         "choose one by `format`, or export the data as text"

@@ -17,8 +17,10 @@
 import numpy as np
 import pytest
 
+from benchmarks.nanopositioner import growing_sine
 from piezo_hysteresis.identification.records.excitation_content import excitation_content
-from piezo_hysteresis.record import Record
+from piezo_hysteresis.identification.records.roles import roles_of
+from piezo_hysteresis.record import Experiment, Record
 
 
 def content(voltage, period, **options):
@@ -56,3 +58,9 @@ def test_noise_chirps_and_many_steps_are_broadband(random):
     steps = np.repeat(np.tile([0.0, 1.0], 10), 1000)
     for voltage in (random.standard_normal(20_000), 5.0 + 0.01 * random.standard_normal(20_000), chirp, steps):
         assert content(voltage, 1e-4).is_broadband
+
+
+def test_a_fast_triangle_behind_a_hold_determines_no_orders_of_dynamics():
+    drive = growing_sine(60.0, 5e-4, (0.4, 0.7, 1.0), triangle=True)
+    record = Record(drive, 1e-6 * drive, 5e-4, "triangle", initial_voltage=0.0)
+    assert roles_of(Experiment((record,))).broadband == ()

@@ -91,8 +91,11 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
     fitted = tuple(i for i in left if not is_one_of(i, CONDITIONING) and not experiment[i].truncated) or tuple(left)
     largest = max((contents[i].span for i in fitted), default=0.0)
     slow = [i for i in fitted if contents[i].is_slow and contents[i].span >= LARGE * largest > 0.0]
-    triangles = [i for i in slow if experiment[i].phase.split("_")[0] == "triangle"]
+    straight = [i for i in fitted if experiment[i].phase.split("_")[0] == "triangle"]
+    triangles = [i for i in slow if i in straight]
     moving = [i for i in fitted if contents[i].span >= LARGE * largest > 0.0]
     fastest = experiment.fastest_period
-    broadband = [i for i in fitted if contents[i].is_broadband and experiment[i].sample_period < 1.001 * fastest]
+    # a triangle turns a few times, and is straight between
+    rich = [i for i in fitted if contents[i].is_broadband and i not in straight]
+    broadband = [i for i in rich if experiment[i].sample_period < 1.001 * fastest]
     return Roles(contents, fitted, out, tuple(triangles or slow or moving), tuple(broadband))

@@ -33,6 +33,10 @@ COMMENT = ("#", "%")
 """Beginnings of comment lines."""
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d+)?Z?")
 """A date with time of day."""
+_CLOCK = re.compile(r"(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+"""A time of day, as instruments write it beside a column of dates."""
+_MIDNIGHT = 2.0**27
+"""Time from which times of day count [s]: large as that of a date, so that a table begins at its first row."""
 _YEAR_2000 = np.datetime64("2000-01-01", "ns")
 """Date from which times are counted."""
 
@@ -132,6 +136,8 @@ def number_in(cell: str, comma: bool) -> float | None:
     try:
         return float(cell.replace(",", ".") if comma else cell)
     except ValueError:
+        if clock := _CLOCK.fullmatch(cell):
+            return _MIDNIGHT + 3600.0 * int(clock[1]) + 60.0 * int(clock[2]) + float(clock[3].replace(",", "."))
         return _seconds(cell) if _STAMP.fullmatch(cell) else None
 
 

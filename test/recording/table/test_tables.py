@@ -285,6 +285,10 @@ ROWS = [(k / 100, round(5.0 - 5.0 * math.cos(k / 50), 4), round(7.0 - 7.0 * math
         ("Time,Drive,Position\nms,mV,nm\n", lambda t, u, y: f"{1e3 * t:.0f},{1e3 * u:.1f},{1e3 * y:.1f}"),
         ("timestamp,voltage (V),Weg [µm]\n", lambda t, u, y: f"2024-03-12 10:00:{t:06.3f},{u},{y}"),
         (
+            "Date;Time;Position 1 [pm];DAC [V]\n",
+            lambda t, u, y: f"2024-03-12;10:00:{t:06.3f};{1e6 * y:.0f};{u}",
+        ),
+        (
             '"t [ms]","Piezo (V)","Sensor (nm)","Target (nm)"\n',
             lambda t, u, y: f'"{1e3 * t:.0f}","{u}","{1e3 * y}","0"',
         ),
@@ -294,7 +298,7 @@ ROWS = [(k / 100, round(5.0 - 5.0 * math.cos(k / 50), 4), round(7.0 - 7.0 * math
             lambda t, u, y: f"{t:.3f}\t{u}\t{y}\t",
         ),
     ],
-    ids=["row of units", "dates", "quoted", "LabVIEW"],
+    ids=["row of units", "dates", "times of day", "quoted", "LabVIEW"],
 )
 def test_files_as_instruments_write_them(head, row, tmp_path):
     path = tmp_path / "r.lvm"
@@ -304,3 +308,10 @@ def test_files_as_instruments_write_them(head, row, tmp_path):
     assert record.start_time == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(record.voltage, [u for _, u, _ in ROWS], atol=1e-9)
     np.testing.assert_allclose(record.displacement, [1e-6 * y for _, _, y in ROWS], atol=1e-14)
+
+
+def test_the_stream_of_an_interferometer_is_named(tmp_path):
+    path = tmp_path / "run.aws"
+    path.write_bytes(b"\0\1\2" * 100)
+    with pytest.raises(RecordingError, match="attocube"):
+        read(path)
