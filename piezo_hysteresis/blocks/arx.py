@@ -24,10 +24,10 @@ from .kernel import fma, kernel
 from .linear import LinearBlock
 
 ORDER = 8
-"""Taps and feedback go in groups of this many, padded with zeros: eight numbers stay in registers."""
+"""Taps and feedback are padded with zeros to multiples of this number, because eight numbers stay in registers."""
 
 TILE = 1024
-"""Samples that go through taps and feedback together, so that they stay in the first cache."""
+"""Number of samples that pass taps and feedback together, so that they stay in the first-level cache."""
 
 
 def lagrange(fraction: float) -> tuple[Array, Array]:

@@ -53,7 +53,7 @@ else:
         return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
 
     def inlined(function: F) -> F:
-        """A kernel of one sample that is compiled into the loops that call it: no call, and no wait for one."""
+        """A kernel of one sample that is compiled into the loops that call it: this avoids the cost of a call."""
         return numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)(function)
 
     @intrinsic

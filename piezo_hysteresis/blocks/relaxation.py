@@ -27,7 +27,7 @@ from .kernel import kernel
 from .linear import AddedBlock
 
 LANES = 4
-"""Elements that are advanced together; their number is filled up to a multiple of it."""
+"""Number of elements that are computed together; the elements are padded to a multiple of it."""
 
 
 class Hold(NamedTuple):

@@ -34,7 +34,7 @@ from .options.stage_option import add_stage_arguments, diagnose_stage
 from .terminal import console, progress, show, show_notices
 
 USUAL_TIME = "5 s to 2 min"
-"""How long it takes, as `docs/performance.md` measures it, on a busy computer too."""
+"""Usual duration, also on a busy computer; `docs/performance.md` measures it."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     PiezoError
-        On bad input, or data that do not even determine a baseline.
+        If the input is invalid, or the data do not determine a baseline.
     """
     live = None if args.stage is None else _of_stage(args)
     found = _of_recording(args) if live is None else live.found

@@ -16,7 +16,7 @@
 
 The C files need a C99 compiler and nothing else: a header, a source, and a self-test that compares the source with the
 model. They hold the prediction and, where the model has one, the inverse with the limits of the drive inside. Every
-effect of the catalogue can be written. The program is right for the sample period of the model only.
+effect of the catalogue can be written. The program is valid only at the sample period of the model.
 
 Co-simulation units (FMI 3.0) hold the same code for Simulink, Dymola, OpenModelica and others, with a library for this
 computer where it has a C compiler.

@@ -88,12 +88,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Find, work, write; returns 0, or 1 where a recording has no result.
+    """Find the recordings, process them, and write the results; returns 1 where a recording has no result, otherwise 0.
 
     Raises
     ------
     PiezoError
-        On options that make no sense, or places that cannot be reached.
+        If options are invalid, or places cannot be reached.
     """
     if not args.time_limit > 0.0:
         raise ParameterError(f"--time-limit: got {args.time_limit:g} s, expected more than 0 s")
@@ -114,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _worked(args: argparse.Namespace, folder: Path) -> int:
-    """Recordings that have no result after the run."""
+    """Process the recordings; returns those without a result."""
     model = "" if args.model is None else model_file.dumps(model_file.load(args.model))
     work = work_for(args.task, model, args.hysteresis)
     reading = reading_options.keywords(args)

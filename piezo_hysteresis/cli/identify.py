@@ -35,7 +35,7 @@ from .options.destination import add_results, require_new_results
 from .terminal import console, progress, show, show_notices
 
 USUAL_TIME = "2 s to 1 min"
-"""How long it takes, as `docs/performance.md` measures it, on a busy computer too."""
+"""Usual duration, also on a busy computer; `docs/performance.md` measures it."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     PiezoError
-        On bad input, or data that do not determine the model.
+        If the input is invalid, or the data do not determine the model.
     """
     require_new_results(args)
     experiment = reading_options.read(args)
@@ -120,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def verdict_line(found: Identification) -> str:
-    """What came out, in one sentence."""
+    """The result in one sentence."""
     fit, percent = found.fit, found.free_run_percent
     if not fit.converged:
         return (

@@ -72,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _print_error(error, NOT_IDENTIFIABLE)
     except (PiezoError, OSError) as error:
         if isinstance(error, BrokenPipeError):
-            # the reader of our output has gone: leave nothing for the interpreter to flush
+            # the reader of the output has ended: leave nothing for the interpreter to flush
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return BROKEN_PIPE
         return _print_error(error, BAD_INPUT)

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     PiezoError
-        On bad input, or records in which nothing moves.
+        If the input is invalid, or the stage does not move in the records.
     """
     require_new_results(args)
     model = model_file.load(args.model)

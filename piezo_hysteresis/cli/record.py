@@ -14,8 +14,8 @@
 
 """``piezo record``: play a protocol to a stage and record it, without ROS.
 
-STAGE.yaml is a parameter file of the driver (config/driver.yaml): which back end, its parameters, the limits. The same
-checks, limits and locks hold as in the driver node. Ctrl-C brings the stage to its safe voltage.
+STAGE.yaml is a parameter file of the driver (config/driver.yaml): back end, its parameters, and limits. Checks, limits
+and locks are those of the driver node. Ctrl-C brings the stage to its safe voltage.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Declare the subcommand."""
     parser = subparsers.add_parser("record", description=__doc__)
     parser.add_argument("stage", metavar="STAGE.yaml", type=Path, help="parameter file of the driver")
-    parser.add_argument("protocol", choices=tuple(PROTOCOLS), help="what is played")
+    parser.add_argument("protocol", choices=tuple(PROTOCOLS), help="protocol to play")
     parser.add_argument("-o", "--output", metavar="FOLDER", required=True, help="experiment to write")
-    parser.add_argument("--seed", type=int, default=0, help="of everything random in the protocol (default: 0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the random waveforms (default: 0)")
     parser.set_defaults(run=run)
 
 
@@ -55,10 +55,10 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     PiezoError
-        On a file, a stage, limits or a folder that are not acceptable; the stage is at its safe voltage then.
+        If a file, a stage, limits or a folder is not acceptable. The stage is then at its safe voltage.
     """
     settings, values = read_stage(args.stage)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the stage is made safe
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the stage goes to its safe voltage
     session = DriverSession(settings, values, f"a recording with {args.stage.resolve()}")
     try:
         protocol = PROTOCOLS[args.protocol](drive_limits(session), args.seed)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What `piezo identify` and `piezo validate` do with records of several drive voltages."""
+"""`piezo identify` and `piezo validate` for records of several drive voltages."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def validate(experiment: Experiment, args: argparse.Namespace) -> int:
     Raises
     ------
     PiezoError
-        On a model or records that cannot be used, or that do not fit each other.
+        If the model or the records cannot be used, or do not fit each other.
     """
     records: Sequence[Record] = experiment.records
     _show(axes_errors(axes_file.load(args.model), records), "", args.json)

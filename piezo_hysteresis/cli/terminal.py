@@ -32,13 +32,13 @@ from ..record import Notice
 from ..report.tables.table import Table
 
 WIDTH = 10_000
-"""Columns where standard output is no terminal: a table takes the width that it needs, and no word is broken."""
+"""Width of the output to a file [characters]: tables take the width that they need, and no word is broken."""
 LINE_INTERVAL = 10.0
-"""Time between two lines of progress where standard error is no terminal [s]."""
+"""Time between two lines of progress in a file [s]."""
 
 
 def console() -> Console:
-    """Standard output; plain text where it is no terminal."""
+    """Standard output; plain text where it is not a terminal."""
     width = None if sys.stdout.isatty() else max(WIDTH, shutil.get_terminal_size().columns)
     return Console(file=sys.stdout, highlight=False, markup=False, width=width, soft_wrap=True)
 
@@ -70,19 +70,19 @@ def show_notices(notices: Iterable[Notice]) -> None:
 
 @contextmanager
 def progress(task: str, expected: str = "") -> Iterator[Callable[[str, float], None]]:
-    """What is being done, on standard error, while something takes long: a bar, or without a terminal a line each 10 s.
+    """Show the progress of a long task on standard error: a bar, or without a terminal a line every 10 s.
 
     Parameters
     ----------
     task : str
-        What is done, e.g. ``"identify"``.
+        Name of the task, e.g. ``"identify"``.
     expected : str
-        How long it usually takes, said at the start.
+        Usual duration, printed at the start.
 
     Yields
     ------
     callable
-        To be called with a word and a fraction.
+        Function of a word and the fraction done.
     """
     if expected:
         print(f"{task}: {expected}", file=sys.stderr, flush=True)
@@ -109,7 +109,7 @@ def progress(task: str, expected: str = "") -> Iterator[Callable[[str, float], N
 
 @contextmanager
 def _lines(task: str) -> Iterator[Callable[[str, float], None]]:
-    """A line every `LINE_INTERVAL`, also while one step takes longer than that."""
+    """Print a line every `LINE_INTERVAL`, also during a longer step."""
     began, ended = time.monotonic(), threading.Event()
     latest = ("", 0.0)
 

@@ -108,7 +108,7 @@ def answer(comparison: ModelComparison, tests: list[dict[str, Any]]) -> dict[str
                 "fit_percent": row.fit,
                 "floor_m": float(comparison.floors[row.index]),
             }
-            for row in now.judged  # not the way into the first full loop
+            for row in now.judged  # without the part before the first full loop
         ],
         "percent_of_range_by_frequency": {f"{f:g}": percent for f, percent in now.by_frequency.items()},
         "residual_tests": tests,

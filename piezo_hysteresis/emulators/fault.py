@@ -31,13 +31,13 @@ class Fault:
     kind : str
         Key of a `FaultCatalogue`.
     command : str
-        Command or call at which it strikes, in capitals; empty for a lasting fault that is there from the start.
+        Command or call at which it occurs, in capitals; empty for a lasting fault that is present from the start.
     occurrence : int
-        Strikes when the command comes for the so-manieth time.
+        Number of the occurrence of the command at which the fault occurs.
     value : float
-        What the kind needs: seconds, an error number.
+        Value for the kind: seconds, or an error number.
     lasts : bool
-        False where it strikes once, True where it is there from then on.
+        False where it occurs once, True where it lasts from then on.
     """
 
     kind: str
@@ -110,7 +110,7 @@ class Faults:
         self._active = {f.kind for f in self._faults if not f.command}
 
     def count(self, command: str) -> dict[str, float]:
-        """Note a command; the kinds of the faults that strike once at it, with their values."""
+        """Count a command, and return the kinds of the single faults that occur at it, with their values."""
         name = command.upper()
         count = self._counts[name] = self._counts.get(name, 0) + 1
         struck = [f for f in self._faults if f.command == name and f.occurrence == count]
@@ -118,5 +118,5 @@ class Faults:
         return {f.kind: f.value for f in struck if not f.lasts}
 
     def lasts(self, kind: str) -> bool:
-        """True while a lasting fault is there."""
+        """True while a lasting fault is present."""
         return kind in self._active

@@ -30,7 +30,7 @@ _NAMES = tuple(f.name for f in fields(AxesModel) if f.init)
 
 
 def save(model: AxesModel, path: str | Path) -> Path:
-    """Write a model file, whole or not at all; returns its path.
+    """Write a model file, which appears only when it is complete; returns its path.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def load(path: str | Path) -> AxesModel:
     Raises
     ------
     ModelError
-        If there is no such file, or it is no model of several axes.
+        If there is no such file, or it is not a model of several axes.
     """
     path = Path(path).expanduser()
     try:

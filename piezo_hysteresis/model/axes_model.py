@@ -32,7 +32,7 @@ LINEAR_TERMS = 3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AxesState:
-    """What an `AxesModel` carries from one block to the next.
+    """State of an `AxesModel` between two blocks.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class AxesModel:
     Raises
     ------
     ModelError
-        On shapes that do not fit each other, numbers that are not finite, or scales that are not positive.
+        If shapes do not fit each other, numbers are not finite, or scales are not positive.
     """
 
     taps: Array
@@ -121,7 +121,7 @@ class AxesModel:
 
     @property
     def settling(self) -> int:
-        """Samples after which a start from rest in the middle of a motion is forgotten, but for slow plays."""
+        """Number of samples after which a wrong start from rest no longer matters, apart from slow plays."""
         return int(self.taps.shape[0] * self.taps.shape[2] + 5 * self.memory / self.sample_period)
 
     def rest(self) -> AxesState:
@@ -165,7 +165,7 @@ class AxesModel:
         return y + self.zero, AxesState(power, history[:, kept:].copy(), plays)
 
     def regressors(self, voltages: Array) -> Array:
-        """Regressors φ of the last pass from rest [V], shape (n, f): what an identification multiplies with taps."""
+        """Regressors φ of the last pass from rest [V], shape (n, f); the output is linear in them."""
         _, history, _, _ = self._follow(np.array(voltages, dtype=np.float64, order="C"), self.rest())
         return history[-1, self.taps.shape[2] - 1 :].copy()
 

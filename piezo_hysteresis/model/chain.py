@@ -37,15 +37,15 @@ Array = NDArray[np.float64]
 Channels = Mapping[str, Array]
 
 RUNAWAY = 1e9
-"""Displacement scales beyond which a simulation counts as diverged."""
+"""Displacement, in displacement scales, beyond which a simulation counts as diverged."""
 
 BLOCK = 32768
-"""Samples that go through the whole chain together, so that they stay in the cache of the processor."""
+"""Number of samples that are processed together by the whole chain, so that they stay in the processor's cache."""
 
 
 @dataclass(frozen=True, slots=True)
 class ChainState:
-    """What a chain carries from one block of samples to the next."""
+    """State of a chain between two blocks of samples."""
 
     blocks: tuple[State, ...]
     inputs: tuple[float, ...]
@@ -58,7 +58,7 @@ class ChainState:
 
 @dataclass(frozen=True, slots=True)
 class ChainTangent:
-    """What the sensitivities carry from one block of samples to the next."""
+    """State of the sensitivities between two blocks of samples."""
 
     blocks: tuple[State, ...]
     inputs: tuple[Array, ...]
@@ -103,7 +103,7 @@ class Chain:
         self.channels = frozenset(b.channel for b in self.blocks if isinstance(b, ChannelBlock))
         """Names of the extra channels that are used."""
         first, last = self.blocks[0], self.blocks[-1]
-        # changes of unit at the ends are made where samples are taken in and handed out
+        # the changes of unit at both ends are done with the input and output checks
         self._factor_in, begin = (first.factor, 1) if isinstance(first, ChangeOfUnit) else (1.0, 0)
         self._factor_out, end = (last.factor, -1) if isinstance(last, ChangeOfUnit) else (1.0, None)
         self._inner = range(len(self.blocks))[begin:end]
@@ -129,7 +129,7 @@ class Chain:
         return ChainTangent(tuple(states), tuple(inputs))
 
     def resume(self, state: ChainState) -> ChainState:
-        """Take over from a chain at another sample period: memories pass on, filters start settled."""
+        """Continue from a chain at another sample period: memories keep their states, filters start settled."""
         states = tuple(
             s if block.keeps_state else block.rest(x, state.time)
             for block, s, x in zip(self.blocks, state.blocks, state.inputs, strict=True)
@@ -161,10 +161,10 @@ class Chain:
         ModelError
             On samples that are not finite.
         DivergenceError
-            With effect, sample and time of the first runaway.
+            With effect, sample and time of the first divergence.
         """
         y = np.empty(u.size)
-        copy = not (u.flags.c_contiguous and u.flags.writeable)  # another array type would compile the kernels anew
+        copy = not (u.flags.c_contiguous and u.flags.writeable)  # another array type would compile the kernels again
         for start in range(0, u.size, BLOCK):
             part = slice(start, start + BLOCK)
             here = u[part].copy() if copy else u[part]

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 HOLD_STEPS = 8
-"""Steps in which the time between two records that continue is gone through."""
+"""Number of steps over the time between two records that continue."""
 
 
 def free_run(model: Model, records: Iterable[Record]) -> list[Array]:
@@ -126,7 +126,7 @@ def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
 
 
 def _in_one_go(records: Iterable[Record], sample_period: float) -> Iterator[tuple[int | None, Record]]:
-    """Records with their index, and without one the holds between continuing records, in which creep goes on."""
+    """Records with their index, and without an index the holds between them, during which creep continues."""
     before: Record | None = None
     for index, record in enumerate(records):
         if before is not None and record.continues:

@@ -220,7 +220,7 @@ class Model:
         ModelError
             On empty or non-finite samples, and on a period shorter than the model's.
         DivergenceError
-            If the output runs away.
+            If the output diverges.
         """
         chain = self.at(sample_period or state.sample_period)
         if chain.setting.sample_period != state.sample_period:
@@ -283,7 +283,7 @@ class Model:
         return standard_errors(self, records)
 
     def free_run(self, records: Iterable[Record]) -> list[Array]:
-        """As `simulate`, of any records, without a word about where the first one begins."""
+        """As `simulate`, without the warning about the start of the first record."""
         return free_run(self, records)
 
     def linearise(

@@ -14,8 +14,8 @@
 
 """`model_file`: a `Model` as the parameter YAML that nodes, people and the CLI share.
 
-Strict under ``model.``, blind to everything else: a ``ros2 param dump`` of the identification node is a valid model
-file, and a model file is a valid ``--params-file``. Units stand in the comments; all are SI.
+Everything under ``model.`` is checked, and all other entries are ignored: a ``ros2 param dump`` of the identification
+node is a valid model file, and a model file is a valid ``--params-file``. Units stand in the comments; all are SI.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def loads(text: str, source: str = "model file") -> Model:
 
 
 def save(model: Model, path: str | Path) -> Path:
-    """Write a model file, whole or not at all; returns its path.
+    """Write a model file, which appears only when it is complete; returns its path.
 
     Raises
     ------

@@ -32,7 +32,7 @@ from .parameter_covariance import ParameterCovariance
 from .parameter_file import Entry, entry
 
 PREFIX = "model."
-"""Where a model lives among the parameters of a node."""
+"""Prefix of a model among the parameters of a node."""
 
 COVARIANCE = "covariance."
 """Name of the covariance of the parameters, below the prefix."""
@@ -87,7 +87,7 @@ def from_parameters(values: Mapping[str, object], source: str = "model") -> Mode
     values : mapping
         Parameter name to value, as from `to_parameters` or a node.
     source : str
-        What to call the set in messages.
+        Name of the set in messages.
 
     Raises
     ------

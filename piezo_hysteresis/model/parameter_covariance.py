@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ParameterCovariance`: how uncertain the numbers of a model are together, and how a model file holds it.
+"""`ParameterCovariance`: the covariance of the numbers of a model, and its form in a model file.
 
 `response_error` says how uncertain they make the frequency response.
 """

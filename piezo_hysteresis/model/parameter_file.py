@@ -32,15 +32,15 @@ Scalar = bool | int | float | str
 Entry = Scalar | list[Scalar]
 
 _TRUE = {"y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
-"""What rcl reads as true."""
+"""Words that rcl reads as true."""
 _FALSE = {"n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
-"""What rcl reads as false."""
+"""Words that rcl reads as false."""
 _INTEGER = re.compile(r"[-+]?(0[xX][0-9a-fA-F]{1,15}|[0-9]{1,18})")  # longer ones are doubles to rcl
-"""What rcl reads as an integer."""
+"""Texts that rcl reads as an integer."""
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.?[0-9]*)([eE][-+]?[0-9]+)?")
-"""What rcl reads as a double."""
+"""Texts that rcl reads as a double."""
 _SPECIAL = re.compile(r"([-+]?)\.(inf|Inf|INF|nan|NaN|NAN)")
-"""What rcl reads as infinity, or as not a number."""
+"""Texts that rcl reads as infinity, or as not a number."""
 
 
 LONGEST_TEXT = 1_000_000
@@ -92,7 +92,7 @@ def parameters(text: str, source: str = "parameter file") -> dict[str, dict[str,
     text : str
         YAML.
     source : str
-        What to call the file in messages.
+        Name of the file in messages.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def parameters(text: str, source: str = "parameter file") -> dict[str, dict[str,
 
 
 def _require_plain(text: str, source: str) -> None:
-    """Neither deep nor long nor with aliases, as rcl: a few aliases in one another stand for a text without end."""
+    """Refuse deep or long files and, as rcl does, aliases: a few nested aliases can stand for an endless text."""
     depth = 0
     for number, event in enumerate(yaml.parse(text, Loader=_LOADER)):
         if number > _MOST_EVENTS:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`provenance`: what a model file says about where its values come from."""
+"""`provenance`: the origin of the values of a model, as its file states it."""
 
 from __future__ import annotations
 

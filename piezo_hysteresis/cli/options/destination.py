@@ -31,9 +31,9 @@ def add_results(parser: argparse.ArgumentParser, **contents: str) -> None:
     Parameters
     ----------
     parser : argparse.ArgumentParser
-        Of the subcommand.
+        Parser of the subcommand.
     **contents : str
-        What is written, by the name of the option: ``figures``, ``report``, ``json``.
+        Help text for every option: ``figures``, ``report``, ``json``.
     """
     for name, content in contents.items():
         parser.add_argument(f"--{name}", metavar="FOLDER" if name == "figures" else "FILE", help=content)
@@ -46,7 +46,7 @@ def add_force(parser: argparse.ArgumentParser) -> None:
 
 
 def require_new_results(args: argparse.Namespace) -> None:
-    """Refuse output files that exist, and a folder for figures that has something in it, unless ``--force`` is given.
+    """Refuse existing output files and a folder for figures that is not empty, unless ``--force`` is given.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def require_new_file(option: str, path: str | None, force: bool | None = None) -
     option : str
         What the user typed before it, e.g. ``"--truth"``.
     path : str or None
-        The file; None where none was asked for.
+        The file; None where the option was not given.
     force : bool, optional
         Whether ``--force`` was given; None where the command does not have it.
 
@@ -91,7 +91,7 @@ def require_new_file(option: str, path: str | None, force: bool | None = None) -
 
 
 def require_new_experiment(option: str, path: str) -> None:
-    """Refuse a place where an experiment cannot be written because something is there.
+    """Refuse a place for an experiment that is not empty.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def require_new_experiment(option: str, path: str) -> None:
     Raises
     ------
     RecordingError
-        If it exists and is no empty folder.
+        If it exists and is not an empty folder.
     """
     place = Path(path).expanduser()
     place = place.with_suffix("") if place.suffix == ".mcap" else place
@@ -113,21 +113,21 @@ def require_new_experiment(option: str, path: str) -> None:
 
 
 def require_new_folder(option: str, path: str | None, force: bool) -> None:
-    """Refuse a folder that has something in it.
+    """Refuse a folder that is not empty.
 
     Parameters
     ----------
     option : str
         What the user typed before it, e.g. ``"--figures"``.
     path : str or None
-        The folder; None where none was asked for.
+        The folder; None where the option was not given.
     force : bool
         Whether files in it may be replaced.
 
     Raises
     ------
     RecordingError
-        If it is a file, or holds something.
+        If it is a file or not empty.
     """
     if path is None:
         return

@@ -37,12 +37,12 @@ def add_plant_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def plant(args: argparse.Namespace) -> tuple[PlantParameters, dict[str, Any]]:
-    """The plant asked for, and what was hidden in it: ``name`` and ``changes``.
+    """The chosen plant, and its hidden effect: ``name`` and ``changes``.
 
     Raises
     ------
     ParameterError, RecordingError
-        On a file or an option that is not acceptable.
+        If a file or an option is not acceptable.
     """
     parameters = _read(args.plant)
     if args.noise is not None:

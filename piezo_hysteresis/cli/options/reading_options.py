@@ -34,7 +34,7 @@ ROWS_BEFORE = 1 << 20
 
 
 def add_arguments(parser: argparse.ArgumentParser, needs_experiment: bool = True) -> None:
-    """Declare the experiment and what the file may not say about itself."""
+    """Declare the experiment and the options for reading it."""
     parser.add_argument(
         "experiment",
         metavar="EXPERIMENT",
@@ -45,12 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser, needs_experiment: bool = True
 
 
 def add_reading_group(parser: argparse.ArgumentParser) -> None:
-    """Declare what a file may not say about itself."""
+    """Declare options for information that a file may lack."""
     group = parser.add_argument_group("options for reading, if the recording does not contain the information")
     group.add_argument(
         "--format",
         choices=tuple(recording.FORMATS),
-        help="format of the file (default: chosen by the look of the path)",
+        help="format of the file (default: inferred from the path)",
     )
     group.add_argument("--axis", metavar="NS", help="namespace of one stage in a bag of several, e.g. /stage_x")
     group.add_argument(
@@ -108,7 +108,7 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
 
 
 def read(args: argparse.Namespace, rows_before: int = ROWS_BEFORE) -> Experiment:
-    """The experiment that the arguments name.
+    """Read the experiment that the arguments name.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def read(args: argparse.Namespace, rows_before: int = ROWS_BEFORE) -> Experiment
     Raises
     ------
     RecordingError, RecordError
-        If it cannot be read, or an option makes no sense.
+        If it cannot be read, or an option is invalid.
     """
     try:
         experiment = recording.read(*args.experiment, rows_before=rows_before, **keywords(args))
@@ -137,7 +137,7 @@ def keywords(args: argparse.Namespace) -> dict[str, Any]:
     Raises
     ------
     RecordingError
-        If an option makes no sense.
+        If an option is invalid.
     """
     return {
         "format": args.format,

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``piezo diagnose --stage``: the gap finder plays what it needs to a stage, and stops when the answer is sure."""
+"""``piezo diagnose --stage``: the gap finder plays phases to a stage, and stops when the answer is sure."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ from ..terminal import console, progress, show
 from .destination import require_new_experiment
 
 FASTEST = 1000.0
-"""Speed of a stage that is given by a file of plant parameters alone; 1 is real time."""
+"""Speed of a stage given only by a file of plant parameters; 1 is real time."""
 
 
 def add_stage_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare ``--stage``, ``--error-rate``, ``--stage-time`` and ``--seed``."""
-    group = parser.add_argument_group("diagnosis of a stage that is driven meanwhile, instead of a recording")
+    group = parser.add_argument_group("drive a stage during the diagnosis, instead of reading a recording")
     group.add_argument(
         "--stage",
         metavar="FILE",
@@ -63,11 +63,11 @@ def add_stage_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help=f"longest time for which the stage is driven [s] (default: {LONGEST:g})",
     )
-    group.add_argument("--seed", type=int, default=0, help="of everything random in the phases (default: 0)")
+    group.add_argument("--seed", type=int, default=0, help="seed of the random waveforms (default: 0)")
 
 
 def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
-    """Play, record and decide, until the answer is sure; the recording is written whatever happens.
+    """Play, record and decide until the answer is sure. The recording is written also after an error.
 
     Parameters
     ----------
@@ -77,13 +77,13 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
     Raises
     ------
     PiezoError
-        On a file, a stage, limits or a folder that are not acceptable; the stage is at its safe voltage then.
+        If a file, a stage, limits or a folder is not acceptable. The stage is then at its safe voltage.
     """
     if args.output is None:
         raise ParameterError("diagnose --stage: got no -o, expected the folder of the experiment to write")
     require_new_experiment("-o", args.output)
     session = _open(Path(args.stage).expanduser())
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the stage is made safe
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the stage goes to its safe voltage
     records: list[Record] = []
     try:
         live = begin(
@@ -123,7 +123,7 @@ def _open(path: Path) -> DriverSession:
 
 
 def _show_plan(session: DriverSession, live: LiveDiagnosis) -> None:
-    """What may be played, before anything moves."""
+    """Print the phases that may be played, before the stage moves."""
     out = console()
     whole = Protocol("plan", live.limits, tuple(p for tier in live.plan for p in tier.phases))
     out.print(f"{session.limits.name}\nplan: {whole.summary}", highlight=False)
@@ -144,7 +144,7 @@ def _played(session: DriverSession, live: LiveDiagnosis, before: list[Record], s
 
 
 def _clock(session: DriverSession, records: list[Record], started: float) -> float:
-    """Time at which the next phase begins [s]: a simulated stage stands still while nothing is played."""
+    """Time at which the next phase begins [s]. The time of a simulated stage does not pass between phases."""
     if not records:
         return 0.0
     end = records[-1].start_time + records[-1].duration

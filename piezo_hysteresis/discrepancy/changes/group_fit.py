@@ -170,10 +170,10 @@ class _Fit:
         change, model, scores = np.zeros(len(GROUPS)), self._model, self._before
         deviation = np.zeros(len(GROUPS))
         for _ in range(TURNS):
-            gram, pull = self._equations(scores)
+            gram, gradient = self._equations(scores)
             inverse = np.linalg.pinv(_scaled(gram, free), hermitian=True)
             size = np.sqrt(np.diag(gram)[free])
-            step = inverse @ (pull[free] / size) / size
+            step = inverse @ (gradient[free] / size) / size
             variance = np.diag(inverse) * self._known[free] / size**2
             deviation[free] = np.sqrt(variance + self._main.wander[free])
             change[free] += step
@@ -208,16 +208,16 @@ class _Fit:
         return self._baseline.scatter[drive_class(score)]
 
     def _equations(self, scores: Sequence[ChangeScore]) -> tuple[Array, Array]:
-        gram, pull = np.zeros((len(GROUPS), len(GROUPS))), np.zeros(len(GROUPS))
+        gram, gradient = np.zeros((len(GROUPS), len(GROUPS))), np.zeros(len(GROUPS))
         for score in scores:
-            own, weight = self._scatter(score).pull(score)
+            own, weight = self._scatter(score).gradient(score)
             gram += weight
-            pull += own
-        return gram, pull
+            gradient += own
+        return gram, gradient
 
     def _remaining(self, scores: Sequence[ChangeScore], fitted: Sequence[int]) -> str:
         """The group that the watch would report after the fit; empty for none."""
-        gram, pull = self._equations(scores)
+        gram, gradient = self._equations(scores)
         worst, name = 1.0, ""
         inner = np.linalg.pinv(gram[np.ix_(fitted, fitted)], hermitian=True)
         for k, group in enumerate(GROUPS):
@@ -227,7 +227,7 @@ class _Fit:
             weight = gram[k, k] - beside @ inner @ beside
             if weight < APART * gram[k, k]:
                 continue
-            own = pull[k] - beside @ inner @ pull[fitted]
+            own = gradient[k] - beside @ inner @ gradient[fitted]
             window = min(1.0, WINDOW / len(scores))
             known = self._known[k] + window * weight * self._main.wander[k]
             statistic = window * own**2 / weight / known / self._threshold
@@ -243,13 +243,13 @@ class _Fit:
     def _onset(self, scores: Sequence[ChangeScore], group: str) -> int:
         """The score with which a step of a group, and of the offset, most probably began."""
         free = sorted({GROUPS.index(group), _OFFSET})
-        gram, pull = np.zeros((len(GROUPS), len(GROUPS))), np.zeros(len(GROUPS))
+        gram, gradient = np.zeros((len(GROUPS), len(GROUPS))), np.zeros(len(GROUPS))
         best, begun = -np.inf, len(scores)
         for k in reversed(range(len(scores))):
-            own, weight = self._scatter(scores[k]).pull(scores[k])
-            gram, pull = gram + weight, pull + own
+            own, weight = self._scatter(scores[k]).gradient(scores[k])
+            gram, gradient = gram + weight, gradient + own
             size = np.sqrt(np.maximum(np.diag(gram)[free], np.finfo(np.float64).tiny))
-            scaled = pull[free] / size
+            scaled = gradient[free] / size
             gain = float(scaled @ np.linalg.pinv(_scaled(gram, free), hermitian=True) @ scaled)
             if gain > best:
                 best, begun = gain, k

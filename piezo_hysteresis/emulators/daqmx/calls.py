@@ -78,7 +78,7 @@ class Calls:
         return [name for name in dir(self) if name[0].isupper()]
 
     def strike(self, name: str) -> dict[str, float]:
-        """Note a call; the faults that strike once at it, with their values."""
+        """Count a call, and return the single faults that occur at it, with their values."""
         with self._turn:
             return self._card.faults.count(name)
 
@@ -88,7 +88,7 @@ class Calls:
             self._card.underflow()
 
     def end(self) -> None:
-        """Keep nobody waiting any more, and end the tasks: the card stops where it is."""
+        """End all waits and tasks; the card stops at its present voltage."""
         self._ended.set()
         with self._turn:
             self._card.stop()

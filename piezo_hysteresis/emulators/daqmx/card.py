@@ -94,7 +94,7 @@ class Card:
 
     @property
     def available(self) -> int:
-        """Samples of every input that wait to be read."""
+        """Number of samples of every input that can be read."""
         self._advance()
         return int(self._acquired.shape[1])
 
@@ -164,7 +164,7 @@ class Card:
         return inputs[[INPUTS.index(channel) for channel in channels]]
 
     def _advance(self) -> None:
-        """Play what is due."""
+        """Play the samples that are due."""
         if not self.is_running:
             return
         if math.isinf(self._speed):

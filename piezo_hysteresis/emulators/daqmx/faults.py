@@ -30,9 +30,9 @@ FAULTS = FaultCatalogue(
         "device_lost": (_IN_A_STREAM, "the card is unplugged for one call"),
         "underflow": (_IN_A_STREAM, "the output buffer runs empty"),
         "late": (_IN_A_STREAM, "samples come later than the time-out of the read"),
-        "short_read": (_IN_A_STREAM, "fewer samples come than were asked for"),
+        "short_read": (_IN_A_STREAM, "fewer samples come than requested"),
         "duplicated": (_IN_A_STREAM, "the samples of the read before come again"),
-        "garbled": (_IN_A_STREAM, "one sample is no number"),
+        "garbled": (_IN_A_STREAM, "one sample is not a number"),
     },
     lasting={
         "wrong_clock": "samples at half the requested rate, and reports that rate",

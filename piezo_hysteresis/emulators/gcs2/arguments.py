@@ -30,7 +30,7 @@ Command = Callable[[list[str]], list[str] | None]
 
 
 def groups(arguments: list[str], size: int) -> list[list[str]]:
-    """Arguments that belong together, `size` at a time."""
+    """Arguments in groups of `size`."""
     if not arguments or len(arguments) % size:
         raise Refusal(WRONG_COUNT)
     return [arguments[i : i + size] for i in range(0, len(arguments), size)]
@@ -51,7 +51,7 @@ def channels(arguments: list[str]) -> list[int]:
 
 
 def tables(arguments: list[str], known: range) -> list[int]:
-    """Recorder tables asked for; all that are known where none is named."""
+    """Requested recorder tables; all if none is named."""
     chosen = [int(table) for table in arguments] or list(known)
     if not set(chosen) <= set(known):
         raise Refusal(NO_RECORDER_TABLE)

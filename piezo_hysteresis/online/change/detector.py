@@ -99,15 +99,15 @@ class ChangeDetector:
         scatter = self._baseline.scatter.get(key)
         if scatter is None or not scatter.excited.any():
             return Change()
-        pull, weight = scatter.pull(score)
+        gradient, weight = scatter.gradient(score)
         if self._unlearnt:
             self._unlearnt -= 1
-            self._offset += pull[_OFFSET]
+            self._offset += gradient[_OFFSET]
             self._offset_weight += weight[_OFFSET, _OFFSET]
             return Change(watched=True)
         if self._offset_weight:
-            pull = pull - weight[:, _OFFSET] * (self._offset / self._offset_weight)
-        self._window.append((pull, np.diag(weight), score.stamp, scatter.count))
+            gradient = gradient - weight[:, _OFFSET] * (self._offset / self._offset_weight)
+        self._window.append((gradient, np.diag(weight), score.stamp, scatter.count))
         del self._window[:-WINDOW]
         pulls, weights = (np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1))
         length = np.arange(1, len(pulls) + 1)[:, None]
@@ -150,7 +150,7 @@ def _like_offset(scatter: Scatter) -> Array:
 
 def directions(scatter: Scatter) -> Array:
     """Direction in which a whitened score moves for a change of each group, shape (5, 5)."""
-    _, weight = scatter.pull(ChangeScore(np.zeros(len(GROUPS)), scatter.slope, 0.0, 0.0, 0, 0.0))
+    _, weight = scatter.gradient(ChangeScore(np.zeros(len(GROUPS)), scatter.slope, 0.0, 0.0, 0, 0.0))
     size = np.sqrt(np.diag(weight))
     alike = weight / np.where(size > 0.0, size, 1.0)[:, None] / np.where(size > 0.0, size, 1.0)
     values, vectors = np.linalg.eigh(alike)

@@ -90,7 +90,7 @@ class Scatter:
         """Root of the mean slope of every group, shape (5,); 1 where it is zero."""
         return _scale(self.slope)
 
-    def pull(self, score: ChangeScore) -> tuple[Array, Array]:
+    def gradient(self, score: ChangeScore) -> tuple[Array, Array]:
         """Gradient of the log likelihood of a score with respect to the groups (5,), and its Fisher information (5, 5).
 
         The gradient is zero on average while nothing changes, and information times θ after a change θ.
@@ -123,10 +123,10 @@ class Scatter:
         precision[np.ix_(kept, kept)] = biased * np.linalg.pinv(covariance, rcond=1e-10, hermitian=True)
         none = np.zeros((2, len(GROUPS)))
         bare = cls(len(scores), misfit, precision, slope, none, none[0], residual_power(scores))
-        said = [bare.pull(score) for score in scores]
-        pulls, weights = np.array([p for p, _ in said]), np.array([np.diag(w) for _, w in said])
-        known = replace(bare, memory=_memory(pulls / np.sqrt(np.maximum(weights, _TINY))))
-        return replace(known, wander=_wander(pulls, weights, known.inflation(WINDOW)[-1]))
+        said = [bare.gradient(score) for score in scores]
+        gradients, weights = np.array([p for p, _ in said]), np.array([np.diag(w) for _, w in said])
+        known = replace(bare, memory=_memory(gradients / np.sqrt(np.maximum(weights, _TINY))))
+        return replace(known, wander=_wander(gradients, weights, known.inflation(WINDOW)[-1]))
 
 
 def residual_power(scores: Sequence[ChangeScore]) -> float:
@@ -160,13 +160,13 @@ def _memory(said: Array) -> Array:
     return np.vstack((first, np.where(first > 0.0, decay, 0.0)))
 
 
-def _wander(pulls: Array, weights: Array, inflation: Array) -> Array:
+def _wander(gradients: Array, weights: Array, inflation: Array) -> Array:
     """`Scatter.wander` from the gradients (n, 5) and their information; 0 where the scatter explains it."""
-    windows = len(pulls) // WINDOW
+    windows = len(gradients) // WINDOW
     if windows < FEWEST_WINDOWS:
         return np.zeros(len(GROUPS))
-    pull, weight = (x[: windows * WINDOW].reshape(windows, WINDOW, -1).sum(axis=1) for x in (pulls, weights))
+    gradient, weight = (x[: windows * WINDOW].reshape(windows, WINDOW, -1).sum(axis=1) for x in (gradients, weights))
     seen = (weight > 0.0).all(axis=0)
     weight = np.where(seen, weight, 1.0)
     expected = (inflation / weight).mean(axis=0) * (1.0 + 2.0 * np.sqrt(2.0 / (windows - 1)))
-    return np.where(seen, np.maximum(0.0, np.var(pull / weight, axis=0, ddof=1) - expected), 0.0)
+    return np.where(seen, np.maximum(0.0, np.var(gradient / weight, axis=0, ddof=1) - expected), 0.0)

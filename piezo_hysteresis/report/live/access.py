@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`TokenAccess`: who may see the page where others than this machine reach it: whoever knows the token."""
+"""`TokenAccess`: restricts a page that other machines can reach to visitors who know the token."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _LONGEST_TOKEN = 1000
 """Largest number of characters of a token."""
 
 _DELAY = 1.0
-"""Time that a wrong token takes [s], against guessing."""
+"""Delay of the answer to a wrong token [s], which prevents guessing."""
 
 _FORM = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -86,7 +86,8 @@ def read_token(path: str | Path) -> str:
 
 
 class TokenAccess(AuthProvider):
-    """Lets in who has given the token; the browser remembers it by a signed cookie until the server ends.
+    """Admits visitors who have given the token. The browser keeps a signed cookie, which is valid until the server
+    ends.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ class TokenAccess(AuthProvider):
 
     @property
     def get_user(self) -> Callable[[Any], Any]:
-        """Who sends a request: None until the token was given."""
+        """The sender of a request; None until the token was given."""
         return lambda handler: handler.get_signed_cookie(self.cookie, max_age_days=1)
 
     @property
@@ -115,21 +116,21 @@ class TokenAccess(AuthProvider):
 
     @property
     def login_url(self) -> str:
-        """Where the token is asked for."""
+        """Address of the form for the token."""
         return "/login"
 
     @property
     def get_login_url(self) -> None:
-        """Always the same."""
+        """Not needed: the address is fixed."""
 
     @property
     def login_handler(self) -> type[RequestHandler]:
-        """What asks for the token."""
+        """Class of the form for the token."""
         return TokenForm
 
     @property
     def logout_url(self) -> None:
-        """A closed browser, or a day, ends the visit."""
+        """Not needed: the visit ends with the browser, or after a day."""
 
     @property
     def logout_handler(self) -> None:
@@ -137,14 +138,14 @@ class TokenAccess(AuthProvider):
 
 
 class TokenForm(RequestHandler):
-    """Asks for the token, and remembers who has given it."""
+    """Form for the token; it sets the cookie of a visitor who has given it."""
 
     def get(self) -> None:
         """Show the form."""
         self.write(_FORM.format(text="This page can move a stage."))
 
     async def post(self) -> None:
-        """Take the token."""
+        """Check the token."""
         access = self.application.auth_provider
         if access.accepts(self.get_body_argument("token", "")):
             self.set_signed_cookie(access.cookie, "visitor", expires_days=None, httponly=True, samesite="Strict")

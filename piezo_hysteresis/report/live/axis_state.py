@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`AxisState`: what is known of one axis while it runs: samples, statuses, models; written by nodes, read by pages."""
+"""`AxisState`: samples, statuses and models of a running axis, written by nodes and read by pages."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ VERDICTS = ("named", "nothing_missing", "unknown")
 """Words that the verdict of a diagnosis begins with."""
 
 HISTORY = 20
-"""Models, and alarms, that are remembered."""
+"""Number of models, and of alarms, that are kept."""
 
 SILENT = 3.0
-"""Time without a message after which a node counts as gone [s]: three reports on /diagnostics."""
+"""Time without a message after which a node counts as ended [s]; this is three reports on /diagnostics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,15 +48,15 @@ class Status:
     Parameters
     ----------
     name : str
-        Name of the node and, after a colon, of what it reports about.
+        Name of the node and, after a colon, the subject of the report.
     level : int
         `OK`, `WARN`, `ERROR` or `STALE`.
     message : str
-        What it says.
+        Its message.
     values : mapping of str to str
         Its values.
     received : float
-        When it came, on the steady clock [s].
+        Time of arrival on the steady clock [s].
     """
 
     name: str
@@ -67,13 +67,13 @@ class Status:
 
     @property
     def age(self) -> float:
-        """Time since it came [s]."""
+        """Time since its arrival [s]."""
         return time.monotonic() - self.received
 
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """A status that was worse than OK, from when to when.
+    """A status that was worse than OK, with its time.
 
     Parameters
     ----------
@@ -93,16 +93,16 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class KnownModel:
-    """A model that came on the topic `model`.
+    """A model that was received on the topic `model`.
 
     Parameters
     ----------
     model : Model
         The model itself.
     hash : str
-        Of everything but its provenance.
+        Hash of everything but its provenance.
     received : float
-        When it came, since the epoch [s].
+        Time of arrival since the epoch [s].
     """
 
     model: Model
@@ -111,7 +111,7 @@ class KnownModel:
 
     @property
     def free_run_error(self) -> float | None:
-        """RMS of its free-run error where it was fitted [m]; None where the model does not say."""
+        """RMS of its free-run error on the fitted data [m]; None where the model does not state it."""
         try:
             return float(self.model.provenance["free_run_error"])
         except (KeyError, ValueError):
@@ -133,9 +133,9 @@ class AxisState:
     window : SampleWindow
         Its newest samples.
     heard : float
-        When the last block of samples came, on the steady clock [s].
+        Arrival of the last block of samples on the steady clock [s].
     phase : str
-        Phase under way, as the driver names it.
+        Name of the present phase.
     residual_rms : float or None
         RMS residual over the last second [m].
     statuses : dict of str to Status
@@ -143,13 +143,13 @@ class AxisState:
     identification, change : Status or None
         Newest messages of `status` and of `change`.
     verdict : str
-        What the last diagnosis found; empty before there is one.
+        Result of the last diagnosis; empty before there is one.
     models : tuple of KnownModel
         The newest last.
     recalibrations : tuple of RecalibratedNumber
-        What the model node has recalibrated, the oldest first.
+        Recalibrations by the model node, the oldest first.
     refused_model : str
-        Why the newest text on `model` is none; empty where it is one.
+        Reason why the newest text on `model` is not a model; empty where it is one.
     """
 
     def __init__(self, name: str) -> None:
@@ -170,7 +170,7 @@ class AxisState:
 
     @property
     def is_streaming(self) -> bool:
-        """True while samples come."""
+        """True while samples arrive."""
         return time.monotonic() - self.heard < SILENT
 
     @property
@@ -180,7 +180,7 @@ class AxisState:
 
     @property
     def free_run_error(self) -> float | None:
-        """RMS error that the model in use promises [m]; None where it promises none."""
+        """RMS error that the model in use states [m]; None where it states none."""
         prediction = self.part("prediction")
         try:
             return None if prediction is None else float(prediction.values["free_run_error"])
@@ -188,11 +188,11 @@ class AxisState:
             return None
 
     def part(self, word: str) -> Status | None:
-        """The report about one part: ``stage``, ``prediction``, ``identification``, ``change``; None before it came."""
+        """The report about ``stage``, ``prediction``, ``identification`` or ``change``; None before it arrives."""
         return next((s for name, s in list(self.statuses.items()) if name.endswith(f": {word}")), None)
 
     def report(self, status: Status) -> None:
-        """Take a report of /diagnostics; one that is worse than OK raises an alarm, and the next good one ends it."""
+        """Add a report of /diagnostics. A report worse than OK raises an alarm, and the next good one ends it."""
         self.statuses = {**self.statuses, status.name: status}
         active = dict(self._active)
         before = active.get(status.name)
@@ -206,7 +206,7 @@ class AxisState:
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
-        """Alarms that last, the newest first."""
+        """Present alarms, the newest first."""
         return tuple(sorted(self._active.values(), key=lambda alarm: -alarm.began))
 
     @property
@@ -215,23 +215,23 @@ class AxisState:
         return tuple(reversed(list(self._over)))
 
     def report_identification(self, status: Status) -> None:
-        """Take a message of `status`."""
+        """Add a message of `status`."""
         self.identification = status
         if status.values.get("state") == "done" and status.message.partition(":")[0] in VERDICTS:
             self.verdict = status.message
 
     def report_recalibrations(self, text: str) -> None:
-        """Take the history of the model node; a text that is none leaves it as it was.
+        """Replace the history of recalibrations; an invalid text does not change it.
 
         Raises
         ------
         RecordingError
-            If the text is none.
+            If the text is not a history.
         """
         self.recalibrations = read_numbers(text, "topic 'recalibrations'")
 
     def follow(self, text: str) -> None:
-        """Take a model file; one that is not acceptable is reported as such."""
+        """Add a model file; a file that is not acceptable is reported."""
         try:
             model = loads(text, "topic 'model'")
         except PiezoError as error:

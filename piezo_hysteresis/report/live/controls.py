@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Controls`: the buttons of an axis. All but the stop ask before they act, and show first what will happen."""
+"""`Controls`: the buttons of an axis. All but the stop describe the action and ask before they act."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ class Control:
     Parameters
     ----------
     name : str
-        Word of the button.
+        Label of the button.
     service : str
-        What it calls, relative to the axis.
+        Service that it calls, relative to the axis.
     question : str
-        What is shown before it is called; empty where it acts at once.
+        Question that is shown before the call; empty where the button acts at once.
     plan : str
-        Service whose answer is shown besides, and has to be positive.
+        Service whose answer is shown with the question, and has to be positive.
     kind : str
-        Look of the button.
+        Style of the button.
     """
 
     name: str
@@ -96,7 +96,7 @@ class Controls:
     Parameters
     ----------
     source : LiveSource
-        Whose services are called.
+        Source of the services.
     axis : callable
         Name of the axis that is shown.
     styles : bokeh InlineStyleSheet
@@ -134,14 +134,14 @@ class Controls:
         return button
 
     def poll(self) -> None:
-        """Show the answers that have come since."""
+        """Show new answers."""
         done = [pending for pending in self._pending if pending[0].done()]
         self._pending = [pending for pending in self._pending if not pending[0].done()]
         for future, then in done:
             then(future.result())
 
     def close(self) -> None:
-        """Withdraw the question, e.g. because another axis is shown now."""
+        """Remove the question, e.g. because another axis is shown."""
         self._close()
         self._answer.text = ""
 
@@ -184,7 +184,7 @@ class Controls:
         self._confirm.disabled = True
 
         def compare(answer: Answer) -> None:
-            """What was confirmed is what is played: the plan is asked for once more."""
+            """Compare the plan with the confirmed one before the call."""
             if answer == Answer(True, plan):
                 self._close()
                 self._act(control, axis)

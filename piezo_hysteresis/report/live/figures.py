@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The four figures of the page: loop, displacement, residual and its spectrum; arrays in, Bokeh figures out."""
+"""The four figures of the page: Bokeh figures of loop, displacement, residual and its spectrum."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ HEIGHT = 300
 """Height of a figure [px]."""
 
 SPECTRUM_SAMPLES = 1 << 16
-"""Samples of the newest part of which the spectrum is taken."""
+"""Number of newest samples in the spectrum."""
 
 _FEWEST = 64
-"""Samples below which there is no spectrum."""
+"""Fewest samples for a spectrum."""
 
 TOOLS = "pan,box_zoom,wheel_zoom,reset,save"
 """Tools beside a figure."""
@@ -63,12 +63,12 @@ PROMISED: dict[str, Any] = {"color": BLUE, "line_width": 1.4, "line_dash": [2, 3
 
 
 class WindowFigures:
-    """Draws a window of samples; what is shown follows the range of the time axes.
+    """Draws a window of samples in the range of the time axes.
 
     Parameters
     ----------
     time_label : str
-        What the time axes say.
+        Label of the time axes.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class WindowFigures:
         return float(self._time.start), float(self._time.end)
 
     def span(self, start: float, end: float) -> None:
-        """Show a part of the time axis [s], which is also where a reset leads back to."""
+        """Show a part of the time axis [s]; a reset returns to it."""
         self._time.update(start=start, end=end, reset_start=start, reset_end=end)
 
     def draw(self, window: Window, origin: float, noise: float | None, error: float | None) -> None:
@@ -136,7 +136,7 @@ class WindowFigures:
         window : Window
             Samples.
         origin : float
-            Time that stands as zero on the time axes [s].
+            Time that is zero on the time axes [s].
         noise : float or None
             RMS noise of the sensor [m], where it is known.
         error : float or None

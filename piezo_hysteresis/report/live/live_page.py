@@ -49,7 +49,7 @@ _NOISE_SAMPLES = 8192
 
 
 class LivePage:
-    """Draws one axis of a source four times a second; no work is done between.
+    """Draws one axis of a source four times a second.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class LivePage:
             self._texts["state"].text = "<p>no axis yet: nobody publishes the topic 'samples'</p>"
             return
         if self._pause.active:
-            if self._window is None:  # all that is held, so that it can be looked at in detail
+            if self._window is None:  # all kept samples, so that they can be examined in detail
                 self._window = axis.window.newest(max(WINDOWS.values()))
             window = self._window
         else:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Points to draw of many samples: the extremes of every bin, and a gap in the line where samples are missing."""
+"""Reduces many samples to points to draw: the extremes of every bin, and gaps where samples are missing."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _PROMINENCE = 0.05
 
 
 def extremes(values: Array, points: int = LINE_POINTS) -> NDArray[np.intp]:
-    """Indices of finite samples to draw, smallest and largest of every bin among them; both sides of every gap, too.
+    """Indices of finite samples to draw, with the smallest and largest of every bin and both sides of every gap.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def with_gaps(places: NDArray[np.intp], valid: NDArray[np.bool_], *columns: Arra
     valid : (n,) ndarray of bool
         Which samples exist.
     *columns : (n,) ndarray
-        What is drawn.
+        Values to draw.
     """
     missing = np.concatenate(([0], np.cumsum(~valid)))
     after = 1 + np.flatnonzero(np.diff(missing[places]))
@@ -76,7 +76,7 @@ def with_gaps(places: NDArray[np.intp], valid: NDArray[np.bool_], *columns: Arra
 def newest_cycles(window: Window) -> Window:
     """The last few cycles of the drive, or all of the window where it holds fewer.
 
-    A window of very many cycles is halved before they are looked for, so that they stay distinguishable after thinning.
+    A window with very many cycles is halved before the search, so that the cycles stay distinguishable after thinning.
     """
     while window.size > 64:
         places = extremes(window.voltage)

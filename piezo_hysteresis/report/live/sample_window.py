@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`SampleWindow`: the newest samples of a stream, measured and predicted, each in the place of its running number."""
+"""`SampleWindow`: the newest samples of a stream, measured and predicted, stored by their running numbers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 CAPACITY = 1 << 19
-"""Samples that are kept: 10 s at 50 kHz, in 21 MB."""
+"""Number of samples that are kept: 10 s at 50 kHz, in 21 MB."""
 
 _MOST_EARLY = 100
 """Blocks of predictions that wait for their samples."""
@@ -36,7 +36,7 @@ _TURN = 1 << 32
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Window:
-    """Samples that follow one another; NaN where nothing was measured or predicted.
+    """Consecutive samples; NaN where nothing was measured or predicted.
 
     Parameters
     ----------
@@ -77,17 +77,17 @@ class Window:
 
 
 class SampleWindow:
-    """A ring of samples, written by one thread and read by another.
+    """Ring buffer of samples, written by one thread and read by another.
 
     Parameters
     ----------
     capacity : int
-        Samples that are kept at most, a power of two.
+        Largest number of samples, a power of two.
 
     Attributes
     ----------
     received : int
-        Samples that have come in.
+        Number of received samples.
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
@@ -101,10 +101,10 @@ class SampleWindow:
         self.received = 0
 
     def add(self, index: NDArray[np.uint32], time: Array, voltage: Array, displacement: Array) -> None:
-        """Take a block of samples that follow one another.
+        """Add a block of consecutive samples.
 
-        A block that does not continue the stream within the capacity of the window starts it anew: the driver was
-        restarted, or was silent for long.
+        A block that does not continue the stream within the capacity empties the window, because the driver was
+        restarted or silent for long.
 
         Parameters
         ----------
@@ -138,9 +138,9 @@ class SampleWindow:
                 self._place(*block)
 
     def add_prediction(self, index: NDArray[np.uint32], prediction: Array) -> None:
-        """Take the predictions of samples; those of samples that the window does not hold any more are left out.
+        """Add predictions; those of samples that have left the window are ignored.
 
-        Two topics keep no common order: predictions that come before their samples wait for them.
+        The order of two topics is not defined, so that predictions may wait for their samples.
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class SampleWindow:
         return self._period
 
     def newest(self, duration: float) -> Window:
-        """The samples of the last `duration` [s], or as many as are held, oldest first."""
+        """The samples of the last `duration` [s], or all kept samples if there are fewer; the oldest first."""
         with self._lock:
             count = min(self._filled, round(duration / self._period) if self._period else 0)
             start = (self._end - count) % self._capacity

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`PageServer`: an HTTP server of its own thread, on this machine only where no token is given."""
+"""`PageServer`: an HTTP server in its own thread; without a token only this machine can reach it."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ class PageServer:
     port : int
         Port to listen on; 0 takes a free one.
     token : str
-        What a visitor has to give; empty: nothing, on this machine only.
+        Token that a visitor has to give; empty: none, for this machine only.
     origins : iterable of str
         Names, with or without a port, under which browsers may reach the page besides `address` and localhost.
 
     Raises
     ------
     ParameterError
-        On an address that others reach without a token, or one that cannot be listened on.
+        If other machines reach the address and there is no token, or the address is not available.
     """
 
     def __init__(
@@ -86,13 +86,13 @@ class PageServer:
 
     @property
     def port(self) -> int:
-        """Port that is listened on."""
+        """Port of the server."""
         assert self._server is not None
         return int(self._server.port or 0)
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds the page."""
+        """Address of the page for a browser on this machine."""
         host = f"[{self._address}]" if ":" in self._address else self._address
         return f"http://{'127.0.0.1' if host in ('0.0.0.0', '[::]') else host}:{self.port}/"
 
@@ -146,7 +146,7 @@ class PageServer:
         return BaseServer(IOLoop.current(), tornado, http)
 
     def _allowed(self, port: int) -> list[str]:
-        """Host and port of the pages that may talk to the server: a page of another site may not."""
+        """Hosts and ports from which a page may connect to the server; pages of other sites may not."""
         hosts = [*dict.fromkeys((self._address, "127.0.0.1", "localhost"))]
         own = [f"[{host}]" if ":" in host else host for host in hosts if host not in ("0.0.0.0", "::")]
         return [host if _names_port(host) else f"{host}:{port}" for host in (*own, *self._origins)]

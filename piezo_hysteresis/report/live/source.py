@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`LiveSource`: what a page needs of the world of nodes: the axes that are there, and an answer from their services."""
+"""`LiveSource`: interface between a page and the nodes: the known axes and their services."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from .axis_state import AxisState
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a service said.
+    """Answer of a service.
 
     Parameters
     ----------
     success : bool
-        Whether it did, or began, what it was asked for.
+        Whether the request was done or begun.
     message : str
-        In words.
+        Message of the service.
     """
 
     success: bool
@@ -47,4 +47,4 @@ class LiveSource(Protocol):
         """The axes known so far, by name."""
 
     def call(self, axis: str, service: str) -> Future[Answer]:
-        """Call a service of an axis; the future always gets an answer, also where nobody serves it."""
+        """Call a service of an axis. The future always gets an answer, also where the service does not exist."""

@@ -35,13 +35,13 @@ NEEDED = (
 _SAMPLE_TIME_TOLERANCE = 1e-3
 """Relative difference up to which two sample times are one."""
 _HIGHEST_VOLTAGE = 1e4
-"""No piezo amplifier gives more [V]."""
+"""Largest voltage of any piezo amplifier [V]."""
 _SERVO_TIMES = (1e-6, 0.1)
-"""Servo times that can be [s]."""
+"""Range of possible servo times [s]."""
 _LONGEST_TRAVEL = 0.1
-"""No piezo stage moves further [m]."""
+"""Largest travel of any piezo stage [m]."""
 _POLL = 5e-3
-"""Time between two questions whether the generator runs [s]."""
+"""Time between two queries whether the generator is running [s]."""
 
 
 class Axis:
@@ -61,7 +61,7 @@ class Axis:
         self._travel = (-_LONGEST_TRAVEL / setup.position_unit, _LONGEST_TRAVEL / setup.position_unit)
 
     def identify(self) -> Description:
-        """Ask the controller who it is and for its limits; nothing moves.
+        """Query identity and limits of the controller; nothing moves.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class Axis:
         )
 
     def _narrow_travel(self) -> None:
-        """Positions further than a whole travel range outside of it cannot be; in open loop a stage leaves it a bit."""
+        """Accept positions up to one travel range beyond its ends, because an open-loop stage may pass them."""
         first, last = (self.client.number(f"{q} {self.setup.axis}", *self._travel) for q in ("TMN?", "TMX?"))
         if first < last:
             self._travel = (2 * first - last, 2 * last - first)

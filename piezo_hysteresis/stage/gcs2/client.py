@@ -32,7 +32,7 @@ _ERROR_NUMBER = re.compile(r"-?[0-9]{1,6}")
 _MASK = re.compile(r"(0[xX])?[0-9a-fA-F]{1,8}")
 """An answer to ``#9``."""
 LARGEST_COUNT = 1e9
-"""More samples, points or tables no controller has."""
+"""Largest number of samples, points or tables of any controller."""
 
 
 class Client:
@@ -82,7 +82,7 @@ class Client:
         return lines[0].rpartition("=")[2].strip()
 
     def number(self, text: str, lowest: float = -math.inf, highest: float = math.inf) -> float:
-        """The one value of an answer, as a finite number from `lowest` to `highest`: others cannot be meant."""
+        """The one value of an answer, as a finite number from `lowest` to `highest`: other values are impossible."""
         words = self.value(text)
         if not _NUMBER.fullmatch(words):
             raise self.nonsense(text, words, "a number")
@@ -130,7 +130,7 @@ class Client:
             self._check("#24", number)
 
     def nonsense(self, text: str, got: str, expected: str) -> Gcs2Error:
-        """The error for an answer that cannot be; what comes next cannot be trusted, so the link is closed."""
+        """Error for an impossible answer. The link is closed, because further answers cannot be trusted."""
         self.connection.close()
         return Gcs2Error(f"{self.connection.place}: got '{got[:60]}' to '{text}', expected {expected}")
 
@@ -156,7 +156,7 @@ class Client:
             raise Gcs2Error(f"{self.connection.place}: refused '{_short(text)}' with {meaning(number)}")
 
     def _unanswered(self, text: str, error: NoAnswerError) -> Gcs2Error:
-        """A controller is silent to what it refuses; the link may be out of step afterwards and is closed."""
+        """Error for a missing answer, which is how a controller refuses a query. The link is closed."""
         words = f"{error} to '{_short(text)}'"
         try:
             self.connection.send("ERR?\n")

@@ -83,7 +83,7 @@ class Gcs2Stage:
         return self._voltage
 
     def configure(self, sample_period: float) -> None:
-        """Sample every so many seconds [s]; a waveform in memory is forgotten."""
+        """Set the sample period [s]; a waveform in memory is discarded."""
         self._require_ready()
         period = self._description.check_sample_period(sample_period)
         self._sample_period = round(period / self._axis.servo_time) * self._axis.servo_time
@@ -91,7 +91,7 @@ class Gcs2Stage:
         self._forget()
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
-        """Hold these limits and this ramp rate [V/s] from now on; learns how the controller draws a ramp."""
+        """Use these limits and this ramp rate [V/s] from now on; finds out whether the controller can draw ramps."""
         self._require_ready()
         self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
         self._waveform = None
@@ -99,14 +99,14 @@ class Gcs2Stage:
             _ = self._axis.waves.draws_lines
 
     def watch(self, is_interrupted: Callable[[], bool]) -> None:
-        """Look at `is_interrupted` before every message of upload, arm, start and read; StoppedError once it is true.
+        """Call `is_interrupted` before every message of upload, arm, start and read; StoppedError once it is true.
 
         Between two looks there is one command, or one answer of `rows_per_answer` samples.
         """
         self._axis.waves.is_interrupted = is_interrupted
 
     def set_voltage(self, voltage: float) -> None:
-        """Go to one voltage [V] at the ramp rate, hold it, and see it measured; a waveform in memory is forgotten."""
+        """Go to one voltage [V] at the ramp rate, hold and verify it; a waveform in memory is discarded."""
         self._require_ready()
         goal = self._limiter.goal(voltage)
         with self._guarded():

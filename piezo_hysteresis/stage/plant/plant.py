@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Plant`: the simulated stage in motion, from drive voltage to what the sensor reads."""
+"""`Plant`: the simulated stage in motion, from drive voltage to sensor reading."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Reading(NamedTuple):
     voltage: Samples
     displacement: Samples
     channels: dict[str, Samples]
-    """What else is measured: ``other_displacement`` [m], ``temperature`` [K]."""
+    """Further measured channels: ``other_displacement`` [m], ``temperature`` [K]."""
 
 
 class Plant:

@@ -65,7 +65,7 @@ class Sensor(Group):
         return np.asarray(x * (1.0 + (x / full) * (self.quadratic + self.cubic * (x / full))))
 
     def convert(self, y: Samples) -> Samples:
-        """What the converter makes of `y` [m]; beyond its range it clips, as a real one does."""
+        """Output of the converter for `y` [m]; it clips beyond its range, as a real one does."""
         half = 2 ** (self.adc_bits - 1) if self.adc_bits else 0
         if not self.adc_bits:
             return np.clip(y, -self.range, self.range)

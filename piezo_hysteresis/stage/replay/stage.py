@@ -89,7 +89,7 @@ class ReplayStage:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What is played differently from how it was recorded, a sentence each."""
+        """Sentences about records that are played at another sample period."""
         names = [played.record.phase for played in self._played if played.is_resampled]
         if not names:
             return ()
@@ -163,7 +163,7 @@ class ReplayStage:
         return float(self._values(self._last, _displacement_of)[0][0])
 
     def safe(self) -> None:
-        """Nothing is energised."""
+        """Do nothing: a recording has no voltage to remove."""
 
     def close(self) -> None:
         """End the replay; every later call that takes samples raises StageError."""

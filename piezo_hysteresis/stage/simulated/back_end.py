@@ -46,7 +46,7 @@ PARAMETERS: tuple[Row, ...] = (
 
 
 def open(values: Mapping[str, Any], opening: Opening) -> Stage:
-    """Make a simulated stage from the values of `PARAMETERS`; PiezoError if they make no sense."""
+    """Make a simulated stage from the values of `PARAMETERS`; PiezoError if they are invalid."""
     period = {"sample_period": opening.sample_period} if opening.sample_period else {}
     named = {"seed": values["seed"], **period}
     plant = PlantParameters.from_mapping(_plant_values(values))

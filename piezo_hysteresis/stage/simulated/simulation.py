@@ -97,7 +97,7 @@ class Simulation:
         return self._plant.time
 
     def configure(self, sample_period: float) -> None:
-        """Sample at another period [s]; the plant is taken as settled at the voltage in force."""
+        """Set another sample period [s]; the plant is then settled at the present voltage."""
         self._require_ready()
         period = self._description.check_sample_period(sample_period)
         if period != self._sample_period:
@@ -105,7 +105,7 @@ class Simulation:
             self._sample_period = period
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
-        """Hold these limits and this ramp rate [V/s] from now on; see `Limiter.restricted`."""
+        """Use these limits and this ramp rate [V/s] from now on; see `Limiter.restricted`."""
         self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
 
     def set_voltage(self, voltage: float) -> None:
@@ -128,7 +128,7 @@ class Simulation:
             self._go(self._description.safe_voltage)
 
     def close(self) -> None:
-        """Make safe; every later call but `close` and `safe` raises StageError."""
+        """Go to the safe voltage; every later call but `close` and `safe` raises StageError."""
         self.safe()
         self._closed = True
 

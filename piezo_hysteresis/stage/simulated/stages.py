@@ -31,7 +31,7 @@ from .simulation import Simulation
 class SimulatedStage(Simulation):
     """A simulated stage that streams.
 
-    Simulated time passes only while samples are taken; who wants real time paces the blocks.
+    Simulated time passes only while samples are taken; the caller paces the blocks for real time.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class SimulatedStage(Simulation):
 class SimulatedMemoryStage(Simulation):
     """A simulated stage with on-board memory: upload, arm, start, wait, read.
 
-    Between two waveforms the plant holds its voltage and lives on for `dead_time`.
+    Between two waveforms the plant holds its voltage for `dead_time` of simulated time.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class SimulatedMemoryStage(Simulation):
         self._is_interrupted: Callable[[], bool] = bool
 
     def watch(self, is_interrupted: Callable[[], bool]) -> None:
-        """Look at `is_interrupted` before a waveform is taken, armed, started or read; StoppedError once it is true."""
+        """Call `is_interrupted` before a waveform is stored, armed, started or read; StoppedError once it is true."""
         self._is_interrupted = is_interrupted
 
     def upload(self, voltage: Samples) -> None:
@@ -114,7 +114,7 @@ class SimulatedMemoryStage(Simulation):
         self._armed = False
 
     def arm(self) -> None:
-        """Make ready to start; takes `dead_time` of simulated time at the voltage in force."""
+        """Prepare the start; takes `dead_time` of simulated time at the present voltage."""
         self._require_ready()
         self._require_not_interrupted()
         self._check(self._uploaded(), self.voltage)
@@ -152,12 +152,12 @@ class SimulatedMemoryStage(Simulation):
         return self._acquired
 
     def configure(self, sample_period: float) -> None:
-        """Sample at another period [s]; a waveform in memory is forgotten."""
+        """Set another sample period [s]; a waveform in memory is discarded."""
         super().configure(sample_period)
         self._waveform, self._acquired, self._armed = None, None, False
 
     def safe(self) -> None:
-        """Stop what plays where it is and go to the safe voltage at the ramp rate."""
+        """Stop a waveform that is playing and go to the safe voltage at the ramp rate."""
         self._armed = False
         if self._playing:
             waveform = self._uploaded()
