@@ -96,7 +96,8 @@ class Promise:
 PROMISED = {
     "published": Promise(),
     "creeping": Promise(),
-    "plays, creeping": Promise(0.7, 0.7, 0.7, 0.06),
+    "plays, creeping": Promise(learned=0.06),
+    "resonance": Promise(),
 }
 
 

@@ -72,10 +72,10 @@ class InverseLoops:
         targets, u, room = np.empty(n), np.empty(n), np.empty((2, fade.size))
         history = np.concatenate((np.zeros(taps.size - 1), y / model.displacement_scale))
         self._dynamics(history, n, taps, taps.size, linear._recursion, targets)
-        plays = part.weights if part.weights.size else np.zeros(1)
-        radii = part.radii if part.radii.size else np.zeros(1)
+        count = part.radii.size
+        c, radii = (values if count else np.zeros(1) for values in (part.weights[0].copy(), part.radii))
         self._invert(
-            *(targets, n, p, plays, radii, part.weights.size, np.zeros(plays.size)),
+            *(targets, n, p, c, radii, count, np.zeros(c.size)),
             *(fade, lead, weights, fade.size, float(direct[0]), limits, room[0], room[1], u),
         )
         return u

@@ -30,8 +30,8 @@ FOOTER = (
     "free-run error that the model file states. Per cents are RMS over the range of the path."
 )
 """How the numbers are to be read."""
-MERIT = ("expected error, rms", "drive voltage", "largest slew")
-"""Rows of the plan that stand under the headline, too."""
+MERIT = ("drive voltage", "largest slew")
+"""Rows of the plan that stand under the headline, too, before the expected error."""
 
 
 def plan_page(plan: Plan, model: Model, source: str) -> Page:
@@ -47,11 +47,17 @@ def plan_page(plan: Plan, model: Model, source: str) -> Page:
         File of the path.
     """
     drawing, table = tracking(plan), plan_table(plan)
-    merit = tuple((name, value) for name, value in table.rows if name in MERIT)
+    total = plan.expected.total
+    merit = [(name, value) for name, value in table.rows if name in MERIT]
+    merit.append(("expected error, rms", nanometre(total)))
+    if plan.range:
+        merit.append(("of the path's range", f"{100.0 * total / plan.range:.3g} %"))
     if plan.reachability.is_whole:
-        headline = f"The stage can follow the whole path; the expected error is {nanometre(plan.expected.total)} rms"
+        headline = f"The stage can follow the whole path; the expected error is {nanometre(total)} rms"
     else:
         headline = "The limits of the drive do not allow the whole path"
     verdict = VerdictText(headline, tuple(f"{line[:1].upper()}{line[1:]}." for line in notes(plan)))
-    html = framed("Compensation: a plan", source, chain(model), verdict, merit, {"Plan": ([drawing], [table])}, FOOTER)
+    html = framed(
+        "Compensation: a plan", source, chain(model), verdict, tuple(merit), {"Plan": ([drawing], [table])}, FOOTER
+    )
     return Page(html, (drawing,))
