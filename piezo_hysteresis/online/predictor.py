@@ -23,12 +23,13 @@ from ..errors import DivergenceError, RecordError
 from ..model.chain import Chain, ChainState
 from ..model.model import Model
 from ..model.samples import samples
+from .model_swap import ModelSwap
 from .prediction import Prediction
 from .running_rms import RunningRms
 from .sensor_offset import SensorOffset
 from .sequence_check import LONGEST_SILENCE, SequenceCheck
 from .voltage_history import FULL_SAMPLES, DriveHistory, VoltageHistory, is_held
-from .warmup import Warmup, chain_at
+from .warmup import chain_at
 
 Array = NDArray[np.float64]
 
@@ -100,8 +101,7 @@ class Predictor:
         self.sequence = SequenceCheck(sample_period)
         self.model: Model | None = None
         self.chain: Chain | None = None
-        self._warmup: Warmup | None = None
-        self._waiting: tuple[Model, float | None] | None = None
+        self._swap = ModelSwap()
         self._unseen: float | None = None  # travel [V] at which the drive was last unknown
         self._joined_unseen = False
         self._window = max(ZERO_SAMPLES, round(ZERO_TIME / sample_period))
@@ -118,7 +118,7 @@ class Predictor:
     @property
     def is_swapping(self) -> bool:
         """True while a new model is being run over the history."""
-        return self._warmup is not None or self._waiting is not None
+        return self._swap.newest is not None
 
     @property
     def warming_up(self) -> bool:
@@ -154,11 +154,10 @@ class Predictor:
         chain = chain_at(model, self.sample_period)
         if self._history.count == 0:
             self.chain, self.model = chain, model
-        elif self._warmup is not None:
-            self._waiting = model, offset
-        else:
-            self._warmup = Warmup(model, self._history, self._zero, offset)
-            self._warm(PIECE)
+            return
+        self._swap.request(model, offset)
+        if not self._swap.is_running:
+            self._advance_swap(PIECE)
 
     def zero(self) -> None:
         """Measure the offset again, over the next 0.1 s."""
@@ -220,16 +219,14 @@ class Predictor:
         residual = measured[: prediction.size] - prediction
         self._rms.add(residual)
         answer = Prediction(arrival.repeated, prediction, residual, self.model, self.warming_up)
-        self._warm(max(PIECE, 8 * drive.size))
+        self._advance_swap(max(PIECE, 8 * drive.size))
         return answer
 
     def _begin(self) -> None:
-        newest = self._warmup.model if self._warmup is not None else self.model
-        newest = newest if self._waiting is None else self._waiting[0]
-        self._waiting = None
+        newest = self._swap.newest or self.model
+        self._swap = ModelSwap()
         self._history = VoltageHistory(self.sample_period)
         self.state: ChainState | None = None
-        self._warmup = None
         self._zero_from(0)
         if newest is not None:
             self.swap(newest)
@@ -272,15 +269,9 @@ class Predictor:
         self._zero.add(measured, modelled, self._history.travel)
         return modelled
 
-    def _warm(self, values: int) -> None:
-        if self._warmup is None and self._waiting is not None:
-            waiting, self._waiting = self._waiting, None
-            self._warmup = Warmup(waiting[0], self._history, self._zero, waiting[1])
-        if self._warmup is None:
-            return
-        warmup, self._warmup = self._warmup, None
-        if not warmup.advance(values):
-            self._warmup = warmup
+    def _advance_swap(self, values: int) -> None:
+        warmup = self._swap.advance(values, self._history, self._zero)
+        if warmup is None:
             return
         self.model, self.chain, self.state = warmup.model, warmup.chain, warmup.state
         if warmup.offset is not None:

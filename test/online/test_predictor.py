@@ -117,6 +117,23 @@ def test_models_that_come_faster_than_they_warm_up_take_over_in_turn() -> None:
     assert predictor.model is models[-1]
 
 
+def test_a_model_that_waited_does_not_take_over_from_a_newer_one() -> None:
+    voltage = sine(101_000, rest=1000)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage, voltage * 1e-6, 5000)
+    first, second, third = (MODEL.with_values({"bouc_wen.p2": value}) for value in (1.1, 1.2, 1.3))
+    predictor.swap(first)
+    predictor.swap(second)
+    position = voltage.size
+    for newer in (first, None):
+        while predictor.is_swapping and predictor.model is not newer:
+            predictor.predict(position, round(position * PERIOD * 1e9), [7.0], [7e-6])
+            position += 1
+        if newer is first:
+            predictor.swap(third)
+    assert predictor.model is third
+
+
 def test_a_swap_near_the_beginning_is_immediate() -> None:
     voltage = sine(3000, rest=1000)
     measured = truth(OTHER, voltage) - 7e-6

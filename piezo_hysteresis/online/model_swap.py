@@ -1,0 +1,74 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`ModelSwap`: models on their way into a stream."""
+
+from __future__ import annotations
+
+from ..model.model import Model
+from .sensor_offset import SensorOffset
+from .voltage_history import VoltageHistory
+from .warmup import Warmup
+
+
+class ModelSwap:
+    """One model that is being run over the history, and the newest of those that came meanwhile."""
+
+    def __init__(self) -> None:
+        self._running: Warmup | None = None
+        self._waiting: tuple[Model, float | None] | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a model is being run over the history."""
+        return self._running is not None
+
+    @property
+    def newest(self) -> Model | None:
+        """The model that will be in force at the end; None if no other is on its way."""
+        if self._waiting is not None:
+            return self._waiting[0]
+        return None if self._running is None else self._running.model
+
+    def request(self, model: Model, offset: float | None) -> None:
+        """Let a model, with its offset [m] if that is known, follow the one that is running; others no longer wait."""
+        self._waiting = model, offset
+
+    def advance(self, values: int, history: VoltageHistory, zero: SensorOffset) -> Warmup | None:
+        """Run on over the next piece of the history; what has reached its end, ready to take over.
+
+        Parameters
+        ----------
+        values : int
+            Voltages to run over.
+        history : VoltageHistory
+            Of the stream.
+        zero : SensorOffset
+            For a model that begins now.
+
+        Raises
+        ------
+        ModelError
+            If the stream is faster than the model; it is dropped.
+        DivergenceError
+            If the model runs away; it is dropped.
+        """
+        if self._running is None and self._waiting is not None:
+            (model, offset), self._waiting = self._waiting, None
+            self._running = Warmup(model, history, zero, offset)
+        warmup, self._running = self._running, None
+        if warmup is None or warmup.advance(values):
+            return warmup
+        self._running = warmup
+        return None
