@@ -32,6 +32,7 @@ from benchmarks.fleet_work import Wait
 from piezo_hysteresis import recording
 from piezo_hysteresis.fleet import code_hash, fleet
 from piezo_hysteresis.fleet.attempt import OtherCodeError
+from piezo_hysteresis.fleet.cluster import cluster
 from piezo_hysteresis.fleet.finding import find_recordings
 from piezo_hysteresis.fleet.fleet import open_orders, run_fleet
 from piezo_hysteresis.fleet.table.results import Results, read_results
@@ -117,6 +118,16 @@ def test_other_code_computes_everything_again(recordings, model_text, client, tm
         assert len(orders) == 7
         with pytest.raises(OtherCodeError, match="install the same version"):
             run_fleet(orders, results, client)
+
+
+def test_workers_of_a_scheduler_elsewhere(recordings, client, rows, tmp_path):
+    """By its address alone, as `--scheduler` gives it; workers and scheduler go on afterwards."""
+    sources = find_recordings([str(recordings)])
+    with cluster(client.scheduler.address) as guest, Results(tmp_path / "results") as results:
+        assert guest.cluster is None
+        assert run_fleet(open_orders(sources, Wait(0.0), results), results, guest).counts == {"done": 6, "failed": 1}
+    assert len(rows()) == 7
+    assert client.submit(sum, (1, 2)).result(timeout=60) == 3
 
 
 def test_a_run_that_was_broken_off_goes_on(recordings, client, tmp_path):
