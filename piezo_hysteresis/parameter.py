@@ -20,7 +20,7 @@ The table is the single source for Python, model files, ROS parameter descriptor
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from .errors import ParameterError
 
@@ -118,10 +118,6 @@ class Parameter:
                 f"{name}: got {number:g} {self.unit}, expected {self.lower:g} to {self.upper:g} {self.unit}"
             )
         return number
-
-    def with_value(self, value: Value) -> Parameter:
-        """The same row with another value."""
-        return replace(self, value=value)
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,8 @@ def _sentences(history: FleetHistory, outliers: Sequence[OutlyingStage]) -> Iter
     if outliers:
         names = list(dict.fromkeys(o.stage for o in outliers))
         first = f"the first in {outliers[0].parameter}"
-        yield f"{len(names)} of the stages lie apart from the others: {', '.join(names[:5])}, {first}."
+        count = "One stage lies" if len(names) == 1 else f"{len(names)} stages lie"
+        yield f"{count} apart from the others: {', '.join(names[:5])}, {first}."
     lost = Counter(history.status[~history.is_done].tolist())
     if lost:
         words = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in lost.most_common())
