@@ -33,7 +33,7 @@ import rooms
 import topics
 
 from piezo_hysteresis.acquisition.settings import DRIVER, IN_FORCE
-from piezo_hysteresis.effects import BASELINE, CHAIN, Effect
+from piezo_hysteresis.effects import BASELINE, CHAIN, UNNAMED, Effect
 from piezo_hysteresis.nodes.compensation.settings import COMPENSATION
 from piezo_hysteresis.nodes.identification.settings import IDENTIFICATION
 from piezo_hysteresis.nodes.model.model_node import MODEL
@@ -50,6 +50,12 @@ HEAD = """\
 Generated from `piezo_hysteresis/effects` by `make docs`; `piezo effects` prints it too. In the order in which the
 effects act; every one has a value that switches it off exactly.
 
+"""
+UNNAMED_HEAD = """\
+# Corrections without a name
+
+They are no effects. `piezo diagnose` offers one of them after the verdict *unknown*
+([how](gap.md#a-correction-without-a-name)), and no search for effects knows them.
 """
 MARKED = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -113,14 +119,16 @@ def section(effect: type[Effect]) -> str:
 
 def catalogue() -> str:
     """The whole page docs/catalogue.md."""
+    named = [e for e in CHAIN if e not in UNNAMED]
     listed = table(
         "effect | family | place | in the published model",
         (
             (f"[`{e.name}`](#{e.name})", f"`{e.family}`", e.place.name.lower(), "yes" if e in BASELINE else "")
-            for e in CHAIN
+            for e in named
         ),
     )
-    return HEAD + listed + "\n" + "\n".join(section(e) for e in CHAIN)
+    sections = [section(e) for e in named] + [UNNAMED_HEAD] + [section(e) for e in UNNAMED]
+    return HEAD + listed + "\n" + "\n".join(sections)
 
 
 def settings(rows: Iterable[Row]) -> str:

@@ -26,7 +26,7 @@ from ..model import model_file
 from ..report.figures.comparison import compare_diagnosis
 from ..report.json_file import write_json
 from ..report.page import page
-from ..report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
+from ..report.tables.answer_tables import correction_table, effect_table, gap_table, rejection_table, where_table
 from ..report.verdict import answer_verdict
 from .options import reading_options
 from .options.destination import add_results, require_new_file, require_new_results
@@ -47,6 +47,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--output",
         metavar="FILE",
         help="write the extended model to this file; with --stage: folder of the experiment",
+    )
+    parser.add_argument(
+        "--correction",
+        metavar="FILE",
+        help="after the verdict unknown, write the model with a correction without a name to this file, if one is "
+        "accepted",
     )
     parser.add_argument(
         "--time",
@@ -81,6 +87,7 @@ def run(args: argparse.Namespace) -> int:
     if live is None and args.output is not None and found.model is not None:
         path = str(model_file.save(found.model, args.output))
     answer = found.answer(path)
+    corrected = _save_corrected(found, args.correction)
     if live is not None:
         answer["live"] = live.answer()
     if args.json is not None:
@@ -95,18 +102,27 @@ def run(args: argparse.Namespace) -> int:
     for sentence in said.sentences:
         out.print(sentence)
     out.print()
-    show(effect_table(answer), where_table(answer), gap_table(answer), rejection_table(answer))
+    show(
+        effect_table(answer), correction_table(answer), where_table(answer), gap_table(answer), rejection_table(answer)
+    )
     show_notices(found.experiment.notices)
-    for written in (path, args.json, args.report):
+    for written in (path, corrected, args.json, args.report):
         if written:
             out.print(f"wrote {written}")
     return 0
 
 
+def _save_corrected(found: Diagnosis, path: str | None) -> str:
+    """Write the model with its correction where one was accepted; returns the path, or nothing."""
+    if path is None or found.correction is None or found.correction.model is None:
+        return ""
+    return str(model_file.save(found.correction.model, path))
+
+
 def _of_stage(args: argparse.Namespace) -> LiveDiagnosis:
     if args.experiment or args.model is not None:
         raise ParameterError("diagnose: got --stage beside a recording or a model, expected --stage alone")
-    for option, path in (("--report", args.report), ("--json", args.json)):
+    for option, path in (("--report", args.report), ("--json", args.json), ("--correction", args.correction)):
         require_new_file(option, path, args.force)
     return diagnose_stage(args)
 
@@ -115,6 +131,7 @@ def _of_recording(args: argparse.Namespace) -> Diagnosis:
     if not args.experiment:
         raise ParameterError("diagnose: got no recording, expected one or several, or --stage FILE")
     require_new_results(args)
+    require_new_file("--correction", args.correction, args.force)
     start = None if args.model is None else model_file.load(args.model)
     experiment = reading_options.read(args)
     with progress("diagnose", f"{experiment.size} samples; this usually takes {USUAL_TIME}") as report_progress:

@@ -22,7 +22,7 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from ..effects import BASELINE, CHAIN, Effect, effect_named
+from ..effects import BASELINE, CHAIN, UNNAMED, Effect, effect_named
 from ..parameter import Parameter
 
 
@@ -55,7 +55,7 @@ def listing() -> Table:
     table = Table(
         "effect", "family", "place", "how it shows in the residual", title="Catalogue of effects, in chain order"
     )
-    for effect in CHAIN:
+    for effect in (e for e in CHAIN if e not in UNNAMED):
         name = f"[dim]{effect.name}[/dim]" if effect in BASELINE else f"[bold]{effect.name}[/bold]"
         table.add_row(name, effect.family, effect.place.name.lower(), effect.signature)
     return table

@@ -21,7 +21,7 @@ from dataclasses import replace
 from ..identification.fit.fit import Fit, Progress
 from ..identification.fit.normal_equations import Nuisance
 from ..record import Experiment
-from .diagnosis import Diagnosis
+from .diagnosis import Diagnosis, Verdict
 from .excitation_check import missing_excitation
 from .form_uncertainty import with_form_uncertainty
 from .gap import Gap, measure_gap, stating
@@ -31,6 +31,7 @@ from .search.baseline_setup import BaselineSetup
 from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection_result import Selection
 from .search.training_data import TrainingData
+from .unnamed.offer import offered
 from .verdict import is_explained, is_makeshift, verdict_of
 
 NOISY, WORTHWHILE = 1.1, 0.95
@@ -83,6 +84,7 @@ def concluded(
     final = with_form_uncertainty(final, fitted, setup.whole_noise, setup.span)
     progress("next experiment", 0.95)
     verdict, reason = verdict_of(selection, named, falls, gap)
+    is_unexplained = verdict is Verdict.UNKNOWN and selection.in_time
     return Diagnosis(
         verdict=verdict,
         reason=reason,
@@ -94,6 +96,7 @@ def concluded(
         gap=gap,
         next_experiment=decide(selection, training_data),
         experiment=experiment.noting(*missing_excitation([records[i] for i in setup.usable])),
+        correction=offered(final.model, setup, selection.null) if is_unexplained else None,
     )
 
 

@@ -30,6 +30,7 @@ from .gap import Gap
 from .next_experiment import NextExperiment
 from .residual.localise import ResidualShare
 from .search.selection_result import Rejection, Selection
+from .unnamed.correction import Correction
 
 SCHEMA = 1
 """Version of the answer for machines."""
@@ -72,6 +73,8 @@ class Diagnosis(Pictured):
         the data, and what they cannot show.
     change : ParameterChange or None
         The parameter of a given model that has changed, where that explains the records.
+    correction : Correction or None
+        After "unknown", the best correction without a name, accepted or refused. It is not part of `model`.
     """
 
     verdict: Verdict
@@ -85,6 +88,7 @@ class Diagnosis(Pictured):
     next_experiment: NextExperiment | None
     experiment: Experiment
     change: ParameterChange | None = None
+    correction: Correction | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -189,6 +193,7 @@ class Diagnosis(Pictured):
                 {"kind": n.kind, "phase": n.phase, "message": n.message, "severe": n.severe}
                 for n in self.experiment.notices
             ],
+            "unnamed_correction": None if self.correction is None else self.correction.answer(),
             "model": model_file,
         }
 
@@ -218,6 +223,8 @@ class Diagnosis(Pictured):
                 else "on the training records, because there were too few for test records"
             )
             lines.append(f"  gap {g.before:.3g} % → {g.after:.3g} % of range, floor {g.floor:.3g} % ({seen})")
+        if self.correction is not None:
+            lines.append(f"  {self.correction.sentence()}")
         lines += [f"  where: {p.axis.replace('_', ' ')}: {p.detail}" for p in self.where[:3]]
         if self.next_experiment is not None:
             pair = " and ".join(self.next_experiment.separates)

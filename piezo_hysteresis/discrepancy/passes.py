@@ -42,6 +42,7 @@ from .search.selection import select
 from .search.selection_result import Selection
 from .search.single_record import diagnose_few
 from .search.time_limit import ending_at
+from .unnamed.correction import without_corrections
 from .verdict import FEWEST
 
 Array = NDArray[np.float64]
@@ -165,7 +166,8 @@ def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosi
     if state.model is None:
         return state
     state.progress("changes of the given model", 0.0)
-    return same_stage(state.experiment, state.model, state.moving) or state
+    found = same_stage(state.experiment, state.model, state.moving)
+    return found or replace(state, model=without_corrections(state.model))
 
 
 def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:

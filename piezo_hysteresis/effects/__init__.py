@@ -56,6 +56,10 @@ from .sensor.offset import Offset
 from .sensor.second_order_low_pass import SecondOrderLowPass
 from .sensor.sensor_bandwidth import SensorBandwidth
 from .sensor.sensor_nonlinearity import SensorNonlinearity
+from .unnamed.unnamed_correction import CorrectionShape, UnnamedCorrection
+from .unnamed.unnamed_plays import UnnamedPlays
+from .unnamed.unnamed_position_map import UnnamedPositionMap
+from .unnamed.unnamed_relaxation import UnnamedRelaxation
 
 CHAIN: tuple[type[Effect], ...] = (
     AmplifierSaturation,
@@ -80,6 +84,9 @@ CHAIN: tuple[type[Effect], ...] = (
     Softening,
     SofteningOfOneMode,
     ExtraResonance,
+    UnnamedPositionMap,
+    UnnamedPlays,
+    UnnamedRelaxation,
     SensorNonlinearity,
     GainDrift,
     SensorBandwidth,
@@ -107,7 +114,10 @@ BASELINE: tuple[type[Effect], ...] = (BoucWen, PublishedBoucWen, Arx, Offset)
 FINER_FORMS: tuple[type[Effect], ...] = (LevelDependentMemory, CreepTwoRates, SecondOrderLowPass)
 """Finer forms of effects that an identified model may hold; a search names the effect, not its form."""
 
-CATALOGUE: tuple[type[Effect], ...] = tuple(e for e in CHAIN if e not in (*BASELINE, *FINER_FORMS))
+UNNAMED: tuple[type[UnnamedCorrection], ...] = (UnnamedPositionMap, UnnamedPlays, UnnamedRelaxation)
+"""Corrections without a physical name, for what no effect explains; no search for effects knows them."""
+
+CATALOGUE: tuple[type[Effect], ...] = tuple(e for e in CHAIN if e not in (*BASELINE, *FINER_FORMS, *UNNAMED))
 """The effects that can be added to a Hammerstein-MBW model."""
 
 BY_NAME: dict[str, type[Effect]] = {e.name: e for e in CHAIN}
@@ -136,6 +146,7 @@ __all__ = [
     "HYSTERESIS",
     "MEMORY",
     "OPERATORS",
+    "UNNAMED",
     "AmplifierBandwidth",
     "AmplifierSaturation",
     "AmplifierSlewLimit",
@@ -175,5 +186,10 @@ __all__ = [
     "Term",
     "ThermalDrift",
     "ThermalExpansion",
+    "CorrectionShape",
+    "UnnamedCorrection",
+    "UnnamedPlays",
+    "UnnamedPositionMap",
+    "UnnamedRelaxation",
     "effect_named",
 ]

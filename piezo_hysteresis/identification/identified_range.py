@@ -17,9 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from ..effects import UnnamedCorrection
 from ..model.model import Model
 from ..record import Experiment, Notice, Record
 from .records.excitation_content import excitation_content
@@ -78,7 +80,14 @@ def outside(model: Model, experiment: Experiment) -> tuple[Notice, ...]:
 
 
 def outside_of(model: Model, record: Record) -> Iterator[Notice]:
-    """`outside` of one record, or of a window of samples."""
+    """`outside` of one record, or of a window of samples; says where a correction without a name does not hold."""
+    is_corrected = any(isinstance(e, UnnamedCorrection) for e in model.effects)
+    for notice in _outside_of(model, record):
+        more = f"{notice.message}; its correction without a name does not hold there"
+        yield replace(notice, message=more) if is_corrected else notice
+
+
+def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
     if not set(KEYS) <= set(model.provenance):
         return
     low, high, slowest, fastest, steepest = (float(model.provenance[key]) for key in KEYS)

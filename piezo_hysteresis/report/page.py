@@ -27,6 +27,7 @@ from .document import document
 from .figures.bode import bode
 from .figures.comparison import ModelComparison
 from .figures.creep import creep
+from .figures.diagnosis.correction import correction
 from .figures.diagnosis.gap import gap
 from .figures.diagnosis.probabilities import probabilities
 from .figures.drawing import Drawing
@@ -36,7 +37,7 @@ from .figures.spectrum import residual_spectrum
 from .figures.step import step
 from .figures.time_series import time_series
 from .figures.whiteness import whiteness
-from .tables.answer_tables import effect_table, gap_table, rejection_table, where_table
+from .tables.answer_tables import correction_table, effect_table, gap_table, rejection_table, where_table
 from .tables.error_table import error_table, frequency_table
 from .tables.parameter_table import correlation_table, parameter_table
 from .tables.probability_table import probability_table
@@ -118,6 +119,8 @@ def page(
     done = 0
     if answer is not None and "live" in answer:
         drawn["Diagnosis"] = [probabilities(answer["live"])]
+    if answer is not None and (shape := correction(answer)) is not None:
+        drawn.setdefault("Diagnosis", []).append(shape)
     for heading, figures in SECTIONS.items():
         for figure in figures:
             if progress is not None:
@@ -141,6 +144,7 @@ def _tables(comparison: ModelComparison, fit: Fit | None, answer: Mapping[str, A
     if answer is not None:
         tables["Diagnosis"] = [
             effect_table(answer),
+            correction_table(answer),
             gap_table(answer),
             where_table(answer),
             rejection_table(answer),

@@ -155,6 +155,9 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
             f"{seen} the gap goes from {gap['before']:.3g} % to {gap['after']:.3g} % of range, "
             f"floor {gap['floor']:.3g} %."
         )
+    correction = answer.get("unnamed_correction")
+    if correction:
+        found.append(correction["reason"])
     following = answer.get("next_experiment")
     if following:
         apart = dict.fromkeys(n.replace("_", " ") for n in following.get("separates", ()))

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pytest
 
-from piezo_hysteresis.effects import BASELINE, BY_NAME, CATALOGUE, CHAIN, FINER_FORMS
+from piezo_hysteresis.effects import BASELINE, BY_NAME, CATALOGUE, CHAIN, FINER_FORMS, UNNAMED
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -59,7 +59,8 @@ def test_names_and_families_are_the_published_ones() -> None:
 
 def test_every_effect_is_in_the_chain_once_and_in_order() -> None:
     assert len(BY_NAME) == len(CHAIN)
-    assert set(BASELINE) | set(CATALOGUE) | set(FINER_FORMS) == set(CHAIN)
+    assert set(BASELINE) | set(CATALOGUE) | set(FINER_FORMS) | set(UNNAMED) == set(CHAIN)
+    assert not set(UNNAMED) & set(CATALOGUE)
     places = [e.place for e in CHAIN]
     assert places == sorted(places)
 

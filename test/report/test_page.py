@@ -26,8 +26,15 @@ from html.parser import HTMLParser
 import pytest
 
 from piezo_hysteresis.errors import RecordingError
-from piezo_hysteresis.report.tables.answer_tables import effect_table, gap_table, rejection_table, where_table
-from piezo_hysteresis.report.verdict import verdict
+from piezo_hysteresis.report.figures.diagnosis.correction import correction
+from piezo_hysteresis.report.tables.answer_tables import (
+    correction_table,
+    effect_table,
+    gap_table,
+    rejection_table,
+    where_table,
+)
+from piezo_hysteresis.report.verdict import answer_verdict, verdict
 
 VOID = {"meta", "img", "br", "link", "hr"}
 
@@ -170,6 +177,20 @@ def test_a_browser_shows_every_figure_and_reaches_every_link_by_keyboard(drawn, 
     links = len(tags.all("a")) + sum(a.get("tabindex") == "0" for _, a in tags.found)
     assert page["reached"] == links
     assert not page["wide"], "nothing scrolls sideways but the tables in their own frame"
+
+
+def test_a_correction_without_a_name_is_drawn_and_tabled_only_where_it_is_accepted(answer):
+    shape = {
+        "x": {"name": "position", "unit": "m", "values": [0.0, 1e-6, 2e-6]},
+        "y": {"name": "deviation", "unit": "m", "values": [0.0, 4e-9, 0.0]},
+    }
+    found = {"accepted": True, "reason": "A correction.", "depends_on": "position", "shape": shape}
+    accepted = {**answer, "verdict": "unknown", "effects": [], "unnamed_correction": found}
+    refused = {**accepted, "unnamed_correction": {**found, "accepted": False}}
+    assert correction_table(accepted).rows[1] == ("1e-06", "4e-09")
+    assert correction(accepted).data["deviation_nm"].tolist() == pytest.approx([0.0, 4.0, 0.0])
+    assert correction_table(refused) is None and correction(refused) is None
+    assert "A correction." in answer_verdict(refused).sentences
 
 
 def test_tables_of_a_diagnosis_say_what_its_answer_says(answer):

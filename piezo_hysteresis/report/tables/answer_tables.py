@@ -45,6 +45,20 @@ def effect_table(answer: Mapping[str, Any]) -> Table | None:
     return Table("Effects found", header, tuple(rows), note, frozenset({2, 5, 6})) if rows else None
 
 
+def correction_table(answer: Mapping[str, Any]) -> Table | None:
+    """The shape of a correction without a name that was accepted, point by point."""
+    correction = answer.get("unnamed_correction")
+    if not correction or not correction["accepted"]:
+        return None
+    axes = [correction["shape"][axis] for axis in ("x", "y")]
+    rows = tuple(tuple(f"{v:.3g}" for v in pair) for pair in zip(*(a["values"] for a in axes), strict=True))
+    header = tuple(f"{a['name']} [{a['unit']}]" for a in axes)
+    note = (
+        "It describes what is left, and has no physical name. It does not hold outside of the range that was recorded."
+    )
+    return Table("Correction without a name", header, rows, note, frozenset({0, 1}))
+
+
 def where_table(answer: Mapping[str, Any]) -> Table | None:
     """Axes along which the residual is concentrated, the strongest first."""
     rows = tuple(

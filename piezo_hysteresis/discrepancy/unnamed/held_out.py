@@ -1,0 +1,131 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Errors at rates and amplitudes that took no part in a fit.
+
+The records are divided into groups of similar rate, and again into groups of similar amplitude. Every group is left out
+once: the numbers are fitted to the other groups, and judged on this one. A form with free weights learns the rates that
+it was shown, and fails here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...identification.fit.bounded_step import bounded_step, room
+from ...identification.fit.normal_equations import grams
+from ...identification.records.excitation_content import excitation_content
+from ...model.model import Model
+from ..search.candidates import directions, free_numbers
+from ..search.training_data import TrainingData
+
+Array = NDArray[np.float64]
+
+GROUPS = 3
+"""Groups of similar rate, and of similar amplitude: slow, middle and fast; small, middle and large."""
+ALIKE = 1.05
+"""Factor between two rates or amplitudes up to which they are the same, so that no limit of a group separates them."""
+STIFFNESS = 1e-6
+"""Share of what all records know about a number by which it stays where it is; that of a correction stays at zero."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class HeldOut:
+    """RMS error over floor of every record that counts, when its group took no part in the fit.
+
+    Parameters
+    ----------
+    by_rate : (r,) ndarray
+        With the groups of similar rate left out.
+    by_amplitude : (k,) ndarray
+        With the groups of similar amplitude left out; without the records of the largest amplitudes, since they are
+        outside of the envelope of the others, where no correction is used.
+    """
+
+    by_rate: Array
+    by_amplitude: Array
+
+
+def groups_of(values: Sequence[float]) -> Array:
+    """Number of the group of each value (r,), from the smallest values on; similar values stay together.
+
+    >>> groups_of([1.0, 100.0, 1.1, 10.0, 9.0, 110.0]).tolist()
+    [0, 2, 0, 1, 1, 2]
+    >>> groups_of([5.0, 5.0, 5.1]).tolist()
+    [0, 0, 0]
+    """
+    sizes = np.log(np.maximum(np.asarray(values, dtype=float), 1e-300))
+    order = np.argsort(sizes, kind="stable")
+    found, group = np.zeros(sizes.size, dtype=int), 0
+    for place in range(1, sizes.size):
+        gap = sizes[order[place]] - sizes[order[place - 1]]
+        is_full = place >= (group + 1) * sizes.size / GROUPS
+        group += int(is_full and gap > np.log(ALIKE))
+        found[order[place]] = group
+    return found
+
+
+def held_out(model: Model, training_data: TrainingData, correction: str = "") -> HeldOut | None:
+    """Errors of a fitted model with whole groups left out, from inner products alone.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted to all records; with the correction, where there is one.
+    training_data : TrainingData
+        Records and floors.
+    correction : str
+        Identifier of the correction, whose numbers go to zero where the other groups know nothing of them.
+
+    Returns
+    -------
+    HeldOut or None
+        None where all records are of one rate, or all of one amplitude.
+    """
+    counted = [i for i, floor in enumerate(training_data.floors) if np.isfinite(floor)]
+    records = [training_data.records[i] for i in counted]
+    contents = [excitation_content(r) for r in records]
+    rates, amplitudes = groups_of([c.bandwidth for c in contents]), groups_of([c.span for c in contents])
+    if not (rates.any() and amplitudes.any()):
+        return None
+    names = free_numbers(model, training_data)
+    columns = directions(model, names)[:-1]
+    products = grams(model, training_data.records, names, training_data.nuisance)
+    scaled = [products[i].matrix / (products[i].size * training_data.floors[i] ** 2) for i in counted]
+    hessians = np.array([columns.T @ p[:-1, :-1] @ columns for p in scaled])
+    slopes = np.array([columns.T @ p[:-1, -1] for p in scaled])
+    power = np.array([p[-1, -1] for p in scaled])
+    theta = np.array([model.values()[n] for n in names])
+    ends = [np.array([getattr(model.row(n), end) for n in names]) for end in ("lower", "upper")]
+    low = room(ends[0], theta, columns, -np.inf)
+    high = room(ends[1], theta, columns, np.inf)
+    own = np.array([n.startswith(f"{correction}.") for n in names], dtype=bool)
+    home = columns.T @ np.where(own, -theta, 0.0)  # the step that takes the correction away
+    stiffness = STIFFNESS * np.maximum(np.diag(hessians.sum(axis=0)), np.finfo(float).tiny)
+
+    def without_groups(groups: Array) -> Array:
+        errors = np.empty(groups.size)
+        for group in range(groups.max() + 1):
+            kept = groups != group
+            hessian = hessians[kept].sum(axis=0) + np.diag(stiffness)
+            step = bounded_step(hessian, slopes[kept].sum(axis=0) + stiffness * home, low, high)
+            for i in np.flatnonzero(~kept):
+                errors[i] = power[i] + step @ hessians[i] @ step - 2.0 * step @ slopes[i]
+        return np.asarray(np.sqrt(np.maximum(errors, 0.0)))
+
+    return HeldOut(without_groups(rates), without_groups(amplitudes)[amplitudes < amplitudes.max()])

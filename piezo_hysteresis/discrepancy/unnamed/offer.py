@@ -1,0 +1,156 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The search for a correction without a name, and the tests that it has to pass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects import Offset, UnnamedCorrection, UnnamedPlays, UnnamedPositionMap, UnnamedRelaxation
+from ...identification.identified_range import identified_range
+from ...model.model import Model
+from ..gap import measure_gap, stating
+from ..search.baseline_setup import BaselineSetup
+from ..search.candidate_refits import LEAST_GAIN
+from ..search.refit import FAILURES, LAST, PRECISE, joint
+from ..search.selection_result import explained
+from ..search.training_data import TrainingData
+from .correction import Correction
+from .held_out import HeldOut, held_out
+
+Array = NDArray[np.float64]
+
+HEIGHTS = (15, 47)
+"""Numbers of heights of the position maps that are tried: smooth, and with a period of a tenth of the travel."""
+PLAYS = 13
+"""Number of plays, whose half widths grow by √2."""
+REMOVES, WORSE = 0.5, 1.05
+"""Share of the gap on the records set aside that a correction removes at least, and error over that without it that no
+such record exceeds."""
+FEW = 10
+"""Linearisations of a trial: a correction is small, and its numbers enter linearly."""
+
+
+def offered(model: Model, setup: BaselineSetup, null: float) -> Correction | None:
+    """The best correction of a fitted model, with the outcome of its tests.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted; what it leaves has no name.
+    setup : BaselineSetup
+        Records and floors.
+    null : float
+        V of a perfect model on the training records.
+
+    Returns
+    -------
+    Correction or None
+        None where the records have no second rate or amplitude, where none was set aside, or where no form gains.
+    """
+    before = held_out(model, setup.training_data)
+    if before is None or not setup.test_records:
+        return None
+    found = [c for form in forms(model, setup.training_data) if (c := tried(model, form, before, setup.training_data))]
+    if not found:
+        return None
+    best = max(found, key=lambda c: min(c.gain_rate, c.gain_amplitude))
+    return judged(best, model, setup, null) if best.accepted else best
+
+
+def forms(model: Model, training_data: TrainingData) -> Iterator[UnnamedCorrection]:
+    """Every form that is tried, switched off: small, passive, and with few numbers for what it spans."""
+    zero = model.with_effect(Offset()) if Offset.name in model else model
+    positions = [y / model.displacement_scale for y in zero.free_run(training_data.records)]
+    low, high = min(float(x.min()) for x in positions), max(float(x.max()) for x in positions)
+    if not high > low:
+        return
+    for heights in HEIGHTS:
+        yield UnnamedPositionMap(m=(0.0,) * heights, low=low, high=high)
+    yield UnnamedPlays(c=(0.0,) * PLAYS, reach=0.5 * (high - low))
+    extent = training_data.extent
+    yield UnnamedRelaxation(tau_min=extent.fastest_period, tau_max=10.0 * extent.longest_record)
+
+
+def tried(model: Model, form: UnnamedCorrection, before: HeldOut, training_data: TrainingData) -> Correction | None:
+    """A form fitted jointly with the model, and what it gains at rates and amplitudes left out; None where it fails.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted without it.
+    form : UnnamedCorrection
+        Switched off.
+    before : HeldOut
+        Errors of the model without it.
+    training_data : TrainingData
+        Records and floors.
+    """
+    try:
+        if min(_gains(model.with_effect(form), form.name, before, training_data)) <= 0.0:
+            return None
+        fit = joint(model.with_effect(form), training_data, FEW)
+        by_rate, by_amplitude = _gains(fit.model, form.name, before, training_data)
+    except FAILURES:
+        return None
+    axes = [axis for axis, gain in (("rates", by_rate), ("amplitudes", by_amplitude)) if gain < LEAST_GAIN]
+    effect = fit.model[form.name]
+    assert isinstance(effect, UnnamedCorrection)
+    refusal = (
+        f"a function of the {form.depends_on} gains only {min(by_rate, by_amplitude):.2f} in mean ln R² at "
+        f"{' and '.join(axes)} that were not fitted, {LEAST_GAIN:g} is needed"
+        if axes
+        else ""
+    )
+    return Correction(effect, model.displacement_scale, None, by_rate, by_amplitude, None, 0.0, refusal)
+
+
+def judged(correction: Correction, model: Model, setup: BaselineSetup, null: float) -> Correction:
+    """The correction after the last fit to all samples, judged on the records set aside."""
+    training_data = replace(setup.training_data, records=setup.whole)
+    try:
+        fit = joint(model.with_effect(correction.effect), training_data, LAST, PRECISE)
+        both, nuisances = (model, fit.model), (training_data.nuisance, training_data.nuisance)
+        gap = measure_gap(both, setup.records, setup.test_records, setup.least.tolist(), setup.span, nuisances, True)
+    except FAILURES as error:
+        return replace(correction, refusal=f"its last fit failed ({error})")
+    ratios = np.array([(p.before / p.floor, p.after / p.floor) for p in gap.per_phase])
+    first, second = np.mean(ratios**2, axis=0).tolist()
+    removed, effect = explained(first, second, null), fit.model[correction.effect.name]
+    assert isinstance(effect, UnnamedCorrection)
+    found = replace(correction, effect=effect, gap=gap, removed=removed)
+    if removed < REMOVES:
+        return replace(found, refusal=f"it removes {100 * removed:.0f} % of the gap on the test records")
+    if found.worst > WORSE:
+        return replace(found, refusal=f"it makes a test record worse by {100 * (found.worst - 1.0):.0f} %")
+    stated = stating(fit.stated_model, gap.live, setup.span)
+    envelope = identified_range(setup.records, setup.fitted)
+    return replace(found, model=replace(stated, provenance={**stated.provenance, **envelope}))
+
+
+def _gains(model: Model, form: str, before: HeldOut, training_data: TrainingData) -> tuple[float, float]:
+    """G at rates and at amplitudes that were left out."""
+    after = held_out(model, training_data, form)
+    assert after is not None
+    return _gain(before.by_rate, after.by_rate), _gain(before.by_amplitude, after.by_amplitude)
+
+
+def _gain(before: Array, after: Array) -> float:
+    logs: Sequence[Array] = [np.log(np.maximum(1.0, errors**2)) for errors in (before, after)]
+    return float(np.mean(logs[0] - logs[1]))

@@ -1,0 +1,180 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Corrections without a name: a form that generalises is accepted, and a free filter bank that learns well is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.blocks.block import Block
+from piezo_hysteresis.blocks.relaxation import RelaxationBlock
+from piezo_hysteresis.discrepancy import passes
+from piezo_hysteresis.discrepancy.search.baseline_setup import BaselineSetup
+from piezo_hysteresis.discrepancy.search.candidates import score_baseline
+from piezo_hysteresis.discrepancy.search.refit import LAST, joint
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
+from piezo_hysteresis.discrepancy.unnamed.correction import Correction, without_corrections
+from piezo_hysteresis.discrepancy.unnamed.held_out import held_out
+from piezo_hysteresis.discrepancy.unnamed.offer import offered, tried
+from piezo_hysteresis.effects import (
+    CATALOGUE,
+    Arx,
+    BoucWen,
+    CorrectionShape,
+    Discretisation,
+    Effect,
+    Offset,
+    UnnamedCorrection,
+    UnnamedPlays,
+    UnnamedPositionMap,
+)
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance, residuals
+from piezo_hysteresis.identification.identified_range import outside_of
+from piezo_hysteresis.model import model_file
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.parameter import Parameter
+from piezo_hysteresis.record import Experiment, Record
+
+PERIOD, SCALE, FLOOR = 1e-3, 1e-5, 2e-9
+PLAIN = Model((BoucWen(), Arx(b=[0.3]), Offset(y0=1e-7)), PERIOD, displacement_scale=SCALE)
+TAU = np.geomspace(5e-3, 0.5, 5)
+
+
+class FreeBank(UnnamedCorrection):
+    """Five relaxations with weights that are free: it can imitate any lag at one rate."""
+
+    name = "free_bank"
+    depends_on = "past"
+    parameters = (Parameter("c", "c_j", "1", (0.0,) * 5, -1.0, 1.0, "weights", "test", 0.0, 0.01),)
+
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
+        names = tuple(f"free_bank.c[{j}]" for j in range(5))
+        slopes = np.hstack((-np.ones((5, 1)), np.eye(5)))
+        return RelaxationBlock(names, TAU, setting.sample_period, self.array("c") @ slopes, slopes)
+
+    def shape(self, displacement_scale: float) -> CorrectionShape:
+        return CorrectionShape("relaxation time", "s", TAU, "weight", "1", self.array("c"))
+
+
+def played(plant: Model, rate: float, height: float, seed: int) -> Record:
+    """Two cycles of a sine from 0 V, with noise."""
+    t = np.arange(max(300, int(2.0 / rate / PERIOD))) * PERIOD
+    bare = Record(0.5 * height * (1.0 - np.cos(2.0 * np.pi * rate * t)), t, PERIOD, phase="sine")
+    noise = np.random.default_rng(seed).normal(scale=FLOOR, size=t.size)
+    return replace(bare, displacement=plant.simulate(bare)[0] + noise)
+
+
+def setup_of(plant: Model) -> BaselineSetup:
+    """Sines of three rates and three amplitudes, of which every one in the middle of both is set aside."""
+    drives = [(rate, height) for rate in (0.7, 4.0, 25.0) for height in (3.0, 5.0, 8.0)]
+    drives += [(1.5, 6.0), (10.0, 4.0)]
+    records = tuple(played(plant, *drive, seed) for seed, drive in enumerate(drives))
+    chosen, least = range(9), np.full(len(records), FLOOR)
+    span = float(np.ptp([r.displacement.max() for r in records] + [0.0]))
+    data = TrainingData(records[:9], least[:9], Nuisance(), extent_of(records, PLAIN))
+    fit = joint(PLAIN, data, LAST)
+    data, score = score_baseline(fit.model, data)
+    lost = [np.zeros(r.size) for r in records]
+    return BaselineSetup(
+        records, records, lost, least, least, span, range(len(records)), chosen, (9, 10), data, fit, score
+    )
+
+
+def hump() -> UnnamedPositionMap:
+    """A deviation at one position."""
+    x = np.linspace(0.0, 0.55, 22)[1:-1]
+    return UnnamedPositionMap(m=tuple(0.004 * np.exp(-(((x - 0.2) / 0.04) ** 2))), low=0.0, high=0.55)
+
+
+@pytest.fixture(scope="module")
+def of_position() -> BaselineSetup:
+    return setup_of(PLAIN.with_effect(hump()))
+
+
+@pytest.fixture(scope="module")
+def of_friction() -> BaselineSetup:
+    return setup_of(PLAIN.with_effect(UnnamedPlays(c=(0.0, 0.0, 0.2, 0.2, 0.0, 0.0, 0.0), reach=0.3)))
+
+
+@pytest.fixture(scope="module")
+def found(of_position: BaselineSetup) -> Correction:
+    return offered(of_position.baseline.model, of_position, 1.0)
+
+
+def test_a_deviation_of_the_position_is_offered_and_its_shape_told(found: Correction) -> None:
+    assert found.accepted and isinstance(found.effect, UnnamedPositionMap)
+    assert found.removed >= 0.5 and found.worst <= 1.05
+    shape = found.effect.shape(SCALE)
+    assert shape.x[np.argmax(shape.y)] == pytest.approx(0.2 * SCALE, abs=0.04 * SCALE)
+    assert "says nothing of the cause" in found.sentence()
+    assert found.answer()["depends_on"] == "position"
+
+
+def test_the_corrected_model_survives_its_file_and_names_its_envelope(
+    of_position: BaselineSetup, found: Correction
+) -> None:
+    again = model_file.loads(model_file.dumps(found.model))
+    record = of_position.records[9]
+    np.testing.assert_array_equal(again.simulate(record), found.model.simulate(record))
+    assert not [*outside_of(again, record)]
+    (told,) = [n for n in outside_of(again, played(PLAIN, 4.0, 11.0, 0)) if n.kind == "outside_amplitudes"]
+    assert "correction without a name does not hold there" in told.message
+
+
+def test_nothing_is_changed_beyond_the_positions_that_were_recorded() -> None:
+    far = np.linspace(0.56, 2.0, 50)
+    block = hump().block(Discretisation(PERIOD, PERIOD))
+    np.testing.assert_array_equal(block.run(far, None)[0], far)
+
+
+def test_friction_of_the_position_is_offered_as_plays(of_friction: BaselineSetup) -> None:
+    found = offered(of_friction.baseline.model, of_friction, 1.0)
+    assert found.accepted and isinstance(found.effect, UnnamedPlays)
+    assert found.removed >= 0.5 and found.worst <= 1.05
+
+
+def test_a_free_filter_bank_learns_well_is_worse_elsewhere_and_is_refused(of_friction: BaselineSetup) -> None:
+    model, data = of_friction.baseline.model, of_friction.training_data
+    one_rate = replace(data, records=data.records[3:6], floors=data.floors[3:6], alone=())
+    learnt = joint(model.with_effect(FreeBank()), one_rate, LAST).model
+    before, after = (
+        np.array([np.sqrt(np.mean(e**2)) for e in residuals(m, data.records, data.nuisance)]) for m in (model, learnt)
+    )
+    ratios = after / before
+    assert ratios[3:6].mean() < 0.7, "it learns the rate that it is shown"
+    assert min(ratios[:3].mean(), ratios[6:].mean()) > 3.0, "and is three times worse at the others"
+    errors = held_out(model, data)
+    refused = tried(model, FreeBank(), errors, data)
+    assert refused is None or not refused.accepted
+    assert tried(model, UnnamedPlays(reach=0.3), errors, data).accepted
+
+
+def test_a_correction_is_never_part_of_naming(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not any(issubclass(effect, UnnamedCorrection) for effect in CATALOGUE)
+    corrected = PLAIN.with_effect(hump())
+    assert [e.name for e in without_corrections(corrected).effects] == [e.name for e in PLAIN.effects]
+    monkeypatch.setattr(passes, "same_stage", lambda *_: None)
+    record = played(PLAIN, 4.0, 5.0, 0)
+    state = passes.DiagnosisState(Experiment((record,)), corrected, CATALOGUE, lambda *_: None)
+    assert hump().name not in passes.compare_with_given_model(state).model
+
+
+def test_records_of_one_rate_cannot_accept_a_correction(of_position: BaselineSetup) -> None:
+    data = of_position.training_data
+    one = replace(data, records=data.records[3:6], floors=data.floors[3:6], alone=())
+    assert offered(of_position.baseline.model, replace(of_position, training_data=one), 1.0) is None
