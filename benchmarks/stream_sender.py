@@ -36,6 +36,7 @@ from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
+from piezo_hysteresis.nodes.messages.phase_text import PHASE_FIELD
 from piezo_hysteresis.nodes.runtime.executor import make_executor, spin_until
 from piezo_hysteresis.nodes.runtime.guarded_node import GuardedNode
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS
@@ -64,7 +65,7 @@ def main(namespace: str, sample_period: float, waveform: Path) -> None:
 
     Without a stamp, for where no core is free it may be old when it comes.
     """
-    cloud = command_to_cloud(np.load(waveform), sample_period, "")
+    cloud = command_to_cloud(np.load(waveform), sample_period, "stream")
     rclpy.init()
     node, executor = GuardedNode("sender", namespace=namespace), make_executor()
     publisher = node.create_publisher(PointCloud2, "command", COMMAND)
@@ -87,7 +88,7 @@ def main(namespace: str, sample_period: float, waveform: Path) -> None:
         while not is_known():
             executor.spin_until_future_complete(Future(), timeout_sec=_LOOK)
         for name in map("stream_{}".format, itertools.count()):
-            cloud.header.frame_id = name
+            cloud.fields[-1].name = PHASE_FIELD + name
             ended = states[name] = Future()
             send(publisher, cloud)
             spin_until(executor, ended, node)

@@ -28,7 +28,10 @@ publisher = node.create_publisher(PointCloud2, "trajectory", 10)
 while not publisher.get_subscription_count():  # until the compensation node is found
     rclpy.spin_once(node, timeout_sec=0.1)
 scan = PointCloud2(height=1, width=wanted.size, point_step=8, row_step=8 * wanted.size, is_dense=True)
-scan.fields = [PointField(name="displacement", offset=0, datatype=PointField.FLOAT64, count=1)]
-scan.data, scan.header.frame_id = array.array("B", wanted.tobytes()), "my_scan"
+scan.fields = [
+    PointField(name=name, offset=0, datatype=PointField.FLOAT64, count=1)
+    for name in ("displacement", "phase:my_scan")  # the same bytes: what they are, and the name of the phase
+]
+scan.data = array.array("B", wanted.tobytes())
 publisher.publish(scan)
 publisher.wait_for_all_acked(Duration(seconds=5.0))

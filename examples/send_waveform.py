@@ -14,7 +14,8 @@
 
 """Play a waveform on a stage from any lab software: `python send_waveform.py --ros-args -r __ns:=/stage_x`.
 
-No message of this package is needed: a waveform is a standard point cloud with one field, `voltage`.
+No message of this package is needed: a waveform is a standard point cloud with one field, `voltage`. A second field of the
+same bytes names the phase.
 """
 
 import array
@@ -39,9 +40,11 @@ while not publisher.get_subscription_count():  # until the driver is found
     rclpy.spin_once(node, timeout_sec=0.1)
 
 waveform = PointCloud2(height=1, width=voltage.size, point_step=8, row_step=8 * voltage.size, is_dense=True)
-waveform.fields = [PointField(name="voltage", offset=0, datatype=PointField.FLOAT64, count=1)]
+waveform.fields = [
+    PointField(name=name, offset=0, datatype=PointField.FLOAT64, count=1)
+    for name in ("voltage", "phase:my_sine")  # the same bytes: what they are, and the name of the phase
+]
 waveform.data = array.array("B", voltage.tobytes())
-waveform.header.frame_id = "my_sine"  # name of the phase
 waveform.header.stamp = node.get_clock().now().to_msg()  # an old command is refused; without a stamp it never is
 
 finished = Future()

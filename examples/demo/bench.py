@@ -34,7 +34,8 @@ from piezo_hysteresis import Model
 from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.model.model_file import loads
 from piezo_hysteresis.model.model_parameters import hash_number
-from piezo_hysteresis.nodes.messages.cloud import from_cloud, to_cloud
+from piezo_hysteresis.nodes.compensation.trajectory import trajectory_to_cloud
+from piezo_hysteresis.nodes.messages.cloud import from_cloud
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.messages.samples import SampleReader
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS, LATCHED, SAMPLES, STATUS
@@ -239,9 +240,8 @@ class Bench:
         """Send a path [m] to the compensation node, and wait until it was played or refused; its last status."""
         self.wait(lambda: self._trajectory.get_subscription_count() > 0, "a compensation node", 60.0)
         self._driven.clear()
-        columns = {"displacement": wanted}
         stamp = self.node.get_clock().now().to_msg()
-        self._trajectory.publish(to_cloud(columns, {"displacement": "f8"}, stamp, name))
+        self._trajectory.publish(trajectory_to_cloud(wanted, name, stamp))
         return self._driven_to_end(name, timeout)
 
     def learn(self, timeout: float = 120.0) -> tuple[DiagnosticStatus, DiagnosticStatus]:

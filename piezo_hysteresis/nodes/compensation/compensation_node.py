@@ -33,7 +33,7 @@ from ...model.model import Model
 from ...model.model_file import load, loads
 from ...online.warmup import compile_kernels
 from ..identification.driver_client import DriverClient
-from ..messages.conversions import values_of
+from ..messages.conversions import phase_text_of, values_of
 from ..messages.phase_text import phase_name
 from ..messages.samples import SampleReader
 from ..runtime.guarded_node import GuardedNode
@@ -66,7 +66,7 @@ class CompensationNode(GuardedNode):
         self._model: Model | None = None
         self._applied: AppliedState | None = None
         self._job: Job | None = None
-        self._phase = ""
+        self._phase = self._frame = ""
         self._set_point = SetPoint(advertise(self, "set_voltage"), self._values["integral_time"])
         if self._values["model_file"]:
             self._follow_model(load(self._values["model_file"]))
@@ -106,6 +106,7 @@ class CompensationNode(GuardedNode):
         driver = self._driver.limits
         try:
             block = self._reader.read(message)
+            self._frame = block.frame
             if driver is not None and (self._applied is None or self._applied.sample_period != driver.sample_period):
                 self._applied = AppliedState(driver.sample_period)
                 if self._model is not None:
@@ -120,10 +121,12 @@ class CompensationNode(GuardedNode):
         self._set_point.measured(float(np.mean(block.displacement)), block.size)
 
     def _on_trajectory(self, cloud: PointCloud2) -> Trigger.Response:
-        name = cloud.header.frame_id[:64]
+        name = ""
         try:
+            text = phase_text_of(cloud, self._frame)
+            name = text[:64]
             applied, limits = self._ready()
-            name = phase_name(cloud.header.frame_id)
+            name = phase_name(text)
             wanted = trajectory_from_cloud(cloud, applied.sample_period, self._values["longest_trajectory"])
         except PiezoError as error:
             self._status.refuse(name, str(error))

@@ -24,7 +24,7 @@ from sensor_msgs.msg import PointCloud2
 from ...compensation import Plan
 from ...errors import RecordError
 from ..messages.cloud import from_cloud, to_cloud
-from ..messages.conversions import PERIOD_TOLERANCE
+from ..messages.conversions import PERIOD_TOLERANCE, with_phase
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,8 @@ def trajectory_from_cloud(cloud: PointCloud2, sample_period: float, longest: flo
 
 def trajectory_to_cloud(displacement: ArrayLike, phase: str, stamp: Time) -> PointCloud2:
     """The message of `trajectory` for a wanted displacement (n,) [m]."""
-    return to_cloud({"displacement": np.array(displacement, dtype=np.float64)}, {"displacement": "f8"}, stamp, phase)
+    columns = {"displacement": np.array(displacement, dtype=np.float64)}
+    return with_phase(to_cloud(columns, {"displacement": "f8"}, stamp), phase)
 
 
 def described(plan: Plan) -> str:

@@ -24,7 +24,7 @@ from std_msgs.msg import Float64
 from ...acquisition.safety.stop_latch import StopLatch
 from ...acquisition.session import DriverSession
 from ...errors import PiezoError, StageError, printable
-from ..messages.conversions import from_stamp, waveform_from_cloud
+from ..messages.conversions import from_stamp, phase_text_of, waveform_from_cloud
 from ..messages.phase_text import phase_and_owner
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.node_clock import now
@@ -89,9 +89,11 @@ class DriverCommands:
         return self._attached
 
     def _on_command(self, cloud: PointCloud2) -> None:
-        name, stamp = printable(cloud.header.frame_id[:_LONGEST_NAME]), 0
+        name, stamp = "", 0
         try:
-            name, owner = phase_and_owner(cloud.header.frame_id)
+            text = phase_text_of(cloud, self._attached[1].frame if self._attached else "")
+            name = printable(text[:_LONGEST_NAME])
+            name, owner = phase_and_owner(text)
             stamp = from_stamp(cloud.header.stamp)
             session, topics = self._stage()
             self._latch.require_released(name)

@@ -52,7 +52,7 @@ class DriverTopics:
     """
 
     def __init__(self, node: LifecycleNode, stage: str, frame: str, sample_period: float, live_rate: float) -> None:
-        self._stage, self._frame = stage, frame
+        self._stage, self.frame = stage, frame
         self._live_step = max(1, round(1 / (live_rate * sample_period)))
         self._next_live = 0
         self._first: dict[int, int] = {}
@@ -83,7 +83,7 @@ class DriverTopics:
         for event in begun:
             send(self._phase, String(data=str(event.phase)))
             self._publish_event(event, delivery.first)
-        if not send(self._samples, self._writer.write(replace(delivery.block, frame=self._frame))):
+        if not send(self._samples, self._writer.write(replace(delivery.block, frame=self.frame))):
             message = f"the middleware did not accept a block of {delivery.block.size} samples; the block is lost"
             self._node.get_logger().warning(message)
         for event in ended:
@@ -139,4 +139,4 @@ class DriverTopics:
                 send(publisher, Float64(data=value))
         if is_heard(self._live):
             stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
-            send(self._live, live(stamp, self._frame, voltage=voltage, displacement=displacement))
+            send(self._live, live(stamp, self.frame, voltage=voltage, displacement=displacement))

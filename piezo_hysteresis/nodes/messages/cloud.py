@@ -42,7 +42,7 @@ def to_cloud(
     stamp : builtin_interfaces.msg.Time
         Time of the first sample.
     frame_id : str
-        Phase or stage name.
+        Frame of what was measured.
     dense : bool
         False where samples before the first one were never measured.
     """

@@ -20,11 +20,12 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from numpy.typing import ArrayLike, NDArray
-from sensor_msgs.msg import JointState, PointCloud2
+from sensor_msgs.msg import JointState, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from ...errors import RecordError, printable
 from .cloud import from_cloud, to_cloud
+from .phase_text import PHASE_FIELD, phase_text
 
 Samples = NDArray[np.float64]
 
@@ -51,7 +52,20 @@ def command_to_cloud(voltage: ArrayLike, sample_period: float, phase: str, stamp
     """
     values = np.asarray(voltage, dtype=np.float64)
     columns = {"time": sample_period * np.arange(values.size), "voltage": values}
-    return to_cloud(columns, COMMAND, stamp or Time(), phase)
+    return with_phase(to_cloud(columns, COMMAND, stamp or Time()), phase)
+
+
+def with_phase(cloud: PointCloud2, phase: str) -> PointCloud2:
+    """The same waveform with the name of its phase: a second name of the bytes of its last field."""
+    column = cloud.fields[-1]
+    name = PointField(name=PHASE_FIELD + phase, offset=column.offset, datatype=column.datatype, count=1)
+    cloud.fields = [*cloud.fields, name]
+    return cloud
+
+
+def phase_text_of(cloud: PointCloud2, frame: str) -> str:
+    """Text that names the phase of a waveform, as from `phase_text`."""
+    return phase_text((field.name for field in cloud.fields), cloud.header.frame_id, frame)
 
 
 def waveform_from_cloud(cloud: PointCloud2, sample_period: float) -> Samples:

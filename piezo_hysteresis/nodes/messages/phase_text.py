@@ -17,14 +17,48 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from ...errors import RecordError
 
 _PHASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 """Names that a phase may have."""
 
+PHASE_FIELD = "phase:"
+"""Beginning of the name of a field that names the phase of a waveform; it stands for the same bytes as another field."""
 
-def phase_name(frame_id: str) -> str:
+
+def phase_text(fields: Iterable[str], frame_id: str, frame: str) -> str:
+    """Text that names the phase of a waveform, and its owner; empty where none is given.
+
+    Parameters
+    ----------
+    fields : iterable of str
+        Names of the fields of the message.
+    frame_id : str
+        Of its header. Senders that know no such field name the phase here.
+    frame : str
+        Frame of the axis; a `frame_id` that equals it is no name of a phase.
+
+    Raises
+    ------
+    RecordError
+        On more than one field that names a phase.
+
+    Examples
+    --------
+    >>> phase_text(["voltage", "phase:triangle"], "stage_x", "stage_x"), phase_text(["voltage"], "triangle", "stage_x")
+    ('triangle', 'triangle')
+    """
+    named = [name.removeprefix(PHASE_FIELD) for name in fields if name.startswith(PHASE_FIELD)]
+    if len(named) > 1:
+        raise RecordError(f"fields: got {len(named)} that begin with '{PHASE_FIELD}', expected one")
+    if named:
+        return named[0]
+    return "" if frame_id == frame else frame_id
+
+
+def phase_name(text: str) -> str:
     """Name of a commanded phase; `command` where no name is given.
 
     Raises
@@ -32,16 +66,14 @@ def phase_name(frame_id: str) -> str:
     RecordError
         If the name cannot be part of a file name.
     """
-    if not frame_id:
+    if not text:
         return "command"
-    if not _PHASE_NAME.fullmatch(frame_id):
-        raise RecordError(
-            f"frame_id: got {frame_id[:80]!r} as phase name, expected 1 to 64 letters, digits, '_', '.', '-'"
-        )
-    return frame_id
+    if not _PHASE_NAME.fullmatch(text):
+        raise RecordError(f"phase name: got {text[:80]!r}, expected 1 to 64 letters, digits, '_', '.', '-'")
+    return text
 
 
-def phase_and_owner(frame_id: str) -> tuple[str, str]:
+def phase_and_owner(text: str) -> tuple[str, str]:
     """Name and owner of a commanded phase, from ``"<name>@<owner>"``; the owner is empty if none is given.
 
     Raises
@@ -49,7 +81,7 @@ def phase_and_owner(frame_id: str) -> tuple[str, str]:
     RecordError
         As `phase_name`.
     """
-    name, _, owner = frame_id.partition("@")
+    name, _, owner = text.partition("@")
     return phase_name(name), owner
 
 

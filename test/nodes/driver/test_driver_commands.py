@@ -16,10 +16,11 @@
 
 import numpy as np
 import pytest
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud
 from piezo_hysteresis.nodes.messages.phase_text import phase_from_text
 
 pytestmark = pytest.mark.nodes
@@ -59,6 +60,15 @@ def test_every_sample_of_a_command_arrives_or_is_reported_lost(driven):
     assert (np.diff(samples.place()) > 0).all()
     assert samples.played(wave, first, number)
     assert [phase_from_text(p.data)[1] for p in phases][-2:] == ["noise", "hold"]
+
+
+@pytest.mark.parametrize(("frame_id", "name"), [("triangle", "triangle"), ("stage", "command"), ("", "command")])
+def test_a_phase_that_no_field_names_is_read_from_frame_id(driven, frame_id, name):
+    statuses, sender = driven.statuses(), driven.publisher(PointCloud2, "command")
+    cloud = command_to_cloud(np.linspace(0.0, 0.1, 100), PERIOD, "")
+    cloud.fields, cloud.header.frame_id = cloud.fields[:-1], frame_id  # the frame of this driver is 'stage'
+    sender.publish(cloud)
+    driven.wait(lambda: driven.states(statuses, name)[-1:] == ["done"], "the end of the command")
 
 
 def test_stamps_and_times_are_one_clock(driven):

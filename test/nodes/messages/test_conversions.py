@@ -24,7 +24,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from piezo_hysteresis.errors import RecordError
 from piezo_hysteresis.nodes.messages import conversions
-from piezo_hysteresis.nodes.messages.phase_text import phase_from_text, phase_name
+from piezo_hysteresis.nodes.messages.phase_text import phase_from_text, phase_name, phase_text
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -37,7 +37,28 @@ def over_the_wire(message):
 def test_waveform_comes_back_bit_for_bit(voltage):
     message = over_the_wire(conversions.command_to_cloud(voltage, 2e-5, "triangle"))
     assert np.array_equal(conversions.waveform_from_cloud(message, 2e-5), voltage)
-    assert phase_name(message.header.frame_id) == "triangle"
+    assert conversions.phase_text_of(message, "") == "triangle"
+    assert message.header.frame_id == ""
+
+
+@pytest.mark.parametrize(
+    ("fields", "frame_id", "name"),
+    [
+        (["voltage", "phase:triangle"], "", "triangle"),
+        (["voltage", "phase:triangle@scanner"], "stage_x", "triangle@scanner"),
+        (["voltage", "phase:triangle"], "sine", "triangle"),
+        (["voltage"], "triangle", "triangle"),  # senders that name the phase in frame_id
+        (["voltage"], "stage_x", ""),  # the frame of the axis is no name of a phase
+        (["voltage"], "", ""),
+    ],
+)
+def test_a_phase_is_named_by_a_field_or_by_frame_id(fields, frame_id, name):
+    assert phase_text(fields, frame_id, "stage_x") == name
+
+
+def test_two_names_of_a_phase_are_refused():
+    with pytest.raises(RecordError, match="expected one"):
+        phase_text(["phase:sine", "voltage", "phase:step"], "", "stage_x")
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.001, 2.0])
