@@ -28,6 +28,8 @@ NODES = ("driver", "model", "identification", "compensation")
 """Nodes of the package that publish at all times."""
 RECORDERS = ("identification", "operator")
 """Keys that may take every topic of an axis."""
+OF_JOBS = ("claimed_by", "model", "status")
+"""Topics that a program needs which calls the actions."""
 OF_ROS = {"publish": ("/rosout", "/parameter_events"), "subscribe": ("/clock",)}
 """Topics of ROS itself that every node of the package uses."""
 PROFILE = re.compile(r'(<profile ns="/stage_x" node="(\w+?)(?:_node)?">)(.*?)(</profile>)', re.DOTALL)
@@ -51,13 +53,16 @@ def quality(topic: Topic) -> str:
 def may(key: str, right: str) -> list[str]:
     """Names that a key of the policy may publish, or subscribe to."""
     names = list(OF_ROS[right]) if key in NODES or right == "publish" else []
+    if right == "subscribe" and key in RECORDERS:
+        names.append("*")  # by a pattern: Fast DDS exchanges no long permissions
     for topic in TOPICS.values():
         if right == "publish":
             by_node = topic.by == key or key in topic.senders or (topic.by == ALL and key in NODES)
             allowed = by_node or (topic.by == ANYONE and key == "operator")
         else:
             looks = key == "observer" and topic.by != ANYONE
-            allowed = key in topic.readers or key in RECORDERS or looks
+            asks = key == "planner" and topic.name in OF_JOBS
+            allowed = key in topic.readers or looks or asks or (key in RECORDERS and topic.name.startswith("/"))
         if allowed:
             names.append(topic.name)
     if key == "driver" and right == "publish":

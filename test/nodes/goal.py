@@ -14,9 +14,16 @@
 
 """`Goal`: one goal of an action, for the tests of the nodes that serve them."""
 
+import fnmatch
 import threading
+from pathlib import Path
+from xml.etree import ElementTree
 
 from rclpy.action import ActionClient
+
+from piezo_hysteresis.nodes.runtime.job_actions import SUFFIX
+
+POLICY = Path(__file__).parents[2] / "config" / "sros2_policy.xml"
 
 
 class Goal:
@@ -43,3 +50,16 @@ class Goal:
     def cancel(self):
         self._accepted.wait(10.0)
         self.handle.cancel_goal_async()
+
+
+def assert_granted(lab, node):
+    """The rights of the security policy cover what the node uses that serves the actions of `node`."""
+    (profile,) = ElementTree.parse(POLICY).getroot().iterfind(f".//profile[@node='{node}{SUFFIX}']")
+    granted = {right: ["/" + name.text.lstrip("/") for name in kind] for kind in profile for right in kind.attrib}
+    used = lab.node.get_service_names_and_types_by_node(node + SUFFIX, "/")
+    jobs = {name.split("/_action/")[0] for name, _ in used if "/_action/" in name}
+    assert jobs
+    assert {name for name in jobs if any(fnmatch.fnmatch(name, p) for p in granted["execute"])} == jobs
+    assert {name for name, _ in used if "/_action/" not in name} == set(granted["reply"])
+    topics = {name for name, _ in lab.node.get_publisher_names_and_types_by_node(node + SUFFIX, "/")}
+    assert {name for name in topics if "/_action/" not in name} <= set(granted["publish"])

@@ -22,6 +22,7 @@ from xml.etree import ElementTree
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
+from piezo_hysteresis.nodes.runtime.job_actions import SUFFIX
 from piezo_hysteresis.nodes.topics import ANYONE, TOPICS
 
 pytestmark = pytest.mark.nodes
@@ -161,16 +162,32 @@ def test_the_security_policy_allows_what_a_node_uses_and_nothing_more(nodes, nod
     if node == "driver_node":
         own.add("/samples")  # before it begins, to find another driver
     clock = set() if node == "driver_node_stop" else {"/clock"}  # a stop asks no clock
-    assert policy.get("subscribe", set()) == own | clock
+    heard, recorded = own | clock, {"/*"} if node == "identification_node" else set()
+    assert policy.get("subscribe", set()) - recorded <= heard
+    assert {n for pattern in policy.get("subscribe", ()) for n in fnmatch.filter(heard, pattern)} == heard
     assert {n for pattern in policy["reply"] for n in fnmatch.filter(of("service"), pattern)} == of("service")
     assert all(n.startswith(f"/{node}/") or "*" not in n for n in policy["reply"])  # its own names
     assert all(fnmatch.filter(of("service"), pattern) for pattern in policy["reply"])
     assert policy.get("request", set()) == of("client")
 
 
+def test_the_policy_grants_the_actions_to_the_nodes_that_serve_them_and_to_the_planner():
+    kinds = {path.stem.lower() for path in (ROOT / "interfaces" / "action").glob("*.action")}
+    served = {"/identification_node/identify", "/identification_node/diagnose", "/compensation_node/track"}
+    assert {name.rpartition("/")[2] for name in served} == kinds
+    assert allowed("planner")["call"] == served
+    for node in ("identification_node", "compensation_node"):
+        assert allowed(f"{node}{SUFFIX}")["execute"] == {f"/{node}/*"}
+        assert allowed(f"{node}{SUFFIX}")["reply"] == {f"/{node}{SUFFIX}/get_type_description"}
+    for key in (*NODES.values(), "operator", "observer"):
+        assert not {"call", "execute"} & allowed(key).keys()
+    assert allowed("planner")["publish"] == {"/rosout", "/parameter_events"}
+    assert "request" not in allowed("planner")
+
+
 def test_no_comment_of_the_policy_stands_where_sros2_looks_for_enclaves():
     whole = ElementTree.parse(POLICY, ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True)))
-    assert [e.tag for e in whole.getroot().find("enclaves")] == ["enclave"] * 6
+    assert [e.tag for e in whole.getroot().find("enclaves")] == ["enclave"] * 7
 
 
 def test_the_policy_has_a_key_for_who_drives_and_one_for_who_looks():

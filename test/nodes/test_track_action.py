@@ -21,7 +21,7 @@ pytest.importorskip("piezo_hysteresis_interfaces", reason="needs the package of 
 from action_msgs.msg import GoalStatus
 from piezo_hysteresis_interfaces.action import Track
 
-from .goal import Goal
+from .goal import Goal, assert_granted
 from .test_compensation_node import NODE, STROKE, Compensation, scan
 
 pytestmark = pytest.mark.nodes
@@ -55,6 +55,7 @@ def test_a_path_is_followed_refused_and_cancelled_by_action(lab):
     assert not long.results, "the refusal of another path ends no goal"
     long.cancel()
     ended = long.result()
+    assert_granted(lab, NODE)
     assert ended.status == GoalStatus.STATUS_CANCELED
     assert not ended.result.success
     lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")

@@ -40,7 +40,8 @@ INTERFACES = "piezo_hysteresis_interfaces"
 
 SUCCEEDED = ("done", "planned")
 """States of a job that ended well."""
-_SUFFIX = "_actions"
+
+SUFFIX = "_actions"
 """Suffix that makes the name of the action node from the name of the node."""
 
 
@@ -79,7 +80,7 @@ class JobActions:
             return
         types = import_module(f"{INTERFACES}.action")
         self._node = Node(
-            f"{node.get_name()}{_SUFFIX}",
+            f"{node.get_name()}{SUFFIX}",
             context=node.context,
             namespace=node.get_namespace(),
             use_global_arguments=False,  # they may rename the node

@@ -22,7 +22,7 @@ pytest.importorskip("piezo_hysteresis_interfaces", reason="needs the package of 
 from action_msgs.msg import GoalStatus
 from piezo_hysteresis_interfaces.action import Diagnose, Identify
 
-from ..goal import Goal
+from ..goal import Goal, assert_granted
 from .test_identification_node import DRIVER, Identification
 
 pytestmark = pytest.mark.nodes
@@ -43,6 +43,7 @@ def test_goals_are_refused_followed_and_cancelled(lab):
     assert busy.result.message.startswith("busy")
     goal.cancel()
     ended = goal.result()
+    assert_granted(lab, "identification_node")
     assert ended.status == GoalStatus.STATUS_CANCELED
     assert not ended.result.success
     assert "safe voltage" in ended.result.message
