@@ -14,8 +14,8 @@
 
 """Play a waveform on a stage from any lab software: `python send_waveform.py --ros-args -r __ns:=/stage_x`.
 
-No message of this package is needed: a waveform is a standard point cloud with one field, `voltage`. A second field of the
-same bytes names the phase.
+No message of this package is needed: a waveform is a standard point cloud with one field, `voltage`. A second field of
+the same bytes names the phase.
 """
 
 import array

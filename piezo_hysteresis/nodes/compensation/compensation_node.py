@@ -121,15 +121,13 @@ class CompensationNode(GuardedNode):
         self._set_point.measured(float(np.mean(block.displacement)), block.size)
 
     def _on_trajectory(self, cloud: PointCloud2) -> Trigger.Response:
-        name = ""
+        name = phase_text_of(cloud, self._frame)
         try:
-            text = phase_text_of(cloud, self._frame)
-            name = text[:64]
             applied, limits = self._ready()
-            name = phase_name(text)
+            name = phase_name(name)
             wanted = trajectory_from_cloud(cloud, applied.sample_period, self._values["longest_trajectory"])
         except PiezoError as error:
-            self._status.refuse(name, str(error))
+            self._status.refuse(name[:64], str(error))
             return Trigger.Response(message=str(error))
         self._set_point.leave()
         self._begin(name, self._runs.follow(name, wanted, limits))

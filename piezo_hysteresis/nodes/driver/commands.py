@@ -89,10 +89,9 @@ class DriverCommands:
         return self._attached
 
     def _on_command(self, cloud: PointCloud2) -> None:
-        name, stamp = "", 0
+        text = phase_text_of(cloud, self._attached[1].frame if self._attached else "")
+        name, stamp = printable(text[:_LONGEST_NAME]), 0
         try:
-            text = phase_text_of(cloud, self._attached[1].frame if self._attached else "")
-            name = printable(text[:_LONGEST_NAME])
             name, owner = phase_and_owner(text)
             stamp = from_stamp(cloud.header.stamp)
             session, topics = self._stage()

@@ -25,11 +25,13 @@ _PHASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 """Names that a phase may have."""
 
 PHASE_FIELD = "phase:"
-"""Beginning of the name of a field that names the phase of a waveform; it stands for the same bytes as another field."""
+"""Beginning of the name of a field that names the phase of a waveform; its bytes are those of another field."""
 
 
 def phase_text(fields: Iterable[str], frame_id: str, frame: str) -> str:
     """Text that names the phase of a waveform, and its owner; empty where none is given.
+
+    The first field that names the phase counts.
 
     Parameters
     ----------
@@ -40,22 +42,13 @@ def phase_text(fields: Iterable[str], frame_id: str, frame: str) -> str:
     frame : str
         Frame of the axis; a `frame_id` that equals it is no name of a phase.
 
-    Raises
-    ------
-    RecordError
-        On more than one field that names a phase.
-
     Examples
     --------
     >>> phase_text(["voltage", "phase:triangle"], "stage_x", "stage_x"), phase_text(["voltage"], "triangle", "stage_x")
     ('triangle', 'triangle')
     """
-    named = [name.removeprefix(PHASE_FIELD) for name in fields if name.startswith(PHASE_FIELD)]
-    if len(named) > 1:
-        raise RecordError(f"fields: got {len(named)} that begin with '{PHASE_FIELD}', expected one")
-    if named:
-        return named[0]
-    return "" if frame_id == frame else frame_id
+    named = (name.removeprefix(PHASE_FIELD) for name in fields if name.startswith(PHASE_FIELD))
+    return next(named, "" if frame_id == frame else frame_id)
 
 
 def phase_name(text: str) -> str:

@@ -47,6 +47,7 @@ def test_waveform_comes_back_bit_for_bit(voltage):
         (["voltage", "phase:triangle"], "", "triangle"),
         (["voltage", "phase:triangle@scanner"], "stage_x", "triangle@scanner"),
         (["voltage", "phase:triangle"], "sine", "triangle"),
+        (["phase:sine", "voltage", "phase:step"], "", "sine"),
         (["voltage"], "triangle", "triangle"),  # senders that name the phase in frame_id
         (["voltage"], "stage_x", ""),  # the frame of the axis is no name of a phase
         (["voltage"], "", ""),
@@ -54,11 +55,6 @@ def test_waveform_comes_back_bit_for_bit(voltage):
 )
 def test_a_phase_is_named_by_a_field_or_by_frame_id(fields, frame_id, name):
     assert phase_text(fields, frame_id, "stage_x") == name
-
-
-def test_two_names_of_a_phase_are_refused():
-    with pytest.raises(RecordError, match="expected one"):
-        phase_text(["phase:sine", "voltage", "phase:step"], "", "stage_x")
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.001, 2.0])
