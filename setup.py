@@ -79,6 +79,7 @@ setup(
         "hardware": ["nidaqmx[grpc]"],
         "labview": ["npTDMS"],
         "notebook": ["jupyterlab", "jupytext", "pandas", "xarray"],
+        "rerun": ["rerun-sdk"],
         "ros": [
             "ros-kilted-diagnostic-msgs",
             "ros-kilted-rclpy",

@@ -159,7 +159,7 @@ def found(changes: int) -> Figures:
             median = float(np.median(times)) if times else None
             rows.append((kind, change, f"{len(times)} of {changes}", median, f"{right} of {len(times)}"))
             all_right, every = all_right + right, every + changes
-            if change == "gain" and kind != "0.2 s" and (median is None or median > 1.0):
+            if change == "gain" and (median is None or median > 1.0):
                 failures.append(f"{kind}: a gain that changed by 0.05 % of range was not found within 1 s")
     if all_right < RIGHT * every:
         failures.append(f"the group is right in {all_right} of {every}, promised {RIGHT:.0%}")

@@ -129,7 +129,7 @@ class ChangeDetector:
 
     def _threshold(self, key: DriveClass, scatter: Scatter) -> float:
         if key not in self._thresholds:
-            self._thresholds[key] = false_alarm_threshold(directions(scatter), self._interval)
+            self._thresholds[key] = false_alarm_threshold(directions(scatter), self._interval, scatter.memory)
         return self._thresholds[key]
 
     def _alike(self, group: int, scatter: Scatter) -> tuple[str, ...]:

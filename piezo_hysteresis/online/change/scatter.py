@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .false_alarm_threshold import WINDOW
+from .false_alarm_threshold import WINDOW, inflation
 from .score import GROUPS, ChangeScore
 
 Array = NDArray[np.float64]
@@ -101,10 +101,7 @@ class Scatter:
 
     def inflation(self, longest: int) -> Array:
         """Variance of the sum of 1, 2, … `longest` scores over that of as many independent ones, shape (longest, 5)."""
-        lag = np.arange(1, longest)[:, None]
-        correlation = self.memory[0] * self.memory[1] ** (lag - 1)
-        total, first = (np.vstack((np.zeros((1, 5)), np.cumsum(c, axis=0))) for c in (correlation, lag * correlation))
-        return 1.0 + 2.0 * (total - first / np.arange(1, longest + 1)[:, None])
+        return inflation(self.memory, longest)
 
     @classmethod
     def of(cls, scores: Sequence[ChangeScore]) -> Scatter:
@@ -152,12 +149,15 @@ def _roots(slope: Array, scale: Array, kept: NDArray[np.intp]) -> tuple[Array, A
 
 
 def _memory(said: Array) -> Array:
-    """`Scatter.memory` of a series (n, 5); correlations within two standard errors of zero are none."""
+    """`Scatter.memory` of a series (n, 5); a correlation within two standard errors of zero is not followed further.
+
+    No series has successive values that correlate more than (1 + decay) / 2.
+    """
     power = np.maximum((said**2).mean(axis=0), _TINY)
     one, two = ((said[lag:] * said[:-lag]).mean(axis=0) / power for lag in (1, 2))
-    first = np.where(one > 2.0 / np.sqrt(len(said)), np.minimum(one, 1.0), 0.0)
-    decay = np.clip(two / np.where(first > 0.0, first, 1.0), 0.0, SLOWEST_DECAY)
-    return np.vstack((first, np.where(first > 0.0, decay, 0.0)))
+    lasting = one > 2.0 / np.sqrt(len(said))
+    decay = np.where(lasting, np.clip(two / np.where(lasting, one, 1.0), 0.0, SLOWEST_DECAY), 0.0)
+    return np.vstack((np.clip(one, 0.0, (1.0 + decay) / 2.0), decay))
 
 
 def _wander(gradients: Array, weights: Array, inflation: Array) -> Array:

@@ -27,6 +27,7 @@ from ..prediction import Prediction
 from ..predictor import Predictor
 from .baseline import Baseline
 from .detector import Change, ChangeDetector
+from .false_alarm_threshold import CLEARED
 from .score import BLOCK_TIME, ChangeScore, Scores, loop_heights
 
 Array = NDArray[np.float64]
@@ -151,7 +152,7 @@ class ChangeWatch:
             if self.change.statistic > 1.0 and not self.since:
                 self.since, self.alarms = self.change.onset, self.alarms + 1
                 self._strongest = 0.0
-            elif self.change.watched and self.change.statistic < 0.5:
+            elif self.change.watched and self.change.statistic < CLEARED:
                 self.since = 0
             if self.since and self.change.statistic > self._strongest:
                 self._strongest, self.groups = self.change.statistic, self.change.groups

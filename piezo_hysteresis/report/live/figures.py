@@ -193,6 +193,11 @@ class WindowFigures:
         }
 
 
+def time_figure(name: str, title: str, label: str) -> figure:
+    """An empty figure over dates, in the style of the page."""
+    return _figure(name, title, label, "", x_axis_type="datetime")
+
+
 def _between(window: Window, start: float, end: float) -> Window:
     inside = np.flatnonzero((window.time >= start) & (window.time <= end))
     return window.part(int(inside[0]), int(inside[-1]) + 1) if inside.size else window.part(0, 0)

@@ -20,6 +20,7 @@ import time
 
 import numpy as np
 from bokeh.document import Document
+from bokeh.layouts import column
 from bokeh.models import Select, Toggle
 
 from ...discrepancy.residual.noise_floor import white_noise
@@ -28,6 +29,7 @@ from . import panels
 from .axis_state import AxisState
 from .controls import Controls
 from .figures import WindowFigures
+from .history import NumberHistory
 from .layout import Section, lay_out, panel_styles, text_panel
 from .sample_window import Window
 from .source import LiveSource
@@ -60,7 +62,7 @@ class LivePage:
     """
 
     def __init__(self, document: Document, source: LiveSource) -> None:
-        self._source = source
+        self._document, self._source = document, source
         styles = panel_styles()
         self._axis = Select(name="axis", title="", options=[], width=150)
         self._axis.on_change("value", lambda attribute, old, new: self._chosen())
@@ -68,6 +70,7 @@ class LivePage:
         self._length.on_change("value", lambda attribute, old, new: self._span())
         self._pause = Toggle(name="pause", label="Pause", width=80)
         self._figures = WindowFigures()
+        self._history = NumberHistory()
         self._controls = Controls(source, lambda: str(self._axis.value or ""), styles)
         self._texts = {name: text_panel(name, styles) for name in ("state", "alarms", "identification", "model")}
         self._window: Window | None = None
@@ -89,7 +92,9 @@ class LivePage:
                 Section(figures.spectrum, classes="half figure"),
                 Section(texts["alarms"], "Alarms", "half"),
                 Section(texts["identification"], "Identification", "half"),
-                Section(texts["model"], "Model"),
+                Section(
+                    column(texts["model"], self._history.layout, name="models", sizing_mode="stretch_width"), "Model"
+                ),
             ),
         )
         self._tick()
@@ -111,7 +116,14 @@ class LivePage:
             self._axis.value = next(iter(axes))
         return axes.get(str(self._axis.value))
 
+    def _is_seen(self) -> bool:
+        """False for a page that was asked for, and that no window shows: yet, or any more."""
+        session = getattr(self._document.session_context, "session", None)
+        return session is None or session.connection_count > 0
+
     def _tick(self) -> None:
+        if not self._is_seen():
+            return
         self._controls.poll()
         axis = self._state()
         if axis is None:
@@ -140,6 +152,7 @@ class LivePage:
             self._figures.draw(window, float(window.time[-1]), self._noise, axis.free_run_error)
 
     def _write(self, axis: AxisState) -> None:
+        self._history.show(axis.recalibrations)
         for name, text in (
             ("state", panels.state(axis, self._noise)),
             ("alarms", panels.alarms(axis)),

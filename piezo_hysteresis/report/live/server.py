@@ -26,12 +26,11 @@ from bokeh.application import Application
 from bokeh.application.handlers.function import FunctionHandler
 from bokeh.document import Document
 from bokeh.server.server import BaseServer
-from bokeh.server.tornado import BokehTornado
-from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
 
 from ...errors import ParameterError
 from .access import TokenAccess, is_local
+from .connections import BoundedServer, BoundedTornado
 
 
 class PageServer:
@@ -131,14 +130,14 @@ class PageServer:
         listening.setblocking(False)
         port = listening.getsockname()[1]
         try:
-            tornado = BokehTornado(
+            tornado = BoundedTornado(
                 {"/": self._application},
                 extra_websocket_origins=self._allowed(port),
                 check_unused_sessions_milliseconds=2000,
                 unused_session_lifetime_milliseconds=5000,
                 **options,
             )
-            http = HTTPServer(tornado)
+            http = BoundedServer(tornado)
             http.add_sockets([listening])
         except BaseException:
             listening.close()

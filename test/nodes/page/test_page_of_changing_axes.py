@@ -112,3 +112,5 @@ def test_a_driver_that_starts_again_as_another_stage_raises_an_alarm_and_is_reca
     (number,) = read_numbers((nodes.kept / FILE).read_text(), "file")
     assert number.new / number.old == pytest.approx(1.01, abs=0.002)
     assert f"{number.new:.6g}" in browser.text("recalibrations")
+    drawn = browser.source("history")
+    assert [drawn[c] for c in ("value", "low", "high")] == [[number.new], [number.low], [number.high]]

@@ -16,12 +16,21 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.online.change.baseline import Baseline
-from piezo_hysteresis.online.change.false_alarm_threshold import false_alarm_threshold
+from piezo_hysteresis.online.change.false_alarm_threshold import (
+    CLEARED,
+    correlate,
+    count_alarms,
+    echo,
+    false_alarm_threshold,
+    inflation,
+    largest_windows,
+)
 from piezo_hysteresis.online.change.scatter import Scatter
 from piezo_hysteresis.online.change.score import GROUPS
 from piezo_hysteresis.online.change.watch import ChangeWatch, baseline_path
@@ -164,11 +173,32 @@ def test_sums_of_correlated_scores_vary_as_an_autoregressive_series_does():
     assert scatter.inflation(k)[0, 0] == 1.0
 
 
-def test_the_threshold_keeps_the_rate_of_false_alarms():
-    level = false_alarm_threshold(np.eye(2), 2000.0, seed=1)
-    total = np.cumsum(np.random.default_rng(2).standard_normal((400_000, 2)), axis=0)
+@pytest.mark.parametrize("phi", [0.0, 0.65])
+def test_the_threshold_keeps_the_rate_of_false_alarms(phi):
+    memory = np.full((2, 2), phi)
+    level = false_alarm_threshold(np.eye(2), 1000.0, memory, seed=1)
+    white = np.random.default_rng(2).standard_normal((200_000, 2))
+    total = np.cumsum(lfilter([np.sqrt(1.0 - phi**2)], [1.0, -phi], white, axis=0), axis=0)
     above = np.zeros(len(total), bool)
-    for k in range(1, 61):
-        above[k:] |= ((total[k:] - total[:-k]) ** 2 / k).max(axis=1) > level
+    for k, variance in enumerate(inflation(memory, 60)[:, 0], 1):
+        above[k:] |= ((total[k:] - total[:-k]) ** 2 / (k * variance)).max(axis=1) > level
     alarms = 1 + np.count_nonzero(np.diff(np.flatnonzero(above)) > 60)
-    assert 100 < alarms < 400  # 200 wanted
+    assert 150 < alarms < 270  # 200 wanted
+
+
+def test_a_threshold_for_rarer_alarms_than_are_simulated_continues_the_rate():
+    white = np.random.default_rng(3).standard_normal((2_000_000, 1))
+    largest = np.zeros(len(white))
+    largest_windows(white, np.ones((60, 1)), largest)
+    level = false_alarm_threshold(np.eye(1), 20_000.0)  # twenty in all that is simulated for the threshold
+    alarms = count_alarms(largest, level, CLEARED * level)
+    assert 60 < alarms < 150  # 100 wanted
+
+
+@pytest.mark.parametrize(("first", "decay"), [(0.3, 0.8), (0.73, 0.6), (0.5, 0.0), (0.0, 0.0)])
+def test_scores_that_are_simulated_have_the_memory_of_the_baseline(first, decay):
+    memory = np.array([[first], [decay]])
+    series = np.random.default_rng(4).standard_normal((400_000, 1))
+    correlate(series, memory[1], echo(memory))
+    correlation = [np.mean(series[k:] * series[: series.size - k]) for k in range(4)]
+    assert correlation == pytest.approx([1.0, first, first * decay, first * decay**2], abs=0.02)
