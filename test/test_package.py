@@ -34,8 +34,8 @@ NO_KEY = {"lz4", "mcap", "threadpoolctl", "zstandard"}
 """No rosdep key; the README names them for pip, but for what mcap itself needs: lz4 and zstandard."""
 
 
-OPTIONAL = {"grpc", "nidaqmx", "nptdms"}
-"""Only for hardware, and for files of LabVIEW: the extras `hardware` and `labview` in setup.py."""
+OPTIONAL = {"grpc", "nidaqmx", "nptdms", "rerun"}
+"""Only for hardware, files of LabVIEW and the Rerun viewer: the extras `hardware`, `labview`, `rerun` in setup.py."""
 
 
 def modules():

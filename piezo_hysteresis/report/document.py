@@ -33,7 +33,8 @@ from .words import nanometre
 FREE_RUN = (
     "Errors are those of free-run simulation: the model sees the drive only, never the measured displacement. Per\n"
     "cents are RMS over peak-to-peak displacement of the experiment. The floor of a phase is its sensor noise or 0.03 %"
-    " of\nrange, whichever is larger."
+    " of\nrange, whichever is larger. A figure grows when it is clicked. piezo view EXPERIMENT shows every sample, "
+    "with zoom."
 )
 """How the numbers of a page about an experiment are to be read."""
 

@@ -36,7 +36,7 @@ from piezo_hysteresis.report.tables.answer_tables import (
 )
 from piezo_hysteresis.report.verdict import answer_verdict, verdict
 
-VOID = {"meta", "img", "br", "link", "hr"}
+VOID = {"meta", "img", "br", "link", "hr", "input"}
 
 
 class Tags(HTMLParser):
@@ -77,6 +77,12 @@ def test_needs_no_other_file_and_no_network(drawn, tags):
     assert not tags.all("link")
     assert "url(" not in drawn.html
     assert "@import" not in drawn.html
+
+
+def test_every_figure_can_be_enlarged_by_mouse_and_keyboard(tags):
+    boxes = tags.all("input")
+    assert [box["type"] for box in boxes] == ["checkbox"] * len(tags.all("img"))
+    assert len({box["aria-label"] for box in boxes}) == len(boxes)
 
 
 def test_every_figure_is_there_with_words_and_numbers(drawn, tags):
@@ -157,8 +163,11 @@ addEventListener("load", () => {
   const images = [...document.images].map(seen);
   const focusable = [...document.querySelectorAll("a[href], [tabindex='0']")];
   const reached = focusable.filter(e => (e.focus(), document.activeElement === e));
+  const width = document.images[0].getBoundingClientRect().width;
+  document.querySelector(".zoom input").click();
+  const grown = document.images[0].getBoundingClientRect().width / width;
   const wide = document.documentElement.scrollWidth > innerWidth;
-  document.title = JSON.stringify({images, reached: reached.length, wide});
+  document.title = JSON.stringify({images, reached: reached.length, wide, grown});
 });
 </script></body>"""
 
@@ -176,7 +185,8 @@ def test_a_browser_shows_every_figure_and_reaches_every_link_by_keyboard(drawn, 
     assert page["images"] == [True] * len(drawn.drawings)
     links = len(tags.all("a")) + sum(a.get("tabindex") == "0" for _, a in tags.found)
     assert page["reached"] == links
-    assert not page["wide"], "nothing scrolls sideways but the tables in their own frame"
+    assert page["grown"] > 1.5, "a click enlarges a figure"
+    assert not page["wide"], "nothing scrolls sideways but tables and figures in their own frames"
 
 
 def test_a_correction_without_a_name_is_drawn_and_tabled_only_where_it_is_accepted(answer):

@@ -76,6 +76,7 @@ def rest_of(one) -> bytes:
 
 def test_connections_that_send_nothing_keep_no_visitor_out(monkeypatch):
     monkeypatch.setattr(connections, "MOST_REQUESTS", 4)
+    monkeypatch.setattr(connections, "SILENT_REQUEST", 3600.0)
     with page() as server, ExitStack() as stack:
         silent = [connected(stack, server) for _ in range(9)]
         with urllib.request.urlopen(server.url, timeout=PATIENCE) as answer:
@@ -102,6 +103,7 @@ def test_a_window_that_does_not_answer_is_ended(monkeypatch):
 
 def test_a_window_too_many_is_refused_and_the_others_stay(monkeypatch):
     monkeypatch.setattr(connections, "MOST_WINDOWS", 1)
+    monkeypatch.setattr(connections, "SILENT_WINDOW", 3600.0)
     with page() as server, ExitStack() as stack:
         first = window(stack, server)
         assert b"ACK" in first.recv(1 << 16)
