@@ -16,7 +16,7 @@
 
 Tests that start nodes wait most of their time. Three such files at once take less of the processors than two of them
 beside a test that computes. Files that open an emulated device, whose lock one process at a time may have, stay in one
-process.
+process, and so do those that open a browser, which draws with the processor.
 
 Tests of real processes over DDS need the processor in time. One that fails is tried once more, and reported as RERUN: a
 promise that does not hold fails twice, a computer that was busy elsewhere does not. Nor does it fail a property: no
@@ -42,6 +42,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         nodes = item.get_closest_marker("nodes") is not None
         device = item.get_closest_marker("device") is not None
-        item.add_marker(pytest.mark.xdist_group("devices" if device else item.path.stem))
+        browser = item.path.parent.name == "page"
+        group = "devices" if device else "browsers" if browser else item.path.stem
+        item.add_marker(pytest.mark.xdist_group(group))
         if nodes:
             item.add_marker(pytest.mark.flaky(reruns=1))

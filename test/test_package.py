@@ -16,6 +16,7 @@
 
 import ast
 import json
+import os
 import re
 import subprocess
 import sys
@@ -154,3 +155,9 @@ def test_the_locked_file_has_a_hash_for_everything_that_is_required():
     assert len(locked) == len(parts)
     wanted = re.search(r"install_requires=\[(.*?)\]", (ROOT / "setup.py").read_text(), re.DOTALL)
     assert {name.lower() for name in re.findall(r'"([\w.-]+)"', wanted.group(1))} <= locked
+
+
+def test_the_tests_of_a_file_run_in_one_process(request):
+    """pytest-xdist shows the group of a test in its name; without groups every process would make every fixture."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        assert request.node.nodeid.endswith("@test_package")
