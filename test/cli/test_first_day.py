@@ -25,7 +25,7 @@ from piezo_hysteresis import recording
 from piezo_hysteresis.cli import terminal
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
-from ..command_server import piezo
+from ..piezo_command import piezo
 
 TIME = np.arange(400) * 5e-3
 VOLTAGE = 1.8 - 1.8 * np.cos(2 * np.pi * TIME)

@@ -47,7 +47,7 @@ from piezo_hysteresis.nodes.messages.samples import samples_from_cloud
 from piezo_hysteresis.nodes.runtime.guarded_node import GuardedNode
 from piezo_hysteresis.nodes.runtime.qos import COMMAND, COMMAND_STATUS, LATCHED
 
-from .node_server import ForkedNode
+from .forked_node import ForkedNode
 
 PATIENCE = 60.0
 

@@ -34,7 +34,7 @@ from piezo_hysteresis.recording.bag.mcap_file import MAGIC
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
 from piezo_hysteresis.stage.opening import Opening
 
-from ..command_server import piezo
+from ..piezo_command import piezo
 
 MEMORY = 3 << 30
 """Address space of a process that reads a hostile file; importing the package takes half of it."""

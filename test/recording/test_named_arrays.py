@@ -22,7 +22,7 @@ from scipy import io
 from piezo_hysteresis.errors import PiezoError, RecordingError
 from piezo_hysteresis.recording import read
 
-from ..command_server import piezo
+from ..piezo_command import piezo
 
 TIME = np.arange(400) * 5e-3
 VOLTAGE = 1.8 - 1.8 * np.cos(2 * np.pi * TIME)
