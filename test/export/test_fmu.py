@@ -29,7 +29,7 @@ from piezo_hysteresis.model.model import Model
 
 from ..contract.compiled import needs_compiler
 
-fmpy = pytest.importorskip("fmpy", reason="no FMPy here; scripts/setup installs requirements-fmu.txt")
+fmpy = pytest.importorskip("fmpy", reason="no FMPy here; scripts/setup-checks installs it")
 validation = pytest.importorskip("fmpy.validation")
 fmi3 = pytest.importorskip("fmpy.fmi3")
 FMI_ERROR = pytest.importorskip("fmpy.fmi1").FMICallException

@@ -82,7 +82,7 @@ def client():
 def s3_server():
     """Address of an S3 server on this machine."""
     if not S3_SERVER.exists():
-        pytest.skip("no S3 server: `make setup` installs one into .venv-s3")
+        pytest.skip("no S3 server: `scripts/setup-checks` installs one into .venv-s3")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]

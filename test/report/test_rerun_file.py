@@ -24,7 +24,7 @@ from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.report.figures.comparison import compare
 from piezo_hysteresis.report.rerun_file import write_rerun
 
-chunk = pytest.importorskip("rerun.chunk", reason="no rerun-sdk here; requirements.txt holds it")
+chunk = pytest.importorskip("rerun.chunk", reason="no rerun-sdk here; scripts/setup-checks installs it")
 
 PERIOD = 1e-3
 MODEL = Model((BoucWen(), Arx(a=(-0.6,), b=(0.2,))), PERIOD, displacement_scale=1e-5)
