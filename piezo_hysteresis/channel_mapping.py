@@ -21,7 +21,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg.blas import ddot  # numpy's would warn of squares that are too large
 
 from .errors import RecordError
@@ -38,6 +38,41 @@ _NAME = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 def are_finite(samples: Samples) -> bool:
     """Whether all samples are finite. The sum of squares is a fast test; if it overflows, every sample is tested."""
     return math.isfinite(ddot(samples, samples)) or bool(np.isfinite(samples).all())
+
+
+def channel_samples(name: str, values: ArrayLike, length: int | None) -> Samples:
+    """Samples of one channel as an array that cannot be changed, shape (n,).
+
+    Parameters
+    ----------
+    name : str
+        Of the channel, for the message of an error.
+    values : (n,) array_like
+        Its samples.
+    length : int or None
+        Number of samples of the channels before it; None for the first one.
+
+    Raises
+    ------
+    RecordError
+        If they are not numbers, are empty, have another length, or are not finite.
+    """
+    try:
+        samples = np.array(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise RecordError(f"{name}: got {type(values).__name__}, expected an array of numbers") from None
+    if samples.ndim != 1 or samples.size == 0:
+        raise RecordError(f"{name}: got shape {samples.shape}, expected one dimension with at least one sample")
+    if length is not None and samples.size != length:
+        raise RecordError(f"{name}: got {samples.size} samples, expected {length} as in voltage")
+    if not are_finite(samples):
+        bad = ~np.isfinite(samples)
+        raise RecordError(
+            f"{name}: sample {int(bad.argmax())} is {samples[bad.argmax()]}, expected finite values; "
+            f"drop or split the record at its {int(bad.sum())} non-finite samples"
+        )
+    samples.setflags(write=False)
+    return samples
 
 
 def quantity_of(name: str) -> str | None:

@@ -21,34 +21,17 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from .channel_mapping import ChannelMapping, Samples, are_finite
+from .channel_mapping import ChannelMapping, Samples, channel_samples
 from .errors import RecordError, printable
 from .html_table import html_table
 from .notice import Notice
 from .picture import Pictured
 
-__all__ = ["Experiment", "Notice", "Record", "Samples", "are_finite"]
+__all__ = ["CONDITIONING", "Experiment", "Notice", "Record", "Samples"]
 
-
-def _channel(name: str, values: ArrayLike, length: int | None) -> Samples:
-    try:
-        samples = np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise RecordError(f"{name}: got {type(values).__name__}, expected an array of numbers") from None
-    if samples.ndim != 1 or samples.size == 0:
-        raise RecordError(f"{name}: got shape {samples.shape}, expected one dimension with at least one sample")
-    if length is not None and samples.size != length:
-        raise RecordError(f"{name}: got {samples.size} samples, expected {length} as in voltage")
-    if not are_finite(samples):
-        bad = ~np.isfinite(samples)
-        raise RecordError(
-            f"{name}: sample {int(bad.argmax())} is {samples[bad.argmax()]}, expected finite values; "
-            f"drop or split the record at its {int(bad.sum())} non-finite samples"
-        )
-    samples.setflags(write=False)
-    return samples
+CONDITIONING = "conditioning"
+"""Name of a phase that brings the stage into a known state; the history before it is unknown."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -101,10 +84,10 @@ class Record(Pictured):
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "voltage", _channel("voltage", self.voltage, None))
+        put(self, "voltage", channel_samples("voltage", self.voltage, None))
         size = self.voltage.size
-        put(self, "displacement", _channel("displacement", self.displacement, size))
-        others = {name: _channel(name, values, size) for name, values in self.channels.items()}
+        put(self, "displacement", channel_samples("displacement", self.displacement, size))
+        others = {name: channel_samples(name, values, size) for name, values in self.channels.items()}
         put(self, "channels", ChannelMapping(others))
         period = float(self.sample_period)
         if not (np.isfinite(period) and period > 0):

@@ -25,9 +25,8 @@ from ..discrepancy.residual.residual import zero_per_phase
 from ..errors import RecordError
 from ..identification.identified_range import outside
 from ..identification.records.conditioning_split import known_from_within
-from ..identification.records.roles import CONDITIONING
 from ..model import model_file
-from ..record import Experiment
+from ..record import CONDITIONING, Experiment
 from ..report.figures.comparison import ModelComparison, compare
 from ..report.json_file import write_json
 from ..report.tables.error_table import error_table, frequency_table
@@ -82,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _doubts(experiment: Experiment) -> str:
     severe = list(dict.fromkeys(n.phase or "all" for n in experiment.notices if n.severe))
-    unknown = [r.phase for r in experiment if r.truncated and r.phase not in CONDITIONING]
+    unknown = [r.phase for r in experiment if r.truncated and r.phase != CONDITIONING]
     message = f" Severe findings in the data make this doubtful: {', '.join(severe)}." if severe else ""
     return message + (f" The state at the start is unknown: {', '.join(unknown)}." if unknown else "")
 

@@ -27,9 +27,9 @@ from ..errors import IdentificationError
 from ..identification.fit.fit import Progress
 from ..identification.fit.normal_equations import residuals
 from ..identification.records.conditioning_split import known_from_within
-from ..identification.records.roles import CONDITIONING, roles_of
+from ..identification.records.roles import roles_of
 from ..model.model import Model
-from ..record import Experiment, Notice
+from ..record import CONDITIONING, Experiment, Notice
 from .changes.same_stage import same_stage
 from .conclusion import concluded
 from .diagnosis import Diagnosis, Verdict
@@ -51,7 +51,7 @@ VOLTAGE_NOISE = "voltage_noise"
 """Kind of the notice of an experiment whose voltage is followed but for its noise."""
 STEPS_LEAVE = 10.0
 """Cost that may be left once the changes of an explicit step are taken out before anything is named."""
-IDLE = ("idle", "hold", *CONDITIONING)
+IDLE = ("idle", "hold", CONDITIONING)
 """Phases that only bring the stage from one state to another."""
 
 

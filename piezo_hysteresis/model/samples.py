@@ -19,8 +19,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..channel_mapping import are_finite
 from ..errors import ModelError
-from ..record import are_finite
 
 Array = NDArray[np.float64]
 

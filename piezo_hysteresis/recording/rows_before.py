@@ -19,11 +19,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..record import Experiment, Notice
+from ..record import CONDITIONING, Experiment, Notice
 from .table.read_options import ReadOptions
-
-CONDITIONING = "conditioning"
-"""Phase of rows that only bring the stage into a known state."""
 
 
 def with_rows_before(read: Callable[[ReadOptions], Experiment], options: ReadOptions, most: int) -> Experiment:

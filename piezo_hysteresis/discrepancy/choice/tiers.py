@@ -23,6 +23,7 @@ from ...effects import Creep, GainDrift
 from ...identification.protocol import excitation
 from ...identification.protocol.drive_limits import DriveLimits, Samples
 from ...identification.protocol.protocol import CORNERED, Protocol, ProtocolPhase
+from ...record import CONDITIONING
 
 SLOW, SLOWEST = 1e-3, 1e-2
 """Sample periods at which slow phases are stored [s]."""
@@ -108,7 +109,7 @@ def tiers(limits: DriveLimits, seed: int = 0) -> tuple[Tier, ...]:
     """
     made = _Phases(limits, seed)
     corners = (0.0, 1.0, 0.0, *excitation.decaying_loops(0.5, 0.7, 12))
-    made.add("conditioning", excitation.ramps(limits, corners, limits.ramp_rate), CORNERED)
+    made.add(CONDITIONING, excitation.ramps(limits, corners, limits.ramp_rate), CORNERED)
     made.add("step", excitation.steps(limits, (0.2, 0.5, 0.8, 0.5) * 4, 0.01))
     for rms in (0.012, 0.012, 0.003):
         made.noise(rms)

@@ -29,9 +29,8 @@ from numpy.typing import NDArray
 from ...effects import MainsHum
 from ...errors import RecordError
 from ...identification.fit.normal_equations import Nuisance
-from ...identification.records.roles import CONDITIONING
 from ...model.model import Model
-from ...record import Experiment, Record
+from ...record import CONDITIONING, Experiment, Record
 from .noise_floor import stroke
 
 Array = NDArray[np.float64]
@@ -208,7 +207,7 @@ def _with_nuisance(record: Record, y: Array, nuisance: Nuisance) -> Array:
 
 
 def _has_known_start(record: Record) -> bool:
-    return record.phase not in CONDITIONING and not record.truncated
+    return record.phase != CONDITIONING and not record.truncated
 
 
 def _row(index: int, record: Record, residual: Array, span: float) -> Error:

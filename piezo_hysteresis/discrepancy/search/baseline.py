@@ -27,7 +27,7 @@ from dataclasses import replace
 from ...effects import HYSTERESIS, Arx, Offset
 from ...errors import IdentificationError
 from ...identification.identify import identify
-from ...identification.records.roles import CONDITIONING, Roles, roles_of
+from ...identification.records.roles import Roles, roles_of
 from ...identification.steps.delay import identify_delay
 from ...identification.steps.dynamics import delay_of
 from ...identification.steps.hysteresis import fit_hysteresis
@@ -42,7 +42,7 @@ from ...identification.steps.linear_start import (
 )
 from ...identification.steps.modes import identify_modes
 from ...model.model import Model
-from ...record import Experiment, Record
+from ...record import CONDITIONING, Experiment, Record
 
 ORDERS = (8, 8)
 """na and nb, as in the paper; the joint fit leaves at zero what the data do not ask for."""
@@ -120,7 +120,7 @@ def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int
 def _fitted_only(experiment: Experiment, fitted: Collection[int]) -> Experiment:
     """The records up to the last that is fitted; the others among them only carry the state of the stage."""
     records = enumerate(experiment.records[: max(fitted) + 1])
-    return Experiment(tuple(r if i in fitted else replace(r, phase=CONDITIONING[0]) for i, r in records))
+    return Experiment(tuple(r if i in fitted else replace(r, phase=CONDITIONING) for i, r in records))
 
 
 def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:

@@ -32,11 +32,10 @@ from ...identification.fit.normal_equations import Nuisance, residuals
 from ...identification.identification import Identification
 from ...identification.identify import identify
 from ...identification.records.leading_step import step_length
-from ...identification.records.roles import CONDITIONING
 from ...identification.structure.left_out import has_several_drives, score_left_out
 from ...model.model import Model
 from ...model.provenance import provenance
-from ...record import Experiment, Notice, Record
+from ...record import CONDITIONING, Experiment, Notice, Record
 from ..diagnosis import Diagnosis, Verdict
 from ..excitation_check import missing_excitation
 from ..gap import Gap, measure_gap, stating
@@ -163,7 +162,7 @@ def diagnose_few(
 
 def _without(experiment: Experiment, aside: Collection[int]) -> Experiment:
     """The experiment in which the records set aside only carry the state of the stage."""
-    records = tuple(replace(r, phase=CONDITIONING[0]) if i in aside else r for i, r in enumerate(experiment.records))
+    records = tuple(replace(r, phase=CONDITIONING) if i in aside else r for i, r in enumerate(experiment.records))
     return Experiment(records, experiment.source)
 
 

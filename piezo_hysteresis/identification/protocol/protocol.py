@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import IdentificationError
+from ...record import CONDITIONING
 from . import excitation
 from .drive_limits import DriveLimits, Samples
 
@@ -159,7 +160,7 @@ class _Plan:
     def conditioning(self) -> None:
         """Two full strokes and shrinking loops: what the stage did before no longer matters."""
         corners = (0.0, 1.0, 0.0, *excitation.decaying_loops(0.5, 0.7, 12))
-        self.add("conditioning", excitation.ramps(self.limits, corners, self.limits.ramp_rate), CORNERED)
+        self.add(CONDITIONING, excitation.ramps(self.limits, corners, self.limits.ramp_rate), CORNERED)
 
     def step(self, edges: int, duration: float) -> None:
         """Edges of 0.3 of the range at several levels: high enough to see the onset, low enough to be gentle."""

@@ -24,8 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...record import Experiment, Notice, Record
-from .roles import CONDITIONING
+from ...record import CONDITIONING, Experiment, Notice, Record
 
 AT_THE_END = 0.02
 """Distance from an end of the range of the drive, as share of the range, that counts as having been there."""
@@ -71,11 +70,11 @@ def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice,
     notices: list[Notice] = []
     for record in experiment:
         before = records[-1] if records and record.continues else None
-        if before is not None and before.phase in CONDITIONING and before.truncated and not covers(before, record):
+        if before is not None and before.phase == CONDITIONING and before.truncated and not covers(before, record):
             record = replace(record, truncated=True)
-        samples = conditioning_length(record) if record.truncated and record.phase not in CONDITIONING else 0
+        samples = conditioning_length(record) if record.truncated and record.phase != CONDITIONING else 0
         if samples:
-            records.append(replace(record[:samples], phase=CONDITIONING[0]))
+            records.append(replace(record[:samples], phase=CONDITIONING))
             record = replace(record[samples:], truncated=False, initial_voltage=None)
             message = f"the initial state is unknown; the first {samples} samples, up to a full loop, are not fitted"
             notices.append(Notice("conditioning_length", message, record.phase))

@@ -20,13 +20,11 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from ...errors import RecordError
-from ...record import Experiment
+from ...record import CONDITIONING, Experiment
 from .excitation_content import ExcitationContent, excitation_content
 
 HELD_OUT = ("validation",)
 """Phases that are not fitted by default."""
-CONDITIONING = ("conditioning",)
-"""Phases that bring the stage into a known state; the history before them is unknown."""
 LARGE = 0.5
 """Drive range of a slow record, as a share of the largest one, from which the record counts as loops."""
 
@@ -76,7 +74,7 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
         if phase not in HELD_OUT and not experiment.named(phase):
             raise RecordError(f"held_out: got phase '{phase}', expected some of {names}")
     contents = tuple(excitation_content(r) for r in experiment)
-    named = {phase: experiment.named(phase) for phase in (*held_out, *CONDITIONING)}
+    named = {phase: experiment.named(phase) for phase in (*held_out, CONDITIONING)}
 
     def is_one_of(index: int, phases: Collection[str]) -> bool:
         return any(experiment[index] is record for phase in phases for record in named[phase])
@@ -88,7 +86,7 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
             raise RecordError(f"held_out: got every phase ({names}), expected at least one that is fitted")
         out = ()
     left = [i for i in indices if i not in out]
-    fitted = tuple(i for i in left if not is_one_of(i, CONDITIONING) and not experiment[i].truncated) or tuple(left)
+    fitted = tuple(i for i in left if not is_one_of(i, (CONDITIONING,)) and not experiment[i].truncated) or tuple(left)
     largest = max((contents[i].span for i in fitted), default=0.0)
     slow = [i for i in fitted if contents[i].is_slow and contents[i].span >= LARGE * largest > 0.0]
     straight = [i for i in fitted if experiment[i].phase.split("_")[0] == "triangle"]
