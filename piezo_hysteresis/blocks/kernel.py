@@ -14,12 +14,15 @@
 
 """`kernel`: the decorator of every per-sample loop. Compiled and cached with numba, plain Python without it.
 
+Numba's own variable NUMBA_DISABLE_JIT=1 asks for plain Python too; numba, 60 MB, is not loaded then.
+
 A kernel is a top-level function of float64 arrays and scalars: numba never caches closures, and a new argument type
 (read-only, strided) would compile again in a running node, so callers hand over fresh contiguous arrays.
 """
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -32,14 +35,20 @@ def fma(x: float, y: float, z: float) -> float:
     return x * y + z
 
 
+_IS_PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
+"""Whether plain Python is asked for."""
+
 try:
+    if _IS_PLAIN:
+        raise ImportError
     import numba
     from numba.extending import intrinsic, overload
 except ImportError:
-    warnings.warn(
-        "numba is not installed: same results but for rounding, and simulations run about 100 times slower",
-        stacklevel=2,
-    )
+    if not _IS_PLAIN:
+        warnings.warn(
+            "numba is not installed: same results but for rounding, and simulations run about 100 times slower",
+            stacklevel=2,
+        )
 
     def kernel(function: F) -> F:
         """Leave the loop as plain Python."""

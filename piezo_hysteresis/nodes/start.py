@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from importlib import import_module
@@ -57,7 +58,8 @@ def compensation_node() -> int:
 
 
 def page_node() -> int:
-    """Run a live page."""
+    """Run a live page. It simulates nothing, and stays 60 MB smaller without the compiler."""
+    os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
     return _run("page.page_node")
 
 

@@ -16,6 +16,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 from piezo_hysteresis.blocks.kernel import fma, kernel
 
 EPSILON = 2.0**-30
@@ -30,3 +34,12 @@ def less_than_a_square(x: float) -> float:
 def test_product_and_sum_are_rounded_once():
     assert (1.0 + EPSILON) * (1.0 - EPSILON) - 1.0 == 0.0  # rounded twice, the square is lost
     assert less_than_a_square(EPSILON) == -(EPSILON**2)
+
+
+def test_numba_is_not_loaded_where_its_own_variable_switches_it_off():
+    program = (
+        "import sys; from piezo_hysteresis.blocks.kernel import kernel; f = lambda: 0; "
+        "assert kernel(f) is f and 'numba' not in sys.modules"
+    )
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    subprocess.run([sys.executable, "-W", "error", "-c", program], env=environment, check=True)

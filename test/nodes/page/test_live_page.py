@@ -103,6 +103,12 @@ def test_the_page_draws_the_loop_and_its_points_are_those_of_the_topics(nodes, b
     browser.click("Pause")
 
 
+def test_the_page_node_loads_no_compiler(nodes):
+    mapped = Path(f"/proc/{nodes.page.pid}/maps").read_text()
+    assert "rclpy" in mapped
+    assert "llvmlite" not in mapped
+
+
 def test_the_page_fits_screens_telephones_and_paper(nodes, browser, pictures):
     for width in (1200, 420):
         browser.size(width, 900)
