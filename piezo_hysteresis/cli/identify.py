@@ -125,7 +125,7 @@ def verdict_line(found: Identification) -> str:
     if not fit.converged:
         return (
             f"Verdict: not determined. The fit did not converge in {fit.iterations} linearisations, so the values "
-            "above are no estimates; give phases that move the stage over its range at several rates."
+            "above are not estimates; give phases that move the stage over its range at several rates."
         )
     severe = sum(n.severe for n in found.notices)
     doubt = (
@@ -164,13 +164,13 @@ def answer(found: Identification, path: str) -> dict[str, Any]:
 
 def _phases(found: Identification) -> Table:
     rows = tuple(
-        (p.phase, f"{p.percent:.3f}", f"{1e9 * p.rms:.1f}", "fitted" if p.is_fitted else "held out")
+        (p.phase, f"{p.percent:.3f}", f"{1e9 * p.rms:.1f}", "fitted" if p.is_fitted else "not fitted")
         for p in found.phases
     )
-    judged = "phases that were not fitted" if any(not p.is_fitted for p in found.phases) else "all phases, all fitted"
+    judged = "the phases that were not fitted" if any(not p.is_fitted for p in found.phases) else "all (fitted) phases"
     span = 100.0 * found.free_run_error / found.free_run_percent if found.free_run_percent else 0.0
     note = (
-        f"Zero of the sensor free per phase. Per cent of range; the range is {1e6 * span:.4g} µm, peak to peak over "
-        f"the experiment. Over {judged}, each counting the same: {found.free_run_percent:.3g} %."
+        f"The sensor zero is fitted for every phase. The range is {1e6 * span:.4g} µm, peak to peak over the "
+        f"experiment. Error over {judged}, with equal weights: {found.free_run_percent:.3g} %."
     )
     return Table("Free-run error", ("phase", "% of range", "nm", "data"), rows, note, frozenset({1, 2}))

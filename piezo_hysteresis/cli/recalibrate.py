@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``piezo recalibrate``: fit gain, offset, loop height and lag of an old model to new records of the same stage."""
+"""Fit gain, offset, loop height and lag of an old model to new records of the same stage."""
 
 from __future__ import annotations
 
@@ -55,11 +55,12 @@ def run(args: argparse.Namespace) -> int:
         rows = {f"{n}_{u}": getattr(found, n) for n, u in zip(numbers, units, strict=True)}
         write_json(args.json, {"schema": 1, "model": str(path), **rows})
     out = console()
+    out.print("Changes of the model:")
     out.print(f"gain         {100.0 * found.gain:+.3f} %")
     out.print(f"loop height  {100.0 * found.loop_height:+.3f} %")
     out.print(f"lag          {1e6 * found.lag:+.4g} µs")
     out.print(f"offset       {1e9 * found.offset:.4g} nm")
-    out.print(f"free-run error {found.before:.3f} % of range before, {found.after:.3f} % after")
+    out.print(f"The free-run error was {found.before:.3g} % of the range before and is {found.after:.3g} % after.")
     show_notices(experiment.notices)
     out.print(f"wrote {path}")
     return 0

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``piezo record``: play a protocol to a stage and record it, without ROS.
+"""Play a protocol to a stage and record it, without ROS.
 
 STAGE.yaml is a parameter file of the driver (config/driver.yaml): back end, its parameters, and limits. Checks, limits
 and locks are those of the driver node. Ctrl-C brings the stage to its safe voltage.

@@ -60,13 +60,14 @@ class UnreachablePart:
             "max_slew_rate": f"{self.needed_slew:.3g} V/s",
         }[self.limit]
         message = (
-            f"{self.begin:.6g} to {self.end:.6g} s is not reachable: it needs {needed}, beyond {self.limit}; "
-            f"the stage would be off by up to {1e9 * abs(self.largest):.0f} nm"
+            f"the path cannot be reached from {self.begin:.4g} to {self.end:.4g} s: it needs {needed}, "
+            f"{'below' if self.limit == 'voltage_min' else 'above'} {self.limit}; the error would be up to "
+            f"{1e9 * abs(self.largest):.0f} nm"
         )
         if self.after_loop:
             message += (
-                "; from rest this displacement is within the limits, but after a swing the hysteresis holds the stage "
-                "above it and only a voltage below the minimum brings it back"
+                "; the displacement can be reached from rest, but not after this motion, because the hysteresis keeps "
+                "the stage above it"
             )
         return message
 

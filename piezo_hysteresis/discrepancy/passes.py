@@ -261,7 +261,7 @@ def _moves(experiment: Experiment, index: int) -> bool:
 
 
 def _where(setup: BaselineSetup, progress: Progress) -> tuple[ResidualShare, ...]:
-    progress("where", 0.35)
+    progress("location of the residual", 0.35)
     left = residuals(setup.baseline.model, setup.records, setup.training_data.nuisance)
     return localise(
         [setup.records[i] for i in setup.usable],

@@ -78,11 +78,11 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
     closed = selection.explained(selection.score)
     if named:
         rest = (
-            "the remaining error is at the floor"
+            "the remaining error is at the noise floor"
             if gap.after <= np.sqrt(ADEQUATE) * gap.floor
-            else f"an error of {gap.after / gap.floor:.1f} times the floor remains unexplained"
+            else f"an error of {gap.after / gap.floor:.1f} times the noise floor remains unexplained"
         )
-        said = f"The model misses {names}, which {explain} {100 * closed:.0f} % of the gap; {rest}."
+        said = f"The model does not contain {names}, which {explain} {100 * closed:.0f} % of the gap; {rest}."
         fitted = [s.best.effect.public_name() for s in selection.accepted if not s.best.effect.is_predicted_live()]
         if not selection.in_time:
             said += " The time limit ended the search, so that more may be missing."
@@ -91,9 +91,12 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
     foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
     if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):
         if gap.after > UNFORESEEN * gap.floor:
-            message = f"the error on the test records is {gap.after / gap.floor:.1f} times the floor"
+            message = f"the error on the test records is {gap.after / gap.floor:.1f} times the noise floor"
             return Verdict.UNKNOWN, f"No effect is named: nothing is missing on the training records, but {message}."
-        return Verdict.NOTHING_MISSING, "Nothing is missing beyond noise and the adequacy floor of 0.03 % of range."
+        return (
+            Verdict.NOTHING_MISSING,
+            "No effect is missing: the error does not exceed the noise and the adequacy floor of 0.03 % of the range.",
+        )
     if is_explained(selection) and is_makeshift(selection):
         message = (
             f"{names} {explain} only {100 * closed:.0f} % of the gap, and a linear effect that is really "

@@ -193,7 +193,7 @@ def identify(
         report("joint fit", 0.3)
         joint = fit_lag(start, *steps_apart(records, floors, roles.fitted))
     if memory and roles.broadband:
-        report("memory", 0.9)
+        report("memory of the hysteresis", 0.9)
         joint, more_notices = choose_memory(joint, records, floors, roles.fitted, roles.loops)
         notices += more_notices
     if not roles.broadband:

@@ -26,12 +26,13 @@ from .verdict import VerdictText
 from .words import nanometre
 
 FOOTER = (
-    "Nothing has moved. The expected error is the root of the sum of squares of what the plan leaves and of the "
-    "free-run error that the model file states. Per cents are RMS over the range of the path."
+    "This is a computation; nothing has moved. The planned error is the difference between the wanted and the "
+    "simulated displacement. The expected error is the root of the sum of squares of the planned error and of the "
+    "free-run error of the model. Percentages are RMS errors over the range of the path."
 )
-"""How the numbers are to be read."""
+"""Explanation of the numbers."""
 MERIT = ("drive voltage", "largest slew")
-"""Rows of the plan that stand under the headline, too, before the expected error."""
+"""Rows of the plan that are repeated under the headline."""
 
 
 def plan_page(plan: Plan, model: Model, source: str) -> Page:
@@ -40,9 +41,9 @@ def plan_page(plan: Plan, model: Model, source: str) -> Page:
     Parameters
     ----------
     plan : Plan
-        Of the path.
+        Plan for the path.
     model : Model
-        Whose inverse it is.
+        Model whose inverse was used.
     source : str
         File of the path.
     """

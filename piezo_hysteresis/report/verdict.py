@@ -24,26 +24,26 @@ from .figures.comparison import ModelComparison
 from .words import nanometre
 
 ENOUGH = 1.5
-"""Mean square of error over floor up to which nothing is missing."""
+"""Mean square of error over noise floor up to which nothing is missing."""
 
 
 @dataclass(frozen=True, slots=True)
 class VerdictText:
-    """One headline, the sentence that is the verdict, and the sentences that go into detail."""
+    """A headline, and sentences: the first is the verdict, the others are details."""
 
     headline: str
     sentences: tuple[str, ...]
 
 
 def verdict(comparison: ModelComparison, answer: Mapping[str, Any] | None = None) -> VerdictText:
-    """Say what the comparison, and the diagnosis if there is one, come to.
+    """The result of the comparison, and of the diagnosis if there is one.
 
     Parameters
     ----------
     comparison : ModelComparison
-        Models against measurement.
+        Predictions of the models and the measurement.
     answer : mapping, optional
-        The answer of a diagnosis, as it is written for machines.
+        Answer of a diagnosis, as in the JSON file.
     """
     severe = [n.message for n in comparison.experiment.notices if n.severe]
     cautions = tuple(f"Caution: {message}." for message in severe)
@@ -60,7 +60,7 @@ def verdict(comparison: ModelComparison, answer: Mapping[str, Any] | None = None
 
 
 def answer_verdict(answer: Mapping[str, Any]) -> VerdictText:
-    """What a diagnosis says, from its answer for machines."""
+    """The result of a diagnosis, from its answer as in the JSON file."""
     return VerdictText(_headline(answer), _sentences(answer))
 
 
@@ -83,23 +83,23 @@ def _fit_sentences(comparison: ModelComparison) -> tuple[str, ...]:
     floor = 100.0 * comparison.floor / now.range
     sentences = [
         f"In free run the error is {nanometre(now.rms)} rms over all phases, {now.percent:.3g} % of a range of "
-        f"{nanometre(now.range)}; the floor is {floor:.2g} %."
+        f"{nanometre(now.range)}; the noise floor is {floor:.2g} %."
     ]
     if before is not None:
         sentences.append(f"Before, it was {nanometre(before.rms)}, {before.percent:.3g} % of range.")
     sentences += _per_record_sentences(comparison)
     if _excess(comparison) <= ENOUGH:
-        sentences.append("This error is at the floor: only noise remains.")
+        sentences.append("This error is at the noise floor: only noise remains.")
     else:
         times = worst.rms / comparison.floors[worst.index]
         sentences.append(
-            f"The error is largest in {worst.phase}: {worst.percent:.3g} % of range, {times:.3g} times its floor."
+            f"The error is largest in {worst.phase}: {worst.percent:.3g} % of range, {times:.3g} times its noise floor."
         )
     return tuple(sentences)
 
 
 def _per_record_sentences(comparison: ModelComparison) -> tuple[str, ...]:
-    """What the error holds that a running stage does not show."""
+    """Effects that are fitted to each recording, so that they are not predicted live."""
     model = comparison.model
     fitted = [] if model is None else [e.public_name() for e in model.effects if not e.is_predicted_live()]
     return tuple(
@@ -142,8 +142,7 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
             twins = ", ".join(t.replace("_", " ") for t in effect["confusable_with"])
             others = f": {twins} would explain the data equally well" if twins else ""
             found.append(
-                f"The family of the effect ({effect['family']}) is certain. Which member of the family it "
-                f"is, is not{others}."
+                f"The family of the effect ({effect['family']}) is certain, but not the member of the family{others}."
             )
     places = [place for place in answer.get("where", ()) if place.get("detail")]
     if places and answer["verdict"] != "nothing_missing":
@@ -152,8 +151,8 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
     if gap.get("after") is not None:
         seen = "On the test records" if gap.get("unseen", True) else "On the fitted data"
         found.append(
-            f"{seen} the gap goes from {gap['before']:.3g} % to {gap['after']:.3g} % of range, "
-            f"floor {gap['floor']:.3g} %."
+            f"{seen} the gap (free-run error) is {gap['before']:.3g} % of the range before and {gap['after']:.3g} % "
+            f"after; the noise floor is {gap['floor']:.3g} %."
         )
     correction = answer.get("unnamed_correction")
     if correction:

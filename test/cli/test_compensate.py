@@ -25,6 +25,7 @@ import pytest
 from piezo_hysteresis.effects import Arx, BoucWen, SofteningOfOneMode
 from piezo_hysteresis.model import model_file
 from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.report.words import nanometre
 
 PERIOD = 2e-5
 MODEL = Model(
@@ -70,8 +71,8 @@ def test_terminal_page_and_json_say_the_same_numbers(piezo, model, tmp_path):
         u = held["voltage"]
     assert u[-1] == u[0] == 0.0, "the way back"
     for text in (
-        f"{1e9 * answer['expected_error']['total_m']:.2f} nm",
-        f"{1e9 * answer['expected_error']['planned_m']:.2f} nm",
+        nanometre(answer["expected_error"]["total_m"]),
+        nanometre(answer["expected_error"]["planned_m"]),
         f"{answer['largest_slew_V_per_s']:.4g} V/s",
         f"{answer['voltage_min_V']:.4g} to {answer['voltage_max_V']:.4g} V",
     ):
@@ -82,7 +83,7 @@ def test_terminal_page_and_json_say_the_same_numbers(piezo, model, tmp_path):
     again = ("--force", "--report", tmp_path / "page.html")
     assert piezo(*words, *again).status == 1
     page = (tmp_path / "page.html").read_text()
-    assert "do not allow the whole path" in page and "below the minimum" in page
+    assert "do not allow the whole path" in page and "below voltage_min" in page
 
 
 def test_out_of_reach_writes_nothing_and_says_what_can_be_had(piezo, model, tmp_path):
@@ -90,7 +91,7 @@ def test_out_of_reach_writes_nothing_and_says_what_can_be_had(piezo, model, tmp_
     words = ("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz")
     done = piezo(*words)
     assert done.status == 1 and not (tmp_path / "command.npz").exists()
-    assert "below the minimum" in done.out and "moved by +" in done.out
+    assert "below voltage_min" in done.out and "if it is shifted by +" in done.out
     assert piezo(*words, "--allow-partial").status == 1
     with np.load(tmp_path / "command.npz") as held:
         assert held["voltage"].min() >= 0.0

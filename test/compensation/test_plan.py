@@ -53,7 +53,7 @@ def test_zero_after_a_loop_on_unipolar_drive_needs_a_negative_voltage() -> None:
     first = found.parts[0]
     assert first.limit == "voltage_min" and first.needed_min < 0.0 and first.after_loop and first.largest > 0.0
     assert 0.015 < first.begin < 0.02 < first.end < 0.025, "at the end of the first loop, not at its start"
-    assert "below the minimum" in str(first)
+    assert "below voltage_min" in str(first)
     nearest = found.nearest
     assert nearest is not None and nearest.offset is not None and nearest.amplitude is not None
     assert nearest.offset > 0.0 and 0.0 < nearest.amplitude < 1.0

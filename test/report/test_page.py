@@ -111,7 +111,7 @@ def test_structure_can_be_heard(tags):
 def test_the_verdict_comes_first_and_in_words(drawn, tags):
     assert drawn.html.index('id="verdict"') < drawn.html.index("<img")
     assert "Missing effect: creep" in tags.words
-    assert any("from 0.72 % to 0.04 % of range" in w for w in tags.words)
+    assert any("is 0.72 % of the range before and 0.04 % after" in w for w in tags.words)
 
 
 def test_what_was_given_is_text_and_never_markup(drawn, tags):

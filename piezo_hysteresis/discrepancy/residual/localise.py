@@ -138,7 +138,7 @@ def _frequencies(
     records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]
 ) -> tuple[ResidualShare, float]:
     edges = EDGES["frequency"]
-    labels = [f"{a:g} to {b:g} Hz" for a, b in zip(edges, edges[1:], strict=False)]
+    labels = [_between(f"{a:g}", f"{b:g}", "Hz") for a, b in zip(edges, edges[1:], strict=False)]
     held, room = np.zeros(len(labels)), np.zeros(len(labels))
     for record, e, f in zip(records, residuals, floors, strict=True):
         spectrum = np.abs(np.fft.rfft(e)) ** 2 / (f * f * e.size**2)
@@ -157,7 +157,12 @@ def _labels(axis: str) -> list[str]:
     if axis == "turning_point_distance":
         return [f"{10 * k} to {10 * k + 10} % of the drive range after a turning point" for k in range(10)]
     edges = EDGES[axis]
-    return [f"{a:.2g} to {b:.2g} s after a change of level" for a, b in zip(edges, edges[1:], strict=False)]
+    bins = [_between(f"{a:.2g}", f"{b:.2g}", "s") for a, b in zip(edges, edges[1:], strict=False)]
+    return [f"{bin_} after a change of level" for bin_ in bins]
+
+
+def _between(low: str, high: str, unit: str) -> str:
+    return f"{low} {unit} or more" if high == "inf" else f"{low} to {high} {unit}"
 
 
 def _drive_bins(record: Record, span: float) -> dict[str, Bins]:

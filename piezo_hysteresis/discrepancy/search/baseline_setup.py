@@ -157,7 +157,7 @@ def prepare_baseline(
         return TrainingData(tuple(kept), np.array(sizes), Nuisance(), extent)
 
     training_data = gathered(records, least)
-    progress("baseline, jointly", 0.2)
+    progress("joint fit of the baseline", 0.2)
     baseline = joint(start, training_data, LAST, PRECISE)
     lost = [np.zeros(r.size) for r in records]
     if sharpens:
@@ -166,7 +166,7 @@ def prepare_baseline(
         records = less(records, lost)
         least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
         training_data = gathered(records, least)
-        progress("baseline, jointly", 0.3)
+        progress("joint fit of the baseline", 0.3)
         baseline = joint(baseline.model, training_data, LAST, PRECISE)
     training_data, score = score_baseline(baseline.model, training_data)
     if score.excess > ADEQUATE:

@@ -62,7 +62,7 @@ def refit_candidates(
             refits = sorted([*refits, result], key=lambda c: c.score.cost)
     if not refits:
         return []
-    progress("dynamics anew", 0.8)
+    progress("new estimate of the dynamics", 0.8)
     leader = _anew(refits[0])
     field = [
         leader,

@@ -189,11 +189,11 @@ def _turn(
         if accepted and close and (lead < 2.0 * error or alikeness(best, candidate, model) > ALIKE):
             rivals.append(candidate)
         else:
-            message = f"in cross-validation it is {lead:.2f} ± {error:.2f} behind {best.name} (mean ln R²)"
+            message = f"in cross-validation its mean ln R² is {lead:.2f} ± {error:.2f} higher than with {best.name}"
             rejected.append(Rejection(candidate.name, message))
     for other in _others(screened, refits):
         most = max(0.0, before.cost - other.score.cost)
-        gains = f"it gains at most {most:.2f} in mean ln R²" if most >= NO_GAIN else "it does not reduce the error"
+        gains = f"it lowers mean ln R² by at most {most:.2f}" if most >= NO_GAIN else "it does not reduce the error"
         rejected.append(Rejection(other.name, f"in cross-validation {gains}"))
     tried = (*refits, *_others(screened, refits))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), tried, renewed)
@@ -227,7 +227,7 @@ def _judged(
     best = finest(simplest([c for c in refits if not bends_all_along(c)] or refits), before)
     gain, left = before.cost - best.score.cost, share_left(best.score, before, null)
     if gain < LEAST_GAIN or left > keeps:
-        small = f"in cross-validation it gains {gain:.2f} in mean ln R², and {LEAST_GAIN:g} is needed"
+        small = f"in cross-validation it lowers mean ln R² by {gain:.2f}, and {LEAST_GAIN:g} is needed"
         much = f"{100 * left:.0f} % of the excess error remains, and {100 * keeps:.0f} % is allowed"
         message = "; ".join(text for text, fails in ((small, gain < LEAST_GAIN), (much, left > keeps)) if fails)
         return best, None, Rejection(best.name, message)

@@ -119,7 +119,7 @@ def diagnose_few(
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
     baseline = joint(with_zero(published), training_data, LAST, PRECISE)
     before = score_model(baseline.model, training_data)
-    progress("where", 0.5)
+    progress("location of the residual", 0.5)
     left = residuals(baseline.model, records, Nuisance(offset=True))
     where = localise([records[i] for i in fitted], [left[i] for i in fitted], [least[i] for i in fitted])
 
@@ -219,8 +219,8 @@ def _verdict(
     if decided and gap.falls:
         rivals = [n for s in selection.accepted for n in s.confusable_with]
         said = (
-            f"The model misses {' and '.join(names)}, which the prediction of rates, amplitudes and records that were "
-            f"left out decides; together they explain {100 * closed:.0f} % of the gap."
+            f"The model does not contain {' and '.join(names)}. An extended model predicts rates, amplitudes and "
+            f"records better that were left out of the fit; it explains {100 * closed:.0f} % of the gap."
         )
         alike = f" These data cannot distinguish {' or '.join(rivals)} from it." if rivals else ""
         return Verdict.NAMED, said + alike

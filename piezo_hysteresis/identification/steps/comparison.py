@@ -64,8 +64,9 @@ class InputComparison:
 
     def __str__(self) -> str:
         return (
-            f"noise {self.amplitude:.3g} V rms: |G({LOW:g} Hz)|/|G({HIGH:g} Hz)| = {self.from_w:.3f} behind the "
-            f"hysteresis, {self.from_v:.3f} with it; lag {self.lag_from_w * 1e6:.4g} and {self.lag_from_v * 1e6:.4g} µs"
+            f"noise of {self.amplitude:.3g} V rms: |G({LOW:g} Hz)|/|G({HIGH:g} Hz)| is {self.from_w:.3f} without and "
+            f"{self.from_v:.3f} with the hysteresis; the lag is {self.lag_from_w * 1e6:.4g} and "
+            f"{self.lag_from_v * 1e6:.4g} µs"
         )
 
 

@@ -92,7 +92,8 @@ class Delay:
         first = self.onsets[0]
         span = f"{first.earliest * 1e6:.4g} to {first.latest * 1e6:.4g} µs"
         return (
-            f"delay {self.samples} samples of {self.sample_period * 1e6:.4g} µs ({span}, {self.response.edges} edges)"
+            f"delay {self.samples} samples of {self.sample_period * 1e6:.4g} µs "
+            f"({span}, from {self.response.edges} edges)"
         )
 
 

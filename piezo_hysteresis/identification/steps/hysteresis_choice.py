@@ -109,8 +109,8 @@ def choose_memory(
     # with the mean of logarithms, a single bad block does not decide
     of_plays, of_state = (float(np.mean(np.log(np.maximum(e, 1.0)))) for e in (plays_error, state_error))
     message = (
-        f"in cross-validation play operators reach {np.exp(of_plays):.3g} times the floor and "
-        f"{joint.model.hysteresis.name} reaches {np.exp(of_state):.3g} times the floor (geometric means)"
+        f"in cross-validation the error is {np.exp(of_plays):.3g} times the noise floor with play operators and "
+        f"{np.exp(of_state):.3g} times the noise floor with {joint.model.hysteresis.name} (geometric means)"
     )
     lead = of_plays - of_state
     if lead > np.log(TIE):

@@ -40,7 +40,9 @@ def effect_table(answer: Mapping[str, Any]) -> Table | None:
     header = ("effect", "family", "gap explained", "confusable with", "parameter", "value", "95 %", "unit")
     several = len({row[0] for row in rows}) > 1
     note = (
-        "The gap explained is that of the effect and of all effects above it; the shares do not add." if several else ""
+        "Each row states the share of the gap that this effect and all effects above it explain together."
+        if several
+        else ""
     )
     return Table("Effects found", header, tuple(rows), note, frozenset({2, 5, 6})) if rows else None
 
@@ -54,7 +56,8 @@ def correction_table(answer: Mapping[str, Any]) -> Table | None:
     rows = tuple(tuple(f"{v:.3g}" for v in pair) for pair in zip(*(a["values"] for a in axes), strict=True))
     header = tuple(f"{a['name']} [{a['unit']}]" for a in axes)
     note = (
-        "It describes what is left, and has no physical name. It does not hold outside of the range that was recorded."
+        "The correction describes the remaining residual. It has no physical name, and is not valid outside the "
+        "recorded range."
     )
     return Table("Correction without a name", header, rows, note, frozenset({0, 1}))
 
@@ -73,19 +76,19 @@ def where_table(answer: Mapping[str, Any]) -> Table | None:
 
 
 def gap_table(answer: Mapping[str, Any]) -> Table | None:
-    """Gap before and after, by phase where the diagnosis says it."""
+    """Gap before and after; by phase if the diagnosis contains it."""
     gap = answer.get("gap_percent_of_range") or {}
     phases = {name: value for name, value in (gap.get("per_phase") or {}).items() if isinstance(value, Mapping)}
     rows = [(name, *(_percent(value.get(key)) for key in _GAP)) for name, value in phases.items()]
     if gap.get("before") is not None:
         rows.append(("all phases", *(_percent(gap.get(key)) for key in _GAP)))
     seen = "the test records" if gap.get("unseen", True) else "the fitted data"
-    note = f"Per cent of range, on {seen}."
+    note = f"Free-run error in % of the range, on {seen}; floor is the error that noise alone causes."
     return Table("Gap", ("phase", *_GAP), tuple(rows), note, frozenset({1, 2, 3})) if rows else None
 
 
 def rejection_table(answer: Mapping[str, Any]) -> Table | None:
-    """Effects that were tried and why they were not taken."""
+    """Effects that were tried, and the reason why each was rejected."""
     by_reason: dict[str, list[str]] = {}
     for rejected in answer.get("rejected", ()):
         by_reason.setdefault(rejected["reason"], []).append(rejected["name"])
@@ -93,7 +96,8 @@ def rejection_table(answer: Mapping[str, Any]) -> Table | None:
         (names[0], reason) if len(names) == 1 else (f"{len(names)} effects", f"{reason}: {', '.join(names)}")
         for reason, names in by_reason.items()
     )
-    return Table("Rejected", ("effect", "reason"), rows) if rows else None
+    note = "R is the RMS residual of a record over its noise floor; the record was left out of the fit."
+    return Table("Rejected", ("effect", "reason"), rows, note) if rows else None
 
 
 def _percent(value: float | None) -> str:

@@ -23,7 +23,7 @@ from .table import Table
 
 
 def error_table(comparison: ModelComparison) -> Table | None:
-    """Every record: its floor, the error of every model, and of the last one in nm, at worst and as fit."""
+    """Every record: its noise floor and the error of every model; for the last model also RMS, worst error and fit."""
     now = comparison.now
     if now is None:
         return None
@@ -39,7 +39,7 @@ def error_table(comparison: ModelComparison) -> Table | None:
     whole = len(now.judged) == len(now.rows)
     rows.append(
         (
-            "all phases" if whole else "known start",
+            "all phases" if whole else "known initial state",
             f"{comparison.experiment.size}",
             f"{floor:.3f}",
             *totals,
@@ -61,13 +61,10 @@ def error_table(comparison: ModelComparison) -> Table | None:
         "Free-run error by phase",
         header,
         tuple(rows),
-        f"Per cent of range; the range is {1e6 * now.range:.4g} µm, peak to peak over the experiment. Every phase "
-        "counts the same in the last row"
+        f"The range is {1e6 * now.range:.4g} µm, peak to peak over the experiment. Every phase has the same weight in "
+        "the last row"
         + ("" if whole else ", except phases that begin in an unknown state (conditioning, truncated)")
-        + (
-            ". Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase. It has little meaning in phases in "
-            "which the stage hardly moves."
-        ),
+        + (". Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase. It has little meaning if the stage hardly moves."),
         frozenset(range(1, len(header))),
     )
 

@@ -51,7 +51,7 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
                 continue
             interval = f"± {sure[name]:.2g}" if name in sure else ""
             message = f"{bounds}: at a bound" if name in hit else bounds
-            rows.append((name, row.symbol, f"{value:.6g}", interval, row.unit, message, row.meaning))
+            rows.append((name, row.symbol, f"{value:.4g}", interval, row.unit, message, row.meaning))
     note = (
         "Single ARX coefficients are not identifiable, because poles and zeros nearly cancel. "
         "Compare the frequency response of G instead."

@@ -19,6 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...compensation.plan import Plan
+from ..words import nanometre
 from .table import Table
 
 MOST_PARTS = 3
@@ -32,7 +33,7 @@ def plan_table(found: Plan) -> Table:
     def error(value: float | None) -> str:
         if value is None:
             return "not stated"
-        return f"{1e9 * value:.2f} nm" + (f", {100.0 * value / span:.4f} % of the path's range" if span else "")
+        return nanometre(value) + (f", {100.0 * value / span:.3g} % of the path's range" if span else "")
 
     way_back = found.voltage.size - found.begin - found.wanted.size
     rows = (
@@ -41,9 +42,9 @@ def plan_table(found: Plan) -> Table:
         ("duration", f"{found.voltage.size * found.sample_period:.4g} s, {found.voltage.size} samples"),
         ("way back to the first voltage", f"{1e3 * way_back * found.sample_period:.4g} ms"),
         ("preview", f"{found.preview} samples, {1e3 * found.preview * found.sample_period:.3g} ms"),
-        ("error left by the plan", error(expected.planned)),
+        ("planned error", error(expected.planned)),
         ("free-run error of the model", error(expected.free_run)),
-        ("uncertainty of the model's numbers", error(expected.parameters)),
+        ("part of it from the parameters", error(expected.parameters)),
         ("expected error, rms", error(expected.total)),
     )
     return Table("Plan", ("quantity", "value"), rows)
@@ -52,7 +53,7 @@ def plan_table(found: Plan) -> Table:
 def notes(found: Plan) -> list[str]:
     """Notes on the plan: effects that were left out, and unreachable parts."""
     lines = [
-        f"caution: {name} has no inverse and was left out; the error above holds what that costs"
+        f"caution: {name} has no inverse and was left out; the error above includes the effect of this"
         for name in found.left_out
     ]
     lines += [f"note: {name} does not depend on the drive and is not compensated" for name in found.not_on_path]
@@ -64,20 +65,21 @@ def refusal(found: Plan) -> list[str]:
     parts = found.reachability.parts
     lines = [str(part) for part in parts[:MOST_PARTS]]
     if len(parts) > MOST_PARTS:
-        lines.append(f"{len(parts) - MOST_PARTS} more parts like these are not reachable")
+        more = len(parts) - MOST_PARTS
+        lines.append(f"{more} more part{'s' * (more > 1)} of the path cannot be reached")
     nearest = found.reachability.nearest
     if nearest is None:
         return lines
     ways = []
     if nearest.offset is not None:
-        ways.append(f"moved by {1e6 * nearest.offset:+.4g} µm")
+        ways.append(f"if it is shifted by {1e6 * nearest.offset:+.4g} µm")
     if nearest.amplitude is not None:
-        ways.append(f"with {100.0 * nearest.amplitude:.4g} % of its amplitude about its middle")
+        ways.append(f"if its amplitude about the middle is reduced to {100.0 * nearest.amplitude:.4g} %")
     if nearest.band is not None:
-        ways.append(f"without content above {nearest.band:.3g} Hz")
+        ways.append(f"if its components above {nearest.band:.3g} Hz are removed")
     return [
         *lines,
-        f"the path becomes reachable {', or '.join(ways)}" if ways else "no shift or scale makes it reachable",
+        f"the whole path can be reached {', or '.join(ways)}" if ways else "no shift or scale makes the path reachable",
     ]
 
 
