@@ -64,32 +64,32 @@ class NonlinearPart:
     """
 
     def __init__(self, terms: Sequence[InverseTerms], limits: Limits, sample_period: float) -> None:
-        self.drive = np.zeros(16)
-        self.drive[[r.PER_VOLT, r.LEAD]] = 1.0
-        self.drive[[r.LOWER, r.UPPER, r.REACH]] = -np.inf, np.inf, np.inf
-        self.drive[[r.LOWEST, r.HIGHEST]] = limits.voltage_min, limits.voltage_max
-        self.drive[[r.STEP, r.RESOLUTION]] = limits.max_slew_rate * sample_period, limits.resolution
+        drive = np.zeros(16)
+        drive[[r.PER_VOLT, r.LEAD]] = 1.0
+        drive[[r.LOWER, r.UPPER, r.REACH]] = -np.inf, np.inf, np.inf
+        drive[[r.LOWEST, r.HIGHEST]] = limits.voltage_min, limits.voltage_max
+        drive[[r.STEP, r.RESOLUTION]] = limits.max_slew_rate * sample_period, limits.resolution
         for name, value in (item for t in terms for item in t.drive.items()):
-            self.drive[r.DRIVE.index(name)] = value
+            drive[r.DRIVE.index(name)] = value
         hysteresis = next((t for t in terms if t.is_hysteresis), InverseTerms(polynomial={"p2": 1.0}))
-        self.poly = np.array([hysteresis.polynomial.get(name, 0.0) for name in POLYNOMIAL])
+        self.poly = tuple(float(hysteresis.polynomial.get(name, 0.0)) for name in POLYNOMIAL)
         self._loop = hysteresis.loop or WITHOUT_LOOP
-        self.kind, self.loop = self._loop.kind, self._loop.numbers
-        self.periods = np.array(self._loop.periods or (sample_period, sample_period))
+        self.kind, self.loop = self._loop.kind, tuple(self._loop.numbers.tolist())
+        self.periods = self._loop.periods or (sample_period, sample_period)
         self._plays = hysteresis.plays or PlayTerms(np.zeros(0), np.zeros(0), np.zeros(0))
         self.weights, self.radii = np.vstack((self._plays.weights, self._plays.bends)), self._plays.radii
-        self._bracket()
+        self._bracket(drive)
+        self.drive = tuple(drive.tolist())
         self._relaxations = [t.relaxations for t in terms if t.relaxations is not None]
         self.bank = self._bank(self._relaxations)
 
-    def _bracket(self) -> None:
-        """Set the interval in which roots are searched: between extrema of the static curve, inside the limits."""
+    def _bracket(self, d: Array) -> None:
+        """Set in `d` the interval in which roots are searched: between extrema of the static curve, inside the limits."""
         p1, p2, square, fourth = self.poly
         c, bends = self.weights
         slope = np.array([p2 + c.sum(), 2.0 * (square + c @ bends), 3.0 * p1, 4.0 * fourth])
         if slope[0] == 0.0:
             raise ModelError("hysteresis: the static curve has no slope at 0 V; expected p2 or plays")
-        d = self.drive
         d[r.TURN] = np.sign(slope[0])
         roots = np.roots(slope[::-1])
         real = roots[np.abs(roots.imag) < 1e-9].real
@@ -137,8 +137,8 @@ class NonlinearPart:
         }
         plays = (("c", self.weights[0]), ("bend", self.weights[1]), ("radius", self.radii))
         numbers |= {name: np.pad(values, one_at_least) for name, values in plays}
-        numbers |= {"loop": np.append(self.loop, self.periods), "poly": self.poly}
-        numbers |= dict(zip(r.DRIVE, self.drive.tolist(), strict=True))
+        numbers |= {"loop": np.array(self.loop + self.periods), "poly": np.array(self.poly)}
+        numbers |= dict(zip(r.DRIVE, self.drive, strict=True))
         state = ["double voltage, slewed, pole, held, pushed", "double h, v, w"]
         state.append(f"double play[{max(1, self.radii.size)}]")
         before: list[str] = []

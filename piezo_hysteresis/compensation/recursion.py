@@ -130,7 +130,9 @@ def relax_to(w, starts, direct, lead, weights, lasts, banks, ahead):
 def invert(targets, kind, p, periods, poly, c, radii, d, bank, state, plays, lasts, banks, u):
     """Drive u (n,) [V] for wanted outputs of the material (n,).
 
-    `bank` is (starts, direct, fade, lead, weights, gains); state (8,), plays (s,), lasts and banks are updated.
+    `bank` is (starts, direct, fade, lead, weights, gains); state (8,), plays (s,), lasts and banks are updated. The
+    numbers p, periods, poly and d are tuples: compiled code would count the users of an array at every inlined call,
+    which costs as much as the search itself.
     """
     starts, direct, fade, lead, weights, gains = bank
     ahead = banks.copy()
