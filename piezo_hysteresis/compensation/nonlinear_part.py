@@ -84,7 +84,7 @@ class NonlinearPart:
         self.bank = self._bank(self._relaxations)
 
     def _bracket(self, d: Array) -> None:
-        """Set in `d` the interval in which roots are searched: between extrema of the static curve, inside the limits."""
+        """Set in `d` the interval of the search for roots: between extrema of the static curve, inside the limits."""
         p1, p2, square, fourth = self.poly
         c, bends = self.weights
         slope = np.array([p2 + c.sum(), 2.0 * (square + c @ bends), 3.0 * p1, 4.0 * fourth])
