@@ -39,7 +39,7 @@ from .bouc_wen_kernel import (
     decay,
     rate_factor,
 )
-from .kernel import kernel
+from .kernel import inlined, kernel
 
 START = len(LOOP)
 """Index of the initial state among the own rows: it has no forcing."""
@@ -54,32 +54,22 @@ def decay_slope(r, length):
     return (length * exp(-x) - decay(r, length)) / r
 
 
-@kernel
-def advance_slopes(h, drive, length, r_same, r_flipped, out):
-    """`advance`, with out = its derivatives by h, drive, length, r_same, r_flipped."""
+@inlined
+def advance_slopes(h, drive, length, r_same, r_flipped):
+    """`advance`, and its derivatives by h, drive, length, r_same, r_flipped."""
     phi = decay(r_same, length)
-    end = h + (drive - r_same * h) * phi
+    pull = drive - h * r_same
+    end = h + pull * phi
     if end * h < 0.0:
         reach = crossing(h, drive, r_same)
         rest = max(0.0, length - reach)
-        left = exp(-r_flipped * rest)
-        pull = drive - h * r_same
-        out[0] = drive * left / pull
-        out[1] = decay(r_flipped, rest) - left * h / pull
-        out[2] = drive * left
-        if abs(r_same) < 1e-6:
-            out[3] = 0.5 * left * h * h / drive
-        else:
-            out[3] = drive * left * (reach + h / pull) / r_same
-        out[4] = drive * decay_slope(r_flipped, rest)
-        return drive * decay(r_flipped, rest)
+        left, drift = exp(-r_flipped * rest), decay(r_flipped, rest)
+        by_same = 0.5 * left * h * h / drive if abs(r_same) < 1e-6 else drive * left * (reach + h / pull) / r_same
+        by_flipped = drive * decay_slope(r_flipped, rest)
+        return drive * drift, (drive * left / pull, drift - left * h / pull, drive * left, by_same, by_flipped)
     left = 1.0 - r_same * phi
-    out[0] = left
-    out[1] = phi
-    out[2] = (drive - r_same * h) * left
-    out[3] = -h * phi + (drive - r_same * h) * decay_slope(r_same, length)
-    out[4] = 0.0
-    return end
+    by_same = -h * phi + pull * decay_slope(r_same, length)
+    return end, (left, phi, pull * left, by_same, 0.0)
 
 
 @kernel
@@ -102,7 +92,6 @@ def linearise_plain(v, p, p1, p2, state, tangent, w, dw):
     h, last = state[0], state[1]
     by_a, by_beta, by_gamma = tangent[0], tangent[1], tangent[2]
     row_a, row_beta, row_gamma, row_1, row_2 = dw[0], dw[1], dw[2], dw[3], dw[4]
-    full = np.zeros(5)
     for i in range(v.size):
         x = v[i]
         dv = x - last
@@ -111,7 +100,7 @@ def linearise_plain(v, p, p1, p2, state, tangent, w, dw):
             s = copysign(1.0, dv)
             drive = s * a
             turn = s * copysign(1.0, drive if h == 0.0 else h)
-            h = advance_slopes(h, drive, abs(dv), beta + gamma * turn, beta - gamma * turn, full)
+            h, full = advance_slopes(h, drive, abs(dv), beta + gamma * turn, beta - gamma * turn)
             by_a = full[0] * by_a + full[1] * s
             by_beta = full[0] * by_beta + (full[3] + full[4])
             by_gamma = full[0] * by_gamma + (full[3] * turn - full[4] * turn)
@@ -137,8 +126,7 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, stat
     drive_by = np.zeros(START + 1)
     same_by = np.zeros(START + 1)
     flipped_by = np.zeros(START + 1)
-    half = np.zeros(5)
-    full = np.zeros(5)
+    half = (0.0, 0.0, 0.0, 0.0, 0.0)
     rated, powered = k != 0.0, n != 1.0
     for c in own:
         rated = rated or c == RATE
@@ -182,8 +170,8 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, stat
                 if n != 1.0:
                     first = abs(h / H_REFERENCE) ** (n - 1.0)
                 if powered:
-                    middle = advance_slopes(
-                        h, drive, 0.5 * length, first * loss - bend - gm, first * loss_flipped - bend + gm, half
+                    middle, half = advance_slopes(
+                        h, drive, 0.5 * length, first * loss - bend - gm, first * loss_flipped - bend + gm
                     )
                     if n != 1.0:
                         power = abs(middle / H_REFERENCE) ** (n - 1.0)
@@ -195,8 +183,8 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, stat
                         power_by_n = power * log(abs(middle / H_REFERENCE))
                 same_by[BETA], same_by[GAMMA], same_by[PHI1], same_by[PHI2] = power, power * s * g, -s, -g
                 flipped_by[BETA], flipped_by[GAMMA], flipped_by[PHI1], flipped_by[PHI2] = power, -power * s * g, -s, g
-                h_next = advance_slopes(
-                    h, drive, length, power * loss - bend - gm, power * loss_flipped - bend + gm, full
+                h_next, full = advance_slopes(
+                    h, drive, length, power * loss - bend - gm, power * loss_flipped - bend + gm
                 )
                 by_v = s * (full[1] * drive_by_speed / period + full[2] / steps)
                 for j in range(m):
