@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...record import Experiment, Notice, Record, Samples
-from ..segmentation.waveform import turning_points
+from ..segmentation.swing_shapes import turning_points
 
 _OPENING = 0.1
 """Share of the range of the drive up to which it counts as hardly moved."""

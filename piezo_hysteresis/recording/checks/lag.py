@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Notice, Record, Samples
-from ..segmentation.waveform import turning_points
+from ..segmentation.swing_shapes import turning_points
 
 LATE = 3e-3
 """Lag [s] beyond that of any stage; a slow sensor filter or a shifted channel causes it."""

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Samples
-from .waveform import turning_points
+from .swing_shapes import turning_points
 
 LARGEST_NOISE = 0.02
 """Voltages within this share of the range are one level."""

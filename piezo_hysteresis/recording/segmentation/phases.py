@@ -25,7 +25,8 @@ import numpy as np
 from ...errors import RecordingError
 from ...record import Experiment, Notice, Record, Samples
 from .levels import LARGEST_NOISE, Piece, pieces_of
-from .waveform import phase_name, turning_points
+from .swing_shapes import turning_points
+from .waveform import phase_name
 from .waveform_changes import waveform_changes
 
 _JUMP = 0.05

@@ -22,15 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Samples
+from .swing_shapes import COARSEST, COSINE, STRAIGHT, swing_shapes, turning_points
 
-COARSEST = 40_000
-"""Largest number of samples in which turning points are searched one by one."""
 _LEAST_SWING = 0.05
 """Least swing of a turning point, share of the range."""
 _REGULAR = 0.1
 """Relative difference up to which two periods are alike."""
 _STRAIGHT = 0.03
 """Largest rms deviation of a straight swing, share of the swing."""
+_MAJORITY = 0.8
+"""Share of the whole swings that have the shape of a wave which grows or shrinks."""
+_FEWEST = 4
+"""Fewest whole swings that show a wave which grows or shrinks."""
 _OTHER_POWER = 0.005
 """Largest share of the power outside a sine."""
 _PERIODIC = 0.9
@@ -87,9 +90,13 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     regular = like.size >= 0.8 * periods.size - 1  # one may belong to the motion before or after
     if straight < _STRAIGHT:
         return "triangle" if regular else "minor_loops"
+    shapes = swing_shapes(voltage, turns)[1:-1]
+    if regular and np.count_nonzero(shapes == STRAIGHT) >= max(_FEWEST, _MAJORITY * shapes.size):
+        return "triangle"
     period = float(np.mean(like)) if like.size else usual
     body = voltage[turns[0] if turns.size <= 3 else turns[1] :]
-    if regular and _is_sine(body, period):
+    cosines = np.count_nonzero(shapes == COSINE) >= max(_FEWEST, _MAJORITY * shapes.size)
+    if regular and (cosines or _is_sine(body, period)):
         return sine_name(_frequency(body, 1 / period) / sample_period)
     return "multisine" if _repeats(wave) else "noise"
 
@@ -101,31 +108,6 @@ def sine_name(frequency: float) -> str:
     ('sine_1hz', 'sine_12300hz')
     """
     return f"sine_{np.format_float_positional(float(f'{frequency:.3g}'), trim='-')}hz"
-
-
-def turning_points(voltage: Samples, least_swing: float) -> NDArray[np.int64]:
-    """Positions of the first sample, of every reversal by at least `least_swing` [V], and of the last sample."""
-    positions = np.arange(voltage.size)
-    if voltage.size > COARSEST:
-        length = 2 * voltage.size // COARSEST
-        blocks = voltage[: voltage.size // length * length].reshape(-1, length)
-        extremes = np.stack((blocks.argmin(axis=1), blocks.argmax(axis=1)), axis=1)
-        extremes.sort(axis=1)
-        positions = np.append((extremes + length * np.arange(len(blocks))[:, None]).ravel(), voltage.size - 1)
-    found = [0]
-    candidate, direction = 0, 0
-    values = voltage.tolist() if voltage.size <= COARSEST else None
-    for position in positions.tolist():
-        value = values[position] if values else voltage[position]
-        best = values[candidate] if values else voltage[candidate]
-        if direction == 0 and abs(value - best) >= least_swing:
-            direction, candidate = (1 if value > best else -1), position
-        elif direction and (value - best) * direction > 0:
-            candidate = position
-        elif direction and (best - value) * direction >= least_swing:
-            found.append(candidate)
-            direction, candidate = -direction, position
-    return np.array([*found, voltage.size - 1])
 
 
 def _transition(voltage: Samples) -> str:

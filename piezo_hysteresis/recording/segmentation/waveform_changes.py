@@ -14,8 +14,8 @@
 
 """Where a drive without rests changes from one waveform to another: from sines to triangles, to another rate, to noise.
 
-A swing, the movement from one turning point to the next, is a half cosine, a straight line, or neither. Alike swings in
-a row are a waveform; what is neither for long is noise, or a multisine.
+Alike swings in a row are a waveform; swings that have neither the shape of a sine nor that of a triangle for long are
+noise, or a multisine.
 """
 
 from __future__ import annotations
@@ -26,18 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Samples
-from .waveform import COARSEST, turning_points
+from .swing_shapes import COSINE, OTHER, STRAIGHT, UNSEEN, swing_shapes, turning_points
 
 _LEAST_SWING = 0.05
 """Least swing of a turning point, share of the range."""
-_POINTS = 24
-"""Points of a swing that are compared with a shape."""
-_SHORTEST = 12
-"""Samples in the shortest swing whose shape is seen."""
-_UNSEEN = 3
-"""Stands for the shape of shorter swings."""
-_SAME_SHAPE = 0.025
-"""Largest rms deviation from a shape, share of the swing; a line and a half cosine are 0.07 apart."""
 _STEADY = 0.05, 1.5
 """Largest difference of the durations of two swings of one waveform: share of them, and samples."""
 _OTHER_RATE = 1.3
@@ -48,6 +40,8 @@ _FEWEST_BESIDE_NOISE = 8
 """Swings of the shortest waveform beside unsteady ones, where a few swings are alike by chance."""
 _SAME_HEIGHT = 1.15
 """Largest ratio of the heights of most swings of a waveform beside unsteady ones."""
+_LEAST_GROWTH = 0.02
+"""Smaller changes of the height from swing to swing, as a share of the largest height, are no growth."""
 _TRANSITION = 2
 """Most swings between two waveforms that belong to none."""
 _NOISE = 16
@@ -90,28 +84,13 @@ def waveform_changes(voltage: Samples) -> list[int]:
     >>> waveform_changes(np.concatenate((slow, fast))), waveform_changes(slow)
     ([4000], [])
     """
-    turns = turning_points(voltage, _LEAST_SWING * float(np.ptp(voltage)))
-    if turns.size <= 2 * _FEWEST:
+    span = float(np.ptp(voltage))
+    turns = turning_points(voltage, _LEAST_SWING * span)
+    if span == 0.0 or turns.size <= 2 * _FEWEST:
         return []
-    swings = _Swings(_shapes(voltage, turns), np.diff(turns), np.abs(np.diff(voltage[turns])))
+    swings = _Swings(swing_shapes(voltage, turns), np.diff(turns), np.abs(np.diff(voltage[turns])))
     waveforms = swings.joined(swings.without_chance(swings.runs()))
     return [int(turns[run.first]) for run in waveforms[1:]] if len(waveforms) <= _MOST else []
-
-
-def _shapes(voltage: Samples, turns: NDArray[np.int64]) -> NDArray[np.int8]:
-    """1 for a straight swing, 2 for a half cosine, 0 for another, `_UNSEEN` where it is too short."""
-    size = np.diff(turns)
-    share = np.linspace(0.0, 1.0, _POINTS + 1)
-    at = turns[:-1, None] + share * size[:, None]
-    before = np.minimum(at.astype(np.int64), voltage.size - 2)
-    values = voltage[before] + (at - before) * (voltage[before + 1] - voltage[before])
-    height = values[:, -1:] - values[:, :1]
-    way = (values - values[:, :1]) / np.where(height == 0.0, 1.0, height)
-    shapes = np.zeros(size.size, np.int8)
-    for shape, ideal in ((1, share), (2, 0.5 - 0.5 * np.cos(np.pi * share))):
-        shapes[np.sqrt(np.mean((way - ideal) ** 2, axis=1)) < _SAME_SHAPE] = shape
-    shapes[size < max(_SHORTEST, 3 * (2 * voltage.size // COARSEST))] = _UNSEEN
-    return shapes
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -147,9 +126,9 @@ class _Swings:
         found: list[_Run] = []
         first = 0
         for i in range(1, self.shape.size + 1):
-            if i < self.shape.size and self.shape[i] == self.shape[first] in (1, 2):
+            if i < self.shape.size and self.shape[i] == self.shape[first] in (STRAIGHT, COSINE):
                 alike = abs(self.size[i] - self.size[first]) <= share * self.size[first] + samples
-                if alike or (self.shape[i] == 1 and abs(slope[i] / slope[first] - 1.0) <= share):
+                if alike or (self.shape[i] == STRAIGHT and abs(slope[i] / slope[first] - 1.0) <= share):
                     continue
             found.append(_Run(first, i, True))
             first = i
@@ -168,14 +147,26 @@ class _Swings:
         return kept
 
     def _is_sure(self, run: _Run) -> bool:
-        """True for swings of equal height that are too many to be alike by chance."""
-        low, high = np.quantile(self.height[run.first : run.stop], (0.2, 0.8))
-        return run.size >= _FEWEST_BESIDE_NOISE and bool(high < _SAME_HEIGHT * low)
+        """True for swings of equal or steadily changing height that are too many to be alike by chance."""
+        height = self.height[run.first : run.stop]
+        low, high = np.quantile(height, (0.2, 0.8))
+        growth = np.diff(height)
+        growth = np.sign(growth[np.abs(growth) > _LEAST_GROWTH * float(height.max())])
+        turns = np.count_nonzero(np.diff(growth))
+        steadily = growth.size > 0 and (turns + 1) * _FEWEST_BESIDE_NOISE <= run.size
+        return run.size >= _FEWEST_BESIDE_NOISE and bool(high < _SAME_HEIGHT * low or steadily)
 
     def joined(self, runs: list[_Run]) -> list[_Run]:
         """Runs that are one waveform, joined: of one shape and rate, also around a disturbance."""
         kept: list[_Run] = []
-        for run in runs:
+        begin = -1  # of a short part without a shape that belongs to the run behind it
+        for i, run in enumerate(runs):
+            if begin >= 0:
+                run = _Run(begin, run.stop, run.steady)
+                begin = -1
+            if 0 < i < len(runs) - 1 and self._belongs_to(run, runs[i + 1], kept[-1]):
+                begin = run.first
+                continue
             kept.append(run)
             while len(kept) > 1 and self._are_one(kept[-2], kept[-1]):
                 kept[-2:] = [_Run(kept[-2].first, run.stop, kept[-2].steady and run.steady)]
@@ -183,18 +174,27 @@ class _Swings:
                 kept[-3:] = [_Run(kept[-3].first, run.stop, True)]
         return kept
 
+    def _belongs_to(self, run: _Run, behind: _Run, before: _Run) -> bool:
+        """True for a short run without a shape whose rate is closer to the run behind it than to the one before."""
+        if self._shape(run) or run.size >= _NOISE:
+            return False
+        own, early, late = (np.log(np.median(self.size[r.first : r.stop])) for r in (run, before, behind))
+        return bool(abs(own - late) < abs(own - early))
+
     def _are_one(self, a: _Run, b: _Run) -> bool:
         shapes = {self._shape(a), self._shape(b)}
-        if shapes == {0} or any(not self._shape(run) and run.size < _NOISE for run in (a, b)):
+        if shapes == {OTHER} or any(not self._shape(run) and run.size < _NOISE for run in (a, b)):
             return True
         ends = self.size[max(a.first, a.stop - _FEWEST) : a.stop], self.size[b.first : b.first + _FEWEST]
         fast, slow = sorted(float(np.median(end)) for end in ends)
-        return shapes != {1, 2} and slow < _OTHER_RATE * fast  # without a sure change of shape the rate decides
+        return (
+            shapes != {STRAIGHT, COSINE} and slow < _OTHER_RATE * fast
+        )  # without a sure change of shape the rate decides
 
     def _shape(self, run: _Run) -> int:
         """Shape of most of its swings, or 0; the short ones may have any."""
-        counts = np.bincount(self.shape[run.first : run.stop], minlength=_UNSEEN + 1)
-        if counts[_UNSEEN] >= _MAJORITY * run.size:
-            return _UNSEEN
-        shape = int(counts[:_UNSEEN].argmax())
-        return shape if counts[shape] + counts[_UNSEEN] >= _MAJORITY * run.size else 0
+        counts = np.bincount(self.shape[run.first : run.stop], minlength=UNSEEN + 1)
+        if counts[UNSEEN] >= _MAJORITY * run.size:
+            return UNSEEN
+        shape = int(counts[:UNSEEN].argmax())
+        return shape if counts[shape] + counts[UNSEEN] >= _MAJORITY * run.size else OTHER

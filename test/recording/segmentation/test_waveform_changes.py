@@ -33,6 +33,12 @@ def centred(frequency):
     return 5.0 + 5.0 * np.sin(2 * np.pi * frequency * TIME)
 
 
+def growing(frequency, levels, cycles, *, straight=False):
+    phase = 2 * np.pi * np.arange(round(cycles / frequency / PERIOD)) * frequency * PERIOD
+    wave = 2 / np.pi * np.arcsin(np.sin(phase)) if straight else np.sin(phase)
+    return np.concatenate([5.0 + 5.0 * level * wave for level in levels])
+
+
 def triangle(frequency, amplitude=8.0):
     return amplitude * (1.0 - np.abs(2.0 * ((frequency * TIME) % 1.0) - 1.0))
 
@@ -70,6 +76,26 @@ def test_waveforms_in_a_row_are_told_apart(parts, names, noise_level):
         assert abs(start - i * TIME.size) * PERIOD <= longest_swing
 
 
+LEVELS = {
+    "five levels": (0.2, 0.4, 0.6, 0.8, 1.0),
+    "three levels": (0.3, 0.6, 1.0),
+    "up and down": (0.2, 0.6, 1.0, 0.6, 0.2),
+}
+
+
+@pytest.mark.parametrize("levels", LEVELS.values(), ids=LEVELS.keys())
+@pytest.mark.parametrize("cycles", [1, 2, 3])
+@pytest.mark.parametrize("straight", [False, True], ids=["sines", "triangles"])
+def test_growing_waves_of_three_rates_are_three_phases(levels, cycles, straight):
+    parts = [growing(f, levels, cycles, straight=straight) for f in (0.5, 5.0, 31.25)]
+    found = propose(np.concatenate((np.full(500, 5.0), *parts)), PERIOD)
+    kinds = ["rest", *(["triangle"] * 3 if straight else ["sine"] * 3)]
+    assert [name.split("_")[0] for _, name in found] == kinds
+    starts = 500 + np.cumsum([0, *(part.size for part in parts[:-1])])
+    longest_swing = np.array([1.0, 1.0, 0.1])  # [s]
+    assert np.all(np.abs(np.array([start for start, _ in found[1:]]) - starts) * PERIOD <= longest_swing)
+
+
 def multisine(seed, count):
     rng = np.random.default_rng(seed)
     lines = (np.cos(2 * np.pi * 0.5 * (k + 1) * TIME + rng.uniform(0, 2 * np.pi)) for k in range(count))
@@ -99,3 +125,7 @@ SINGLE = {
 @pytest.mark.parametrize("drive", SINGLE.values(), ids=SINGLE.keys())
 def test_one_waveform_stays_in_one_piece(drive):
     assert waveform_changes(drive) == []
+
+
+def test_a_drive_that_stands_still_has_no_waveforms():
+    assert waveform_changes(np.zeros(100)) == []
