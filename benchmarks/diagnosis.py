@@ -32,7 +32,7 @@ import numpy as np
 from benchmarks.figures import Cell, Figures, alone
 from benchmarks.independent_plant import NATIVE, Plant
 from benchmarks.naming_cases import cases
-from benchmarks.naming_experiments import ReadOptions, rich
+from benchmarks.naming_experiments import ProtocolVariant, rich
 from piezo_hysteresis.discrepancy import diagnose
 from piezo_hysteresis.effects import CATALOGUE, Creep, Effect
 from piezo_hysteresis.record import Experiment
@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
     rows: list[tuple[Cell, ...]] = [("slow phases stored slowly", usual.size, spent, peak(), said)]
     sizes, costs = [], []
     for hold in sorted(options.holds):
-        full = rich(FullRate(stage()), 1, ReadOptions(hold=hold))
+        full = rich(FullRate(stage()), 1, ProtocolVariant(hold=hold))
         spent, said = cost(full)
         rows.append((f"all at 50 kHz, {sum(r.duration for r in full):.0f} s", full.size, spent, peak(), said))
         sizes.append(float(full.size))
