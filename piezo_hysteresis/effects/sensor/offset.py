@@ -93,7 +93,7 @@ class OffsetBlock(Block):
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         rows = np.empty((len(dx) + 2, x.size))
-        rows[:-2] = dx + (self.settling * tangent)[:, None]
+        np.add(dx, (self.settling * tangent)[:, None], out=rows[:-2])
         rows[-2] = 1.0
         rows[-1] = state
         return self.run(x, state)[0], rows, state, tangent
