@@ -37,7 +37,6 @@ setup(
     long_description=README.read_text(encoding="utf-8") if README.exists() else "",
     long_description_content_type="text/markdown",
     license="Apache-2.0",
-    license_files=["LICENSE"],
     maintainer=MAINTAINER.text,
     maintainer_email=MAINTAINER.get("email"),
     url=MANIFEST.findtext("url"),
