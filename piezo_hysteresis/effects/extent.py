@@ -42,6 +42,9 @@ class Extent:
         From the first to the last sample [s].
     longest_record : float
         Duration of the longest record [s].
+    longest_run : float
+        From the beginning of a record that starts at rest to the end of the last record that continues it, the longest
+        [s].
     peaks : tuple of float
         Frequencies at which the residual stands out of the displacement [Hz], highest first.
     temperature : float
@@ -56,6 +59,7 @@ class Extent:
     fastest_period: float
     duration: float
     longest_record: float
+    longest_run: float
     peaks: tuple[float, ...] = ()
     temperature: float = ROOM
 

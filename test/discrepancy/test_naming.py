@@ -26,7 +26,11 @@ from benchmarks.naming_experiments import ProtocolVariant
 from piezo_hysteresis.discrepancy import Verdict, diagnose
 from piezo_hysteresis.effects import BY_NAME, CATALOGUE
 from piezo_hysteresis.errors import IdentificationError, ParameterError
+from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.protocol.protocol import short
 from piezo_hysteresis.record import Experiment, Notice, Record
+from piezo_hysteresis.stage.plant.parameters import PlantParameters
+from piezo_hysteresis.stage.simulated import SimulatedStage
 
 BRIEF = ProtocolVariant(hold=3.0)
 
@@ -180,4 +184,18 @@ def test_logarithmic_creep_is_saved_as_the_law_that_holds():
     (effect,) = found.effects()
     low, high = effect["parameters"]["gamma"]["interval_95"]
     assert effect["law"] == "creep" and "creep" in found.model
+    assert low <= 0.015 <= high
+
+
+def test_creep_goes_on_from_phase_to_phase():
+    """Phases that were played in one go last 18 s together: relaxations longer than the longest phase belong to it."""
+    stage = SimulatedStage(PlantParameters().with_values({"creep.gamma": 0.015}), seed=1)
+    described = stage.description
+    limits = DriveLimits(2e-5, described.voltage_min, described.voltage_max, 0.0, described.max_slew_rate)
+    records = list[Record]()
+    for phase in short(limits, 1):
+        records.append(stage.play(phase.voltage, phase.name, continues=bool(records), average=phase.stored_every))
+    (effect,) = diagnose(Experiment(tuple(records))).effects()
+    low, high = effect["parameters"]["gamma"]["interval_95"]
+    assert effect["law"] == "creep"
     assert low <= 0.015 <= high

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from ...model.model import Model
 from ...record import Record
+from .quick_dynamics import quick_dynamics
 
 Array = NDArray[np.float64]
 
@@ -48,7 +49,8 @@ def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
     Averages do not show whether a drive ramped or jumped to the next level. The displacement decides for every record:
     a wrong choice gives large residuals in single samples. A slow record does not hold the ringing after a turn either.
     A change that stands out in no sample, and that the residual does not hold in its size, is left alone: it is one of
-    dynamics that are not known well.
+    dynamics that are not known well. What relaxes over more than one sample is not hidden between samples, and is left
+    out of G.
 
     Parameters
     ----------
@@ -64,6 +66,10 @@ def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
     """
     most = [min(PARTS, 2 * int(0.5005 * r.sample_period / model.sample_period)) for r in records]
     parts = [n if n > 1 and _turns_sharply(r) else 1 for r, n in zip(records, most, strict=True)]
+    coarse = [r.sample_period for r, n in zip(records, parts, strict=True) if n > 1]
+    if not coarse:
+        return [np.zeros(r.size) for r in records]
+    model = quick_dynamics(model, min(coarse))
     straight = model.free_run(records)
     changes = []
     for abrupt in (False, True):

@@ -107,8 +107,27 @@ def extent_of(records: Sequence[Record], model: Model) -> Extent:
         fastest_period=min(r.sample_period for r in records),
         duration=max(r.start_time + r.duration for r in records) - min(r.start_time for r in records),
         longest_record=max(r.duration for r in records),
+        longest_run=longest_run(records),
         temperature=round(float(np.mean(known)), 2) if known else ROOM,
     )
+
+
+def longest_run(records: Sequence[Record]) -> float:
+    """Time from rest to the end of the last record that continues the one before, the longest [s].
+
+    Examples
+    --------
+    >>> u = np.zeros(100)
+    >>> first, second = Record(u, u, 0.1), Record(u, u, 0.1, start_time=12.0, continues=True)
+    >>> round(longest_run([first, first, second]), 6)
+    22.0
+    """
+    longest = begin = 0.0
+    for k, record in enumerate(records):
+        if k == 0 or not record.continues:
+            begin = record.start_time
+        longest = max(longest, record.start_time + record.duration - begin)
+    return longest
 
 
 def peaks_of(records: Sequence[Record], left: Sequence[Array], most: int = 3) -> tuple[float, ...]:

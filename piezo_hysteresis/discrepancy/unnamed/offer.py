@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import Offset, UnnamedCorrection, UnnamedPlays, UnnamedPositionMap, UnnamedRelaxation
+from ...effects import Creep, Offset, UnnamedCorrection, UnnamedPlays, UnnamedPositionMap, UnnamedRelaxation
 from ...identification.identified_range import identified_range
 from ...model.model import Model
 from ..gap import measure_gap, stating
@@ -84,8 +84,8 @@ def forms(model: Model, training_data: TrainingData) -> Iterator[UnnamedCorrecti
     for heights in HEIGHTS:
         yield UnnamedPositionMap(m=(0.0,) * heights, low=low, high=high)
     yield UnnamedPlays(c=(0.0,) * PLAYS, reach=0.5 * (high - low))
-    extent = training_data.extent
-    yield UnnamedRelaxation(tau_min=extent.fastest_period, tau_max=10.0 * extent.longest_record)
+    (creep,) = Creep.starts(training_data.extent)
+    yield UnnamedRelaxation(tau_min=creep["tau_min"], tau_max=creep["tau_max"])
 
 
 def tried(model: Model, form: UnnamedCorrection, before: HeldOut, training_data: TrainingData) -> Correction | None:

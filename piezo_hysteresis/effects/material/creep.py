@@ -32,6 +32,10 @@ from ..invertibility import Invertibility
 REFERENCE_TIME = 0.1
 """Time after a step at which creep counts as zero [s]."""
 
+LASTING = 100.0
+"""Slowest relaxation over the time T since the stage was at rest. A relaxation of time τ > T grows by the share T/τ:
+those slower than 100 T grow by 0.002 γ together, those slower than 10 T by 0.02 γ, and the latter can be seen."""
+
 PER_DECADE = 2
 """Relaxations per decade of time; two leave a ripple of 0.02 % of the creep per decade."""
 
@@ -92,7 +96,7 @@ class Creep(Effect):
             1e4,
             1e-3,
             1e8,
-            "slowest relaxation: 10 times the longest record",
+            "slowest relaxation: 100 times the longest run",
             "bank",
             fixed=True,
         ),
@@ -100,7 +104,7 @@ class Creep(Effect):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        return (cls(tau_min=extent.fastest_period, tau_max=10.0 * extent.longest_record),)
+        return (cls(tau_min=extent.fastest_period, tau_max=LASTING * extent.longest_run),)
 
     def check(self) -> None:
         if not self["tau_max"] >= 10.0 * self["tau_min"]:

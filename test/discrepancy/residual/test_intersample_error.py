@@ -95,6 +95,18 @@ def test_what_a_residual_does_not_hold_is_not_taken_out():
     assert np.std(intersample_error(RINGING, [slow])[0]) < 1e-4 * np.ptp(displacement)
 
 
+def test_a_slow_relaxation_of_the_dynamics_is_not_taken_for_what_averages_hide():
+    """A fit that lacks creep gives G such a pole beside a zero; slow records do not hold what it says."""
+    time = PERIOD * np.arange(40_000)
+    drive = 10.0 * (1.0 - np.abs(2.0 * np.mod(time, 1.0) - 1.0))
+    slow = averaged(drive, 10)
+    pole, zero = np.exp(-2.0 * np.pi * 3.0 * PERIOD), np.exp(-2.0 * np.pi * 3.06 * PERIOD)
+    a, b = np.convolve((1.0, -0.5), (1.0, -pole)), np.convolve((0.5,), (1.0, -zero)) * (1.0 - pole) / (1.0 - zero)
+    creeping = STAGE.with_effect(Arx(a=tuple(a[1:]), b=tuple(b), delay=1.0))
+    (change,), (known,) = intersample_error(creeping, [slow]), intersample_error(STAGE, [slow])
+    assert np.std(change - known) < 1e-5 * np.ptp(slow.displacement)
+
+
 def test_records_that_are_not_slow_are_left_alone():
     drive = np.random.default_rng(0).normal(size=500)
     record = Record(drive, 1e-6 * drive, PERIOD)
