@@ -107,7 +107,7 @@ class Controls:
         self._source, self._axis = source, axis
         self._pending: list[tuple[Future[Answer], Callable[[Answer], None]]] = []
         self._asked: tuple[Control, str, str] | None = None
-        self._answer = Div(text="", name="answer", stylesheets=[styles], sizing_mode="stretch_width")
+        self._answer = Div(text="", name="answer", stylesheets=[styles], sizing_mode="stretch_width", visible=False)
         self._question = Div(text="", name="question", stylesheets=[styles], sizing_mode="stretch_width")
         self._confirm = Button(label="Confirm", name="confirm", button_type="warning", width=150)
         self._cancel = Button(label="Do not", name="cancel", width=110)
@@ -143,7 +143,7 @@ class Controls:
     def close(self) -> None:
         """Remove the question, e.g. because another axis is shown."""
         self._close()
-        self._answer.text = ""
+        self._answer.visible = False
 
     def _call(self, axis: str, service: str, then: Callable[[Answer], None]) -> None:
         self._pending.append((self._source.call(axis, service), then))
@@ -194,15 +194,16 @@ class Controls:
         self._call(axis, control.plan, compare)
 
     def _act(self, control: Control, axis: str) -> None:
-        self._answer.text = f"<p>{escape(control.name)} {escape(axis)}: sent …</p>"
+        self._answer.update(text=f"<p>{escape(control.name)} {escape(axis)}: sent …</p>", visible=True)
         self._call(axis, control.service, lambda answer: self._report(control, axis, answer))
 
     def _report(self, control: Control, axis: str, answer: Answer) -> None:
         word = "ok" if answer.success else "error"
-        self._answer.text = (
+        text = (
             f"<p id='answer'><span class='badge {word}'>{'done' if answer.success else 'refused'}</span> "
             f"{escape(control.name)} {escape(axis)}: {escape(answer.message)}</p>"
         )
+        self._answer.update(text=text, visible=True)
 
     def _show(self, text: str, *, ready: bool) -> None:
         self._question.text = f"<div id='question'>{text}</div>"

@@ -24,8 +24,8 @@ from bokeh.plotting import figure
 from numpy.typing import NDArray
 
 from ..density import density
-from ..palette import BLACK, BLUE, GREY, ORANGE
-from .points import extremes, loop_places, newest_cycles, with_gaps
+from ..palette import BLACK, BLUE, ORANGE
+from .points import LINE_POINTS, extremes, followed, loop_places, newest_cycles, with_gaps
 from .sample_window import Window
 
 Array = NDArray[np.float64]
@@ -52,13 +52,13 @@ PREDICTED: dict[str, Any] = {
 }
 """Line of what the model predicts."""
 FLOOR: dict[str, Any] = {
-    "color": GREY,
+    "color": BLACK,
     "line_width": 1.6,
     "line_dash": [8, 3, 2, 3],
-    "legend_label": "noise of the sensor",
+    "legend_label": "sensor noise",
 }
 """Line of the noise floor."""
-PROMISED: dict[str, Any] = {"color": BLUE, "line_width": 1.4, "line_dash": [2, 3], "legend_label": "error of the model"}
+PROMISED: dict[str, Any] = {"color": BLUE, "line_width": 1.4, "line_dash": [2, 3], "legend_label": "model error"}
 """Line of the free-run error that the model file states."""
 
 
@@ -144,12 +144,14 @@ class WindowFigures:
         """
         part = _between(window, *(origin + edge for edge in self.shown))
         time, residual = part.time - origin, part.residual
+        narrowest = (self.shown[1] - self.shown[0]) / LINE_POINTS  # that can be seen
+        followed_at_once = followed(part.time, max(narrowest, 1.5 * window.sample_period))
         for source, name, values, scale in (
             (self._measured, "measured", part.displacement, 1e6),
             (self._predicted, "predicted", part.prediction, 1e6),
             (self._residual, "residual", residual, 1e9),
         ):
-            at, drawn = with_gaps(extremes(values), np.isfinite(values), time, values)
+            at, drawn = with_gaps(extremes(values), np.isfinite(values) & followed_at_once, time, values)
             source.data = {"time": at, name: scale * drawn}
         cycles = newest_cycles(part)
         u, y, p = with_gaps(
@@ -171,6 +173,8 @@ class WindowFigures:
             "error": [e, e],
             "minus_error": [-e, -e],
         }
+        for item, value in zip(self.residual.legend[0].items, (0.0, n, e), strict=True):
+            item.visible = bool(np.isfinite(value))
 
     def draw_spectrum(self, window: Window, noise: float | None) -> None:
         """Draw the spectrum of the newest samples of a window; parameters as for `draw`."""

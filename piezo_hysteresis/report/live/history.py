@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 from bokeh.layouts import column
 from bokeh.models import ColumnDataSource, Select, Whisker
@@ -25,6 +25,9 @@ from bokeh.models import ColumnDataSource, Select, Whisker
 from ...discrepancy.changes.recalibration_history import RecalibratedNumber
 from ..palette import BLUE
 from .figures import MEASURED, time_figure
+
+_ONE_DAY = timedelta(days=1)
+"""Width of the time axis where there is one point."""
 
 
 class NumberHistory:
@@ -43,6 +46,7 @@ class NumberHistory:
         self._values = ColumnDataSource({"time": [], "value": [], "low": [], "high": []}, name="history_data")
         self._steps = ColumnDataSource({"time": [], "value": []})
         self._figure = time_figure("history", "Recalibrated number", "time [UTC]")
+        self._figure.x_range.default_span = _ONE_DAY
         self._figure.step("time", "value", source=self._steps, mode="after", color=BLUE, line_width=1.4)
         self._figure.scatter("time", "value", source=self._values, size=7, color=MEASURED["color"])
         whisker = Whisker(source=self._values, base="time", upper="high", lower="low", line_color=MEASURED["color"])

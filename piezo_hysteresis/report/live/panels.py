@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from html import escape
 
@@ -25,7 +25,7 @@ import numpy as np
 
 from ...errors import printable
 from ..words import nanometre
-from .axis_state import OK, SILENT, STALE, Alarm, AxisState, Status
+from .axis_state import ERROR, OK, SILENT, STALE, WARN, Alarm, AxisState, Status
 
 LEVELS = ("ok", "warn", "error", "stale")
 """Words of the levels of a status, which are also the names of their styles."""
@@ -63,7 +63,7 @@ def state(axis: AxisState, noise: float | None) -> str:
         ]
     numbers += [
         ("residual_rms", "residual, RMS", length(axis.residual_rms)),
-        ("noise", "noise of the sensor", length(noise)),
+        ("noise", "sensor noise, RMS", length(noise)),
     ]
     cells = "".join(f"<div><dt>{label}</dt><dd id='{key}'>{text}</dd></div>" for key, label, text in numbers)
     return f"{_driver(axis)}<dl>{cells}</dl>"
@@ -105,14 +105,11 @@ def _change(change: Status | None) -> str:
         return "<h4>Change watch</h4><p>no report yet</p>"
     words = [f"{badge(change.level, 'change')} {escape(change.message)}"]
     values = change.values
-    if "statistic" in values:
-        words.append(f"statistic {escape(values['statistic'])} of threshold 1")
-    if "group" in values:
-        unit = escape(values.get("unit", ""))
-        words.append(
-            f"{escape(values['group'])}: {escape(values.get('change', ''))} {unit} "
-            f"({escape(values.get('change_low', ''))} to {escape(values.get('change_high', ''))})"
-        )
+    if "statistic" in values and change.level != STALE:
+        words.append(f"statistic {_number(values['statistic']):.2g}, threshold 1")
+    if "group" in values and change.level in (WARN, ERROR):
+        size, low, high = (_amount(values, name) for name in ("change", "change_low", "change_high"))
+        words.append(f"{escape(values['group'])}: {size} ({low} to {high})")
     if "recalibration" in values:
         words.append(f"recalibration: {escape(values['recalibration'])}")
     if "onset" in values:
@@ -133,7 +130,7 @@ def identification(axis: AxisState) -> str:
         lines.append(f"<p id='job'>{badge(status.level, word)} {escape(phase)} {escape(status.message)}</p>")
         if 0.0 < percent < 100.0:
             lines.append(f"<div class='progress'><div style='width:{percent:.0f}%'></div></div>")
-        if values.get("experiment"):
+        if values.get("experiment") and values["experiment"] not in status.message:
             lines.append(f"<p class='path'>{escape(values['experiment'])}</p>")
     verdict = escape(axis.verdict) or "no diagnosis since the identification node was started"
     return f"{''.join(lines)}<h4>Verdict of the last diagnosis</h4><p id='verdict'>{verdict}</p>"
@@ -221,6 +218,13 @@ def _clock(seconds: float) -> str:
 def _count(text: str) -> str:
     number = _number(text)
     return f"{number:,.0f}".replace(",", "\u202f") if math.isfinite(number) else "—"
+
+
+def _amount(values: Mapping[str, str], name: str) -> str:
+    """A change as people write it: without a unit as a percentage, a lag in microseconds, an offset in nanometres."""
+    size, unit = _number(values.get(name, "")), values.get("unit", "")
+    factor, word = {"1": (1e2, "%"), "s": (1e6, "µs"), "m": (1e9, "nm")}.get(unit, (1.0, escape(unit)))
+    return f"{factor * size:.3g} {word}"
 
 
 def _number(text: str) -> float:

@@ -73,6 +73,19 @@ def with_gaps(places: NDArray[np.intp], valid: NDArray[np.bool_], *columns: Arra
     return [np.insert(column[places], after, np.nan) for column in columns]
 
 
+def followed(time: Array, longest: float) -> NDArray[np.bool_]:
+    """Which samples have the next one within `longest` [s]; a driver that stalls leaves a jump in time, none in number.
+
+    Parameters
+    ----------
+    time : (n,) ndarray
+        Time of every sample [s].
+    longest : float
+        Longest time to the next sample [s].
+    """
+    return ~(np.diff(time, append=time[-1:]) > longest)
+
+
 def newest_cycles(window: Window) -> Window:
     """The last few cycles of the drive, or all of the window where it holds fewer.
 

@@ -37,7 +37,7 @@ def record(comparison: ModelComparison, index: int, words: str) -> str:
         Its size.
     """
     now = comparison.now
-    numbers = [("noise of the sensor", length(float(comparison.noise[index])))]
+    numbers = [("sensor noise, RMS", length(float(comparison.noise[index])))]
     if now is not None:
         row = now.rows[index]
         numbers += [("residual, RMS", length(row.rms)), ("of the range", f"{row.percent:.3g} %")]

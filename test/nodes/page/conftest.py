@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One browser for all tests of a file; they are skipped where there is none."""
+"""One browser for the tests of a file (skipped where there is none), and a lab on the launch files' transports.
+
+A process reads the profile of its transports once: all files of this folder have to take the same one, or the lab of a
+later file meets nodes that it cannot reach.
+"""
 
 import os
 from collections.abc import Iterator
@@ -20,7 +24,15 @@ from pathlib import Path
 
 import pytest
 
+from ..conftest import opened
+from ..lab import Lab
 from .browser import CHROMIUM, Browser
+
+TRANSPORTS = {
+    "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    "FASTDDS_DEFAULT_PROFILES_FILE": str(Path(__file__).parents[3] / "config" / "launch_transports.xml"),
+}
+"""As the launch files set them, but for this machine only."""
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +44,16 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield browser
     finally:
         browser.close()
+
+
+@pytest.fixture(scope="module")
+def shared_lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
+    """One lab for all tests of a file, on the transports of the launch files."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in TRANSPORTS.items():
+            patch.setenv(name, value)
+        with opened(tmp_path_factory.mktemp("lab")) as lab:
+            yield lab
 
 
 @pytest.fixture

@@ -30,7 +30,6 @@ from piezo_hysteresis.nodes.messages.cloud import from_cloud
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, diagnostic, values_of
 from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES
 
-from ..conftest import opened
 from ..lab import DEEP
 
 pytestmark = pytest.mark.nodes
@@ -38,21 +37,6 @@ pytestmark = pytest.mark.nodes
 ROOT = Path(__file__).parents[3]
 PERIOD = 2e-5
 AXIS = "/stage_x"
-TRANSPORTS = {
-    "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-    "FASTDDS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "launch_transports.xml"),
-}
-"""As the launch files set them, but for this machine only."""
-
-
-@pytest.fixture(scope="module")
-def shared_lab(tmp_path_factory):
-    """A lab on the transports of the launch files."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name, value in TRANSPORTS.items():
-            patch.setenv(name, value)
-        with opened(tmp_path_factory.mktemp("lab")) as lab:
-            yield lab
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +149,7 @@ def test_a_change_of_the_stage_appears(nodes, browser):
 
     def shown() -> bool:
         publisher.publish(changed)  # the model node goes on saying that there is no baseline
-        return "has changed: gain" in browser.text("change")
+        return "has changed: gain; statistic 5.2, threshold 1; gain: 1.3 %" in browser.text("change")
 
     browser.wait(shown, "the change")
 

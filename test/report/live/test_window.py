@@ -21,7 +21,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.report.live.points import extremes, loop_places, newest_cycles, with_gaps
+from piezo_hysteresis.report.live.points import extremes, followed, loop_places, newest_cycles, with_gaps
 from piezo_hysteresis.report.live.sample_window import SampleWindow, Window
 
 PERIOD = 1e-3
@@ -95,6 +95,15 @@ def test_a_line_is_broken_where_samples_are_missing():
     at, drawn = with_gaps(places, np.isfinite(values), np.arange(50_000.0), values)
     (gap,) = np.flatnonzero(np.isnan(drawn))
     assert (at[gap - 1], at[gap + 1]) == (19_999, 20_500)
+
+
+def test_a_line_is_broken_where_the_driver_stalled():
+    time = PERIOD * np.arange(1000.0)
+    time[400:] += 0.6
+    after = followed(time, 0.01)
+    assert np.flatnonzero(~after) == [399]
+    _, drawn = with_gaps(np.arange(1000), after, time, np.ones(1000))
+    assert np.flatnonzero(np.isnan(drawn)) == [400]
 
 
 @pytest.mark.parametrize("frequency", [1.0, 20.0, 400.0])
