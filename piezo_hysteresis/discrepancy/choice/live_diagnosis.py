@@ -29,7 +29,8 @@ from ..diagnose import diagnose
 from ..diagnosis import Diagnosis, Verdict
 from .probabilities import NONE_OF_THESE, NOTHING, probabilities
 from .rivals import missing_log_odds, rivals_of
-from .tiers import SLOW_FAMILIES, Tier, spare_drives, tiers
+from .still_hidden import still_hidden
+from .tiers import FAST_TIERS, SLOW_FAMILIES, Tier, spare_drives, tiers
 from .time_to_decide import Separation, best_drive
 from .update import End, Update, percent
 
@@ -83,6 +84,8 @@ class LiveDiagnosis:
         The last diagnosis.
     separation : Separation or None
         What the best drive would tell about rivals, where that was asked last.
+    untested : tuple of str
+        Public names of the effects that the phases so far could not show.
     end : End or None
         Why it has ended; None while it goes on.
     """
@@ -103,6 +106,7 @@ class LiveDiagnosis:
     updates: tuple[Update, ...] = ()
     found: Diagnosis | None = None
     separation: Separation | None = None
+    untested: tuple[str, ...] = ()
     end: End | None = field(default=None)
 
     def advanced(self, experiment: Experiment, progress: Progress | None = None) -> LiveDiagnosis:
@@ -122,10 +126,12 @@ class LiveDiagnosis:
         """
         found = diagnose(experiment, effects=self.effects, progress=progress, explicit_step=self.explicit_step)
         time = self.time + sum(p.duration for p in self.due)
-        unplayed = self._untested()
-        told = probabilities(found, {e.public_name() for e in self.effects}, unplayed)
+        untested = self._untested_by(found, time)
+        told = probabilities(found, {e.public_name() for e in self.effects}, untested)
         update = Update(time, self.due_name, told)
-        after = replace(self, time=time, updates=(*self.updates, update), found=found, separation=None)
+        after = replace(
+            self, time=time, updates=(*self.updates, update), found=found, separation=None, untested=untested
+        )
         return after._decided()
 
     @property
@@ -163,7 +169,7 @@ class LiveDiagnosis:
             "probabilities": [
                 {"time_s": round(u.time, 6), "played": u.played, "probabilities": u.probabilities} for u in self.updates
             ],
-            "untested": sorted(self._untested()),
+            "untested": list(self.untested),
             "undecidable": None
             if self.end is not End.UNDECIDABLE or self.separation is None
             else {
@@ -181,11 +187,22 @@ class LiveDiagnosis:
         left = self.plan[self.tier :]
         return left if left and left[0].duration <= self.longest - self.time else ()
 
-    def _untested(self) -> set[str]:
+    def _untested_by(self, found: Diagnosis, time: float) -> tuple[str, ...]:
         """Effects that only phases still to come can show."""
-        if self.tier >= len(self.plan):
-            return set()
-        return {e.public_name() for e in self.effects if e.family in SLOW_FAMILIES}
+        left = [phase for tier in self.plan[self.tier :] for phase in tier.phases]
+        if not left:
+            return ()
+        slow = [e for e in self.effects if e.family in SLOW_FAMILIES]
+        selection = found.selection
+        if (
+            found.verdict is not Verdict.NOTHING_MISSING
+            or selection is None
+            or selection.training_data is None
+            or self.tier < FAST_TIERS
+        ):
+            return tuple(sorted({e.public_name() for e in slow} - set(found.names)))
+        shown = still_hidden(selection.model, selection.training_data, slow, left, time, self.error_rate)
+        return tuple(sorted(shown))
 
     def _decided(self) -> LiveDiagnosis:
         if self.answer_is_sure:

@@ -29,6 +29,8 @@ SLOW, SLOWEST = 1e-3, 1e-2
 """Sample periods at which slow phases are stored [s]."""
 SLOW_FAMILIES = (Creep.family, GainDrift.family)
 """Families that only long phases show."""
+FAST_TIERS = 2
+"""Tiers after which every kind of fast drive was played: the others add only longer holds and repeats."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

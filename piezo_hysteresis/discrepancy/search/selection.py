@@ -110,7 +110,7 @@ def select(
                 break
         model, score = _pruned(model, score, steps)
         in_time = True
-    return Selection(baseline, model, score, tuple(steps), null, in_time)
+    return Selection(baseline, model, score, tuple(steps), null, in_time, training_data)
 
 
 def _is_enough(score: Score, accepted: int) -> bool:

@@ -24,6 +24,7 @@ from ...model.model import Model
 from .candidates import Candidate, FittedCandidate
 from .cross_validation import Score
 from .refit import Fitted
+from .training_data import TrainingData
 
 MANY = 8
 """Records from which the worst one has no say in what an effect explains."""
@@ -98,6 +99,8 @@ class Selection:
         V that a perfect model would have.
     in_time : bool
         False where the time limit ended the search, so that more may be missing.
+    training_data : TrainingData or None
+        Records of the search; None where the verdict came from single records.
     """
 
     baseline: Model
@@ -106,6 +109,7 @@ class Selection:
     steps: tuple[Step, ...]
     null: float
     in_time: bool = True
+    training_data: TrainingData | None = None
 
     @property
     def accepted(self) -> tuple[Step, ...]:

@@ -18,6 +18,7 @@ import pytest
 
 from piezo_hysteresis.discrepancy.choice.live_diagnosis import begin
 from piezo_hysteresis.discrepancy.choice.probabilities import NOTHING
+from piezo_hysteresis.discrepancy.choice.tiers import FAST_TIERS
 from piezo_hysteresis.discrepancy.choice.update import End
 from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
@@ -61,12 +62,14 @@ def test_a_hidden_effect_is_named_after_the_cheap_phases():
     assert states[-1].time < 40.0
 
 
-def test_nothing_is_said_to_be_missing_only_after_slow_phases_were_played():
+def test_nothing_is_said_to_be_missing_once_no_slow_effect_can_show_any_more():
     states = driven({})
     holds_its_promises(states)
     assert states[-1].end is End.SURE
     assert states[-1].updates[-1].likeliest == NOTHING
-    assert states[-1].tier == len(states[-1].plan)
+    assert states[-1].untested == ()
+    assert FAST_TIERS <= states[-1].tier < len(states[-1].plan)
+    assert all(s.untested for s in states[1:-1])
     assert all(s.updates[-1].probabilities[NOTHING] < 1.0 - s.error_rate for s in states[1:-1])
     assert states[1].answer()["untested"] == ["creep", "gain_drift", "thermal_drift"]
 

@@ -1,0 +1,132 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which effects may still show in phases to come, although the records so far show nothing.
+
+A slow effect has a size that the records so far bound. It is excluded if, at that bound, the phases to come would stay
+at the floor with it: playing these phases would then tell nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ...effects import Effect
+from ...identification.fit.covariance import sandwich
+from ...identification.fit.normal_equations import grams
+from ...identification.protocol.protocol import ProtocolPhase
+from ...model.model import Model
+from ...record import Record
+from ..form_uncertainty import PIECES
+from ..search.candidates import directions, free_numbers
+from ..search.cross_validation import ADEQUATE
+from ..search.refit import FAILURES
+from ..search.training_data import TrainingData
+
+Array = NDArray[np.float64]
+
+
+def still_hidden(
+    model: Model,
+    training_data: TrainingData,
+    effects: Iterable[type[Effect]],
+    phases: Sequence[ProtocolPhase],
+    clock: float,
+    error_rate: float,
+) -> set[str]:
+    """Public names of the effects that a phase to come may show.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted to the records so far, which it describes.
+    training_data : TrainingData
+        These records.
+    effects : iterable of Effect classes
+        In question.
+    phases : sequence of ProtocolPhase
+        To come, at least one.
+    clock : float
+        Stage time at which the first of them begins [s].
+    error_rate : float
+        Probability that is accepted of a size beyond its bound.
+
+    Notes
+    -----
+    The size s of an effect has the estimate ŝ and the covariance Σ of a joint linear fit with all numbers of the model.
+    A record counts as `PIECES` independent values. If the effect has the size s, the model without it has shifted its
+    numbers to imitate it in the records so far. M is the mean product, over the phases to come, of what this leaves of
+    the sensitivities. The error that the effect may make there is R² = tr(M (ŝŝᵀ + z² Σ))/f², f the smallest floor so
+    far. It cannot be seen if R² is at most `ADEQUATE` − 1.
+    """
+    z = float(scipy.stats.norm.isf(0.5 * error_rate))
+    floor = float(np.min(training_data.floors))
+    records = list(_to_come(phases, clock))
+    found = set[str]()
+    for effect in effects:
+        starts = effect.starts(training_data.extent) if effect.channel is None else ()
+        for start in (s for s in starts if s.is_off):
+            try:
+                may_show = _may_show(model.with_effect(start), start.name, model, training_data, records, z) / floor**2
+            except FAILURES:
+                may_show = np.inf
+            if may_show > ADEQUATE - 1.0:
+                found.add(effect.public_name())
+                break
+    return found
+
+
+def _may_show(
+    extended: Model, effect: str, model: Model, training_data: TrainingData, records: Sequence[Record], z: float
+) -> float:
+    """Mean square of the error that an effect may make in the records to come, every record counting the same [m²]."""
+    base = free_numbers(model, training_data)
+    sizes = [
+        n
+        for n in free_numbers(extended, training_data)
+        if n.startswith(f"{effect}.") and extended.row(n).off is not None
+    ]
+    q = len(base)
+    columns = directions(model, base, len(sizes))
+    total, meat = np.zeros((len(columns),) * 2), np.zeros((columns.shape[1],) * 2)
+    products = grams(extended, training_data.records, [*base, *sizes], training_data.nuisance)
+    for gram, size_of_error in zip(products, training_data.floors, strict=True):
+        if np.isfinite(size_of_error):
+            weighted = gram.matrix / (gram.size * size_of_error**2)
+            total += weighted
+            meat += max(1.0, weighted[-1, -1]) / PIECES * (columns.T @ weighted @ columns)
+    bread = columns.T @ total @ columns
+    own = slice(q, q + len(sizes))
+    estimate = (sandwich(bread, bread, columns) @ total[:, -1])[own]
+    spread = sandwich(bread, meat, columns)[own, own]
+    kept = bread.shape[0] - len(sizes)
+    alone = columns[:q, :kept]
+    inner = bread[:kept, :kept]
+    left = np.vstack((-sandwich(inner, inner, alone) @ total[:q, own], np.eye(len(sizes))))
+    reach = left @ (np.outer(estimate, estimate) + z**2 * spread) @ left.T
+    shown = grams(extended, records, [*base, *sizes])
+    return float(np.mean([np.sum(g.matrix[:-1, :-1] * reach) / g.size for g in shown]))
+
+
+def _to_come(phases: Sequence[ProtocolPhase], clock: float) -> Iterator[Record]:
+    """The phases as records from rest; what they will measure is not known yet."""
+    for phase in phases:
+        record = Record(phase.voltage, np.zeros(phase.voltage.size), phase.sample_period, phase.name, start_time=clock)
+        every = phase.stored_every
+        yield record.decimate(every) if 1 < every <= record.size else record
+        clock += phase.duration
