@@ -91,9 +91,15 @@ def _bends_dynamics(candidate: Candidate) -> bool:
 def refits_of_twins(
     model: Model, candidates: Sequence[Candidate], best: FittedCandidate, before: Score
 ) -> list[FittedCandidate]:
-    """Refits of candidates that slow drives cannot distinguish from the best one; only other dynamics separate them."""
+    """Refits of candidates that slow drives cannot distinguish from the best one; only other dynamics separate them.
+
+    Each begins where the best has ended, since the loop is the same with either. A best that has not come to the floor
+    may stand behind wrong dynamics: then every start is tried as well.
+    """
     twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
-    return _settled_from_all_starts(model, twins, before)
+    beside = (refit(best.fit.model.without(best.name), c, LATER) for c in twins)
+    found = [settled(c, before) for c in beside if c is not None]
+    return found if best.score.excess <= ADEQUATE else [*found, *_settled_from_all_starts(model, twins, before)]
 
 
 def _settled_from_all_starts(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:

@@ -167,7 +167,7 @@ def _turn(
     refits = refit_candidates(model, likely, before, progress)
     if not refits:
         return None
-    if refits[0].score.excess > ADEQUATE and (others := refits_of_twins(model, screened, refits[0], before)):
+    if others := refits_of_twins(model, screened, refits[0], before):
         refits = _best_of_each([*refits, *others])
     best, alone, rejection = _judged(refits, before, null, keeps)
     if rejection is not None and (late := refits_behind_new_dynamics(model, screened, before)):

@@ -28,12 +28,13 @@ from piezo_hysteresis.stage.simulated import SimulatedStage
 
 PERIOD = 1e-4
 """Of drive and samples [s]."""
+LIMITS = DriveLimits(PERIOD)
 
 
-def driven(hidden, **choices):
+def driven(hidden, limits=LIMITS, **choices):
     """A live diagnosis of a simulated stage, and every state of it."""
     stage = SimulatedStage(PlantParameters().with_values(hidden), seed=3, sample_period=PERIOD)
-    states, records = [begin(DriveLimits(PERIOD), **choices)], []
+    states, records = [begin(limits, **choices)], []
     while states[-1].due:
         for p in states[-1].due:
             records.append(stage.play(p.voltage, p.name, continues=bool(records), average=p.stored_every))
@@ -72,6 +73,21 @@ def test_nothing_is_said_to_be_missing_once_no_slow_effect_can_show_any_more():
     assert all(s.untested for s in states[1:-1])
     assert all(s.updates[-1].probabilities[NOTHING] < 1.0 - s.error_rate for s in states[1:-1])
     assert states[1].answer()["untested"] == ["creep", "gain_drift", "thermal_drift"]
+
+
+def test_effects_that_no_drive_within_the_limits_separates_are_undecidable():
+    """Slow drives make softening and a sensor nonlinearity the same, and the slew limit allows no others."""
+    slow = DriveLimits(PERIOD, voltage_max=8.0, max_slew_rate=150.0)
+    states = driven({"sensor.quadratic": 0.08}, slow, longest=120.0)
+    holds_its_promises(states)
+    last = states[-1]
+    assert last.end is End.UNDECIDABLE
+    assert {*last.separation.rivals} == {"sensor_nonlinearity", "softening"}
+    assert last.separation.expected_z < last.separation.needed_z
+    assert last.answer()["undecidable"]["needed_z"] == last.separation.needed_z
+    assert "Undecidable within the limits and 120 s" in last.reason()
+    (effect,) = last.found.effects()
+    assert {effect["name"], *effect["confusable_with"]} == {*last.separation.rivals}
 
 
 def test_without_time_for_more_the_answer_says_that_it_is_not_sure():
