@@ -26,9 +26,7 @@ import sys
 import time
 from pathlib import Path
 
-from rich.console import Console
-
-from benchmarks.figures import Figures, machine, show, write
+from benchmarks.figures import Figures, console, machine, show, write
 
 SPEED = ("kernels", "simulation", "identification", "growth", "start", "streaming", "diagnosis")
 """What runs where nothing is named."""
@@ -62,18 +60,18 @@ def main() -> int:
     unknown = [name for name in chosen.names if name not in SPEED + QUALITY]
     if unknown:
         parser.error(f"no benchmark '{unknown[0]}', expected some of {', '.join(SPEED + QUALITY)}")
-    console, results = Console(), dict[str, list[Figures]]()
-    console.print(", ".join(f"{key} {value}" for key, value in machine().items()), highlight=False)
+    out, results = console(), dict[str, list[Figures]]()
+    out.print(", ".join(f"{key} {value}" for key, value in machine().items()), highlight=False)
     for name in chosen.names or SPEED:
         begin = time.monotonic()
         module = importlib.import_module(f"benchmarks.{name}")
         options = argparse.ArgumentParser()
         module.arguments(options)
         results[name] = module.run(options.parse_args([]))
-        show(results[name], console)
-        console.print(f"[dim]{name}: {time.monotonic() - begin:.0f} s; python -m benchmarks.{name} --help[/]\n")
+        show(results[name])
+        out.print(f"[dim]{name}: {time.monotonic() - begin:.0f} s; python -m benchmarks.{name} --help[/]\n")
         write(results, chosen.json)
-    console.print(f"written: {chosen.json}")
+    out.print(f"written: {chosen.json}")
     return int(any(figures.failures for group in results.values() for figures in group))
 
 

@@ -33,9 +33,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
+from benchmarks.figures import console
 from benchmarks.independent_plant import NATIVE, Plant
 from benchmarks.naming_cases import NOISES, Case, cases
 from piezo_hysteresis.discrepancy.choice.live_diagnosis import LiveDiagnosis, begin
@@ -195,7 +195,7 @@ def main() -> None:
     noises = NOISES if options.all_noises else (NOISES[1],)
     chosen = [c for c in wanted(tuple(options.groups), options.seeds, noises) if options.only in c.label]
     chosen = chosen[: options.cases]
-    console, outcomes = Console(width=160), list[Outcome]()
+    out, outcomes = console(), list[Outcome]()
     with ProcessPoolExecutor(options.jobs) as pool:
         answers = {pool.submit(answer, case): case for case in chosen}
         for k, done in enumerate(as_completed(answers), 1):
@@ -203,12 +203,12 @@ def main() -> None:
             try:
                 o = done.result()
             except PiezoError as error:
-                console.print(f"{k}/{len(chosen)} {case.label} seed {case.seed}: {error!r}")
+                out.print(f"{k}/{len(chosen)} {case.label} seed {case.seed}: {error!r}")
                 continue
             outcomes.append(o)
             said = " + ".join(o.names) or o.verdict
             mark = "WRONG" if o.is_wrong else ""
-            console.print(
+            out.print(
                 f"{k}/{len(chosen)} {o.label} seed {o.seed} noise {100 * o.noise:g} %: {said}, {o.end}, "
                 f"p {o.probability:.4f}, {o.stage_time:.1f} s (fixed order {o.fixed_time:.1f} s), chosen {o.chosen}, "
                 f"z {o.z}, {o.seconds:.1f} s of processor time {mark}",
@@ -217,16 +217,16 @@ def main() -> None:
             )
             if options.json:
                 options.json.write_text(json.dumps([asdict(o) for o in outcomes], indent=1))
-    console.print(figures(outcomes))
+    out.print(figures(outcomes))
     spent = np.array([o.seconds for o in outcomes])
     own, fixed = (sum(getattr(o, name) for o in outcomes) for name in ("stage_time", "fixed_time"))
     slower = max((o.stage_time / o.fixed_time for o in outcomes), default=1.0)
-    console.print(f"stage time: {own / len(outcomes):.1f} s on average; fixed protocol 'rich' {RICH:g} s")
-    console.print(
+    out.print(f"stage time: {own / len(outcomes):.1f} s on average; fixed protocol 'rich' {RICH:g} s")
+    out.print(
         f"fixed order with stopping: {fixed / len(outcomes):.1f} s on average; a drive was chosen in "
         f"{sum(o.chosen > 0 for o in outcomes)} stages; at worst {100 * (slower - 1):.0f} % slower than the fixed order"
     )
-    console.print(f"processor time per stage: median {np.median(spent):.1f} s, longest {spent.max():.1f} s")
+    out.print(f"processor time per stage: median {np.median(spent):.1f} s, longest {spent.max():.1f} s")
 
 
 if __name__ == "__main__":

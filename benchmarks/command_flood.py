@@ -19,8 +19,6 @@ scripts/run python -m benchmarks.command_flood --ros-args -r __ns:=/stage_x
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import rclpy
 from rclpy.duration import Duration
@@ -51,4 +49,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

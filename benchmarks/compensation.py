@@ -167,6 +167,7 @@ def wanted_with_way(found: Plan) -> np.ndarray:
 def rows_of(bench: Bench, with_feedback: bool) -> list[tuple[Cell, ...]]:
     """Every path on one stage."""
     base, extended = bench.diagnosis.baseline, bench.diagnosis.model
+    assert base is not None and extended is not None
     rows: list[tuple[Cell, ...]] = []
     for shape, frequency in PATHS:
         wanted = path(shape, frequency, bench.stroke)

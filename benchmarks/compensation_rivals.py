@@ -64,10 +64,10 @@ def multiplicative(model: Model, wanted: np.ndarray, limits: Limits) -> np.ndarr
     loop, scale = model["bouc_wen"], model.voltage_scale
     arx = model["arx"]
     assert isinstance(arx, Arx) and isinstance(loop, BoucWen)
-    numbers = [loop[n] for n in ("A", "beta", "gamma", "p1", "p2")]
+    a, beta, gamma, p1, p2 = (loop[n] for n in ("A", "beta", "gamma", "p1", "p2"))
     v = np.empty_like(wanted)
     w = wanted / (arx.dc_gain * model.displacement_scale)
-    run_multiplicative(w, *numbers, limits.voltage_min / scale, limits.voltage_max / scale, v)
+    run_multiplicative(w, a, beta, gamma, p1, p2, limits.voltage_min / scale, limits.voltage_max / scale, v)
     return scale * v
 
 

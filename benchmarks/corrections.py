@@ -32,9 +32,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
+from benchmarks.figures import console
 from benchmarks.independent_plant import NATIVE, Plant
 from benchmarks.naming_cases import UNKNOWN, Case
 from benchmarks.naming_experiments import FULL, corners, ladder, multisine, noise, rich, triangle
@@ -183,7 +183,8 @@ def answer(case: Case) -> tuple[Outcome, Drawing | None]:
         sizes = np.array([(p.before, p.after, p.floor) for p in gap.per_phase])
         ratios = sizes[:, 1] / sizes[:, 0]
         null = float(np.mean((sigma / least) ** 2))
-        removed = explained(*np.mean((sizes[:, :2] / sizes[:, 2:]) ** 2, axis=0), null)
+        first_gap, last_gap = np.mean((sizes[:, :2] / sizes[:, 2:]) ** 2, axis=0)
+        removed = explained(first_gap, last_gap, null)
         before, after = gap.before, gap.after
     outcome = Outcome(
         label=case.label,
@@ -211,19 +212,17 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--picture", type=Path, help="draw the last correction that is accepted")
     args = parser.parse_args()
-    console, outcomes = Console(), list[Outcome]()
+    out, outcomes = console(), list[Outcome]()
     for case in (c for c in cases(args.seeds) if args.only in c.label):
         found, drawing = answer(case)
         if drawing is not None and args.picture is not None:
             drawing.save_picture(args.picture)
         outcomes.append(found)
         said = f"{found.form} {found.removed:.2f} worst {found.worst:.2f}" if found.accepted else found.reason or "none"
-        console.print(
-            f"{found.label} seed {found.seed}: {found.verdict}; {said}; {found.seconds:.1f} s", highlight=False
-        )
+        out.print(f"{found.label} seed {found.seed}: {found.verdict}; {said}; {found.seconds:.1f} s", highlight=False)
         if args.json is not None:
             args.json.write_text(json.dumps([asdict(o) for o in outcomes], indent=1))
-    console.print(report(outcomes))
+    out.print(report(outcomes))
 
 
 def report(outcomes: list[Outcome]) -> Table:

@@ -37,6 +37,9 @@ from rich.table import Table
 
 Cell = str | int | float | None
 
+WIDTH = 10_000
+"""Width of the output to a file [characters]: no word is broken."""
+
 
 @dataclass(frozen=True)
 class Figures:
@@ -98,12 +101,18 @@ def machine() -> dict[str, Any]:
     }
 
 
-def show(figures: list[Figures], console: Console) -> None:
+def console() -> Console:
+    """Standard output; where it is not a terminal, tables take the width that they need."""
+    return Console(width=None if sys.stdout.isatty() else WIDTH, highlight=False)
+
+
+def show(figures: list[Figures]) -> None:
     """Print tables, and what failed below each."""
+    out = console()
     for one in figures:
-        console.print(one.table())
+        out.print(one.table())
         for failure in one.failures:
-            console.print(f"[red]failed:[/] {failure}", highlight=False)
+            out.print(f"[red]failed:[/] {failure}")
 
 
 def write(results: dict[str, list[Figures]], path: Path) -> None:
@@ -120,7 +129,7 @@ def alone(module: str) -> None:
     parser.add_argument("--json", type=Path, help="write the figures there")
     options = parser.parse_args()
     figures = benchmark.run(options)
-    show(figures, Console())
+    show(figures)
     if options.json:
         write({Path(benchmark.__file__ or module).stem: figures}, options.json)
     sys.exit(any(f.failures for f in figures))

@@ -30,7 +30,7 @@ import numpy as np
 from benchmarks.figures import Figures, alone, seconds
 from benchmarks.simulation import ARX, PERIOD, record
 from piezo_hysteresis.effects import BY_NAME, BoucWen, Effect
-from piezo_hysteresis.identification.fit import fit
+from piezo_hysteresis.identification import fit
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.online.predictor import Predictor
 from piezo_hysteresis.record import Record

@@ -36,9 +36,7 @@ from benchmarks.figures import Figures, alone
 from benchmarks.narmax import against_sysidentpy
 from piezo_hysteresis.effects import Arx, PublishedBoucWen
 from piezo_hysteresis.errors import PiezoError
-from piezo_hysteresis.identification import identify
-from piezo_hysteresis.identification.fit import fit
-from piezo_hysteresis.identification.steps import three_steps
+from piezo_hysteresis.identification import fit, identify, three_steps
 from piezo_hysteresis.identification.steps.dynamics import identify_arx
 from piezo_hysteresis.identification.steps.linear_start import hysteresis_signals
 from piezo_hysteresis.model.model import Model

@@ -32,9 +32,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
+from benchmarks.figures import console
 from benchmarks.naming_cases import GROUPS, NOISES, Case, cases
 from piezo_hysteresis.discrepancy import diagnose
 from piezo_hysteresis.effects import BY_NAME
@@ -130,8 +130,8 @@ def confusion(outcomes: list[Outcome]) -> Table:
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for o in outcomes:
         if o.group == "effects":
-            said = "+".join(o.names) if o.names else o.verdict if o.visible else "not visible"
-            counts[o.truth[0]][said] += 1
+            answer = "+".join(o.names) if o.names else o.verdict if o.visible else "not visible"
+            counts[o.truth[0]][answer] += 1
     table = Table("hidden", "said", title="confusion, single effects")
     for truth, said in counts.items():
         table.add_row(truth, ", ".join(f"{name} {n}" for name, n in said.most_common()))
@@ -190,20 +190,20 @@ def main() -> None:
     options = parser.parse_args()
     seeds, noises = (1, (NOISES[1],)) if options.quick else (options.seeds, NOISES)
     wanted = [c for c in cases(tuple(options.groups), seeds, noises) if options.only in c.label][: options.cases]
-    console, outcomes, crashes = Console(), list[Outcome](), 0
+    out, outcomes, crashes = console(), list[Outcome](), 0
     pool = ProcessPoolExecutor(options.jobs)
     answers = [pool.submit(answer, case) for case in wanted]
     for k, (case, found) in enumerate(zip(wanted, answers, strict=True), 1):
         try:
             outcome = found.result()
         except Exception as error:  # a crash is counted, and the benchmark goes on
-            console.print(f"{k}/{len(wanted)} {case.label} seed {case.seed}: [red]{error!r}")
+            out.print(f"{k}/{len(wanted)} {case.label} seed {case.seed}: [red]{error!r}")
             crashes += 1
             continue
         outcomes.append(outcome)
         said = " and ".join(outcome.names) or outcome.verdict
         mark = "[red]false[/]" if outcome.is_false else "" if outcome.family_right else "[yellow]missed[/]"
-        console.print(
+        out.print(
             f"{k}/{len(wanted)} {outcome.label} seed {case.seed} {case.plant} noise {100 * case.noise:g} %: {said} "
             f"V {outcome.excess_before:.2f} → {outcome.excess_after:.2f}, gap {outcome.gap_before:.3f} → "
             f"{outcome.gap_after:.3f} %, floor {outcome.gap_floor:.3f} %, {outcome.seconds:.1f} s {mark}",
@@ -214,11 +214,11 @@ def main() -> None:
             options.json.write_text(json.dumps([asdict(o) for o in outcomes], indent=1))
     pool.shutdown()
     for table in (confusion(outcomes), figures(outcomes), gaps(outcomes)):
-        console.print(table)
-    console.print(f"{crashes} of {len(wanted)} diagnoses crashed")
+        out.print(table)
+    out.print(f"{crashes} of {len(wanted)} diagnoses crashed")
     spent = np.array([o.seconds for o in outcomes])
     half, most = np.quantile(spent, (0.5, 0.95))
-    console.print(
+    out.print(
         f"processor time per diagnosis: median {half:.1f} s, 95 % within {most:.1f} s, longest {spent.max():.1f} s"
     )
 

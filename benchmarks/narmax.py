@@ -33,8 +33,7 @@ from benchmarks import published_plant as plant
 from benchmarks import recovery
 from benchmarks.figures import Cell, Figures
 from piezo_hysteresis.effects import PublishedBoucWen
-from piezo_hysteresis.identification import identify
-from piezo_hysteresis.identification.steps import three_steps
+from piezo_hysteresis.identification import identify, three_steps
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 

@@ -30,11 +30,12 @@ import tempfile
 import time
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from bokeh.client import pull_session
 
-from benchmarks.figures import Cell, Figures, alone
+from benchmarks.figures import Figures, alone
 from benchmarks.relay import processor_time
 from benchmarks.stream_sender import sender
 from benchmarks.streaming import memory, waveform
@@ -71,7 +72,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
         stack.enter_context(sender("/bench", PERIOD, folder / "waveform.npy"))
         address = _address(folder / "log" / "page_node.log", processes)
         page = processes.ids["page_node"]
-        rows = [("none", *_measured(page, options.seconds / 4, processes))]
+        rows: list[Any] = [("none", *_measured(page, options.seconds / 4, processes))]
         session = pull_session(url=address)
         stack.callback(session.close)
         rows.append(("one", *_measured(page, options.seconds, processes, session.force_roundtrip)))
@@ -97,7 +98,7 @@ def _address(log: Path, processes: Processes) -> str:
     return found.group()
 
 
-def _measured(pid: int, duration: float, processes: Processes, look: object = None) -> tuple[Cell, ...]:
+def _measured(pid: int, duration: float, processes: Processes, look: object = None) -> tuple[float, ...]:
     time.sleep(LOOK)
     begin, spent, sizes = time.monotonic(), processor_time(pid), list[float]()
     while time.monotonic() - begin < duration:

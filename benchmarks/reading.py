@@ -29,7 +29,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from benchmarks.figures import Figures, show
 from piezo_hysteresis.record import Experiment, Record
@@ -132,4 +131,4 @@ _WRITERS: dict[str, Callable[[Path, NDArray[np.float64], NDArray[np.float64]], P
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments(parser)
-    show(run(parser.parse_args()), Console())
+    show(run(parser.parse_args()))

@@ -43,7 +43,7 @@ from sensor_msgs.msg import PointCloud2
 from piezo_hysteresis.nodes.messages.cloud_stream import CloudWriter
 from piezo_hysteresis.nodes.messages.conversions import to_stamp
 from piezo_hysteresis.nodes.messages.samples import SAMPLES as LAYOUT
-from piezo_hysteresis.nodes.runtime.executor import make_executor, spin_until
+from piezo_hysteresis.nodes.runtime.executor import make_executor
 from piezo_hysteresis.nodes.runtime.qos import DEEP, SAMPLES
 from piezo_hysteresis.nodes.runtime.sending import send
 
@@ -116,7 +116,8 @@ def main(role: str, size: int) -> None:
         node.create_subscription(PointCloud2, "relay_source", hand_on, DEEP, raw=True)
     executor.add_node(node)
     with suppress(ExternalShutdownException):
-        spin_until(executor, Future())
+        while rclpy.ok():
+            _spin(executor, 1.0)  # without a limit the events executor does not see the end of the context
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 
-from benchmarks.figures import Cell, Figures, machine
+from benchmarks.figures import Cell, Figures, console, machine
 from benchmarks.soak_faults import FAULTS, Bench
 from benchmarks.soak_keeper import BEFORE, LOST, Keeper
 from benchmarks.soak_processes import Soaked
@@ -238,18 +238,18 @@ def main() -> int:
         parser.error(f"--no-faults: got --minutes {options.minutes:g}, expected at least 5")
     os.environ.setdefault("ROS_DOMAIN_ID", str(101 + os.getpid() % 100))  # the tests use those up to 100
     os.environ.setdefault("FASTDDS_DEFAULT_PROFILES_FILE", str(LARGE_BLOCKS))
-    console = Console()
-    console.print(", ".join(f"{key} {value}" for key, value in machine().items()), highlight=False)
+    out = console()
+    out.print(", ".join(f"{key} {value}" for key, value in machine().items()), highlight=False)
     with tempfile.TemporaryDirectory() as folder:
         os.environ.update(XDG_RUNTIME_DIR=folder, ROS_LOG_DIR=folder)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         soak = Soak(options, Path(folder))
-        soak.run(console)
+        soak.run(out)
         figures = soak.balance()
-    console.print(figures.table())
+    out.print(figures.table())
     for line in figures.failures:
-        console.print(f"[red]broken:[/] {line}", highlight=False)
-    console.print("every promise kept" if not figures.failures else f"{len(figures.failures)} promises broken")
+        out.print(f"[red]broken:[/] {line}", highlight=False)
+    out.print("every promise kept" if not figures.failures else f"{len(figures.failures)} promises broken")
     return int(bool(figures.failures))
 
 

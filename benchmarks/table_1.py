@@ -47,6 +47,7 @@ from piezo_hysteresis.effects import (
     SensorBandwidth,
     Softening,
 )
+from piezo_hysteresis.effects.material.creep_exponential import FASTEST
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -107,6 +108,8 @@ class Explanation:
         return float(np.sqrt(np.mean(np.concatenate((self.dynamic - DYNAMIC, self.alone - ALONE)) ** 2)))
 
 
+FASTEST_DECADE = float(np.log10(FASTEST))
+"""Of the time constant of an element; a faster one counts as dynamics."""
 BANK = {"tau_min": PERIOD, "tau_max": 100.0}
 SINGLE = (
     Suspect("nothing", None),
@@ -121,9 +124,9 @@ SINGLE = (
     Suspect(
         "creep, two Kelvin-Voigt elements",
         lambda a, b, s, t: CreepExponential(c=[a, b], tau=[10.0**s, 10.0**t]),
-        (0.02, 0.02, -3.5, -1.5),
-        (0.0, 0.0, -4.0, -2.5),
-        (0.2, 0.2, -2.5, 1.0),
+        (0.02, 0.02, -2.0, -0.5),
+        (0.0, 0.0, FASTEST_DECADE, -1.5),
+        (0.2, 0.2, -1.5, 1.0),
     ),
     Suspect(
         "rate_dependent_hysteresis",

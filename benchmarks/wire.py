@@ -23,6 +23,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -92,13 +93,13 @@ class WiredSession:
     def __init__(self, word: str, parameters: dict, amplifier: WireStage | None = None, **changes) -> None:
         self.session = DriverSession(settings(word, **changes), parameters, f"test {word} {time.monotonic_ns()}")
         if amplifier is None:  # the simulated stage is the amplifier itself
-            amplifier = self.session.stage
-            amplifier.parts = []
-            run = amplifier._plant.run
-            amplifier._plant.run = lambda voltage: (amplifier.parts.append(np.array(voltage)), run(voltage))[1]
-        self.amplifier = amplifier
+            simulated: Any = self.session.stage
+            simulated.parts = []
+            run = simulated._plant.run
+            simulated._plant.run = lambda voltage: (simulated.parts.append(np.array(voltage)), run(voltage))[1]
+        self.amplifier: Any = simulated if amplifier is None else amplifier
         self.deliveries, self.failures = [], []
-        self.acquisition = None
+        self.acquisition: Any = None
 
     def start(self) -> None:
         self.acquisition = self.session.start(time.time_ns, self.deliveries.append, self.failures.append, lambda: 1)
