@@ -44,10 +44,10 @@ MODEL = Model((BoucWen(), Arx(a=[-0.6], b=[0.2])), PERIOD, displacement_scale=1e
 
 
 class Stage:
-    """An endless sine in place of a driver; its gain can be made to change."""
+    """An endless sine in place of a driver; its gain and its drive can be made to change."""
 
     def __init__(self, lab):
-        self.lab, self.count, self.gain = lab, 0, 1.0
+        self.lab, self.count, self.gain, self.amplitude = lab, 0, 1.0, 2.5
         self.model, self.state = MODEL, MODEL.rest(3.5)
         self.noise = np.random.default_rng(5)
         self.samples = lab.publisher(PointCloud2, "samples", SAMPLES)
@@ -59,7 +59,7 @@ class Stage:
     def play(self, seconds):
         for _ in range(round(seconds / PERIOD / SIZE)):
             index = np.arange(self.count, self.count + SIZE)
-            u = 3.5 + 2.5 * np.sin(2 * np.pi * 11.0 * PERIOD * index) * (index > 100)
+            u = 3.5 + self.amplitude * np.sin(2 * np.pi * 11.0 * PERIOD * index) * (index > 100)
             y, self.state = self.model.run(u, self.state)
             block = SampleBlock(
                 1_000_000_000_000 + round(self.count * PERIOD * 1e9),
@@ -101,6 +101,13 @@ def test_a_stage_that_changes_is_reported_with_its_group(lab, tmp_path):
         lambda: any("has changed" in s.message for r in list(reports) for s in r.status), "the alarm on /diagnostics"
     )
     assert node.is_running
+
+    stage.amplitude = 0.0
+    lab.wait(
+        lambda: stage.play(0.5) or reported[-1].message == "the present drive was not part of the baseline",
+        "a watch that does not speak about a drive that it does not know",
+    )
+    assert reported[-1].level == DiagnosticStatus.STALE
 
 
 def test_a_node_without_a_model_takes_no_baseline(lab):

@@ -97,6 +97,17 @@ def test_a_remapped_topic_is_recorded_under_its_own_name(lab):
     assert "conditioning" in {record.phase for record in read(path)}
 
 
+def test_simulated_time_that_nobody_publishes_is_reported(lab):
+    lab.start("model_node", use_sim_time=True)
+    health = lab.diagnostics()
+
+    def reported():
+        return [s for array in list(health) for s in array.status if "no message arrives on /clock" in s.message]
+
+    lab.wait(reported, "the warning")
+    assert reported()[0].level != DiagnosticStatus.OK
+
+
 @pytest.mark.parametrize("after", [0.1, 0.4, 0.8])
 @pytest.mark.parametrize("executable", ["driver_node", "model_node", "identification_node"])
 def test_an_interrupt_while_a_node_starts_shows_no_traceback(lab, executable, after):

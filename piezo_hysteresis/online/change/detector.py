@@ -91,7 +91,7 @@ class ChangeDetector:
         self._offset, self._offset_weight = 0.0, 0.0
         self._interval = false_alarm_interval / BLOCK_TIME
         self._thresholds: dict[DriveClass, float] = {}
-        self._window: list[tuple[Array, Array, int, int]] = []
+        self._window: list[tuple[Array, Array, int, DriveClass]] = []
 
     def add(self, score: ChangeScore) -> Change:
         """Take the next score and return the result of the watch."""
@@ -107,11 +107,11 @@ class ChangeDetector:
             return Change(watched=True)
         if self._offset_weight:
             gradient = gradient - weight[:, _OFFSET] * (self._offset / self._offset_weight)
-        self._window.append((gradient, np.diag(weight), score.stamp, scatter.count))
+        self._window.append((gradient, np.diag(weight), score.stamp, key))
         del self._window[:-WINDOW]
         pulls, weights = (np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1))
         length = np.arange(1, len(pulls) + 1)[:, None]
-        certain = 1.0 + length / min(row[3] for row in self._window)  # the mean of the baseline is itself uncertain
+        certain = 1.0 + self._of_baseline(weights)
         if not self._same_offset:
             certain = certain + _like_offset(scatter) * length / RECENTRED
         known = certain * scatter.inflation(len(pulls)) + scatter.wander * weights
@@ -126,6 +126,21 @@ class ChangeDetector:
             self._window[-1 - int(at)][2] - round(BLOCK_TIME * 1e9),
             True,
         )
+
+    def _of_baseline(self, weights: Array) -> Array:
+        """Variance that the uncertain mean of the baseline adds to each sum of the window, over that of the sum itself.
+
+        The scores of one class share the mean of their class, those of several classes do not.
+        """
+        added = np.zeros_like(weights)
+        classes = [row[3] for row in reversed(self._window)]
+        for key in set(classes):
+            scatter = self._baseline.scatter[key]
+            inside = np.array([k == key for k in classes])[:, None]
+            own = np.cumsum(np.where(inside, np.diff(weights, axis=0, prepend=0.0), 0.0), axis=0)
+            known = scatter.count * scatter.weight
+            added += own**2 / np.where(known > 0.0, known, np.inf)
+        return added / np.where(weights > 0.0, weights, 1.0)
 
     def _threshold(self, key: DriveClass, scatter: Scatter) -> float:
         if key not in self._thresholds:

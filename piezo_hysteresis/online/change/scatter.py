@@ -90,6 +90,11 @@ class Scatter:
         """Root of the mean slope of every group, shape (5,); 1 where it is zero."""
         return _scale(self.slope)
 
+    @property
+    def weight(self) -> Array:
+        """Fisher information of a typical score about each group, shape (5,)."""
+        return np.diag(self.gradient(ChangeScore(np.zeros(len(GROUPS)), self.slope, 0.0, 0.0, 0, 0.0))[1])
+
     def gradient(self, score: ChangeScore) -> tuple[Array, Array]:
         """Gradient of the log likelihood of a score with respect to the groups (5,), and its Fisher information (5, 5).
 
@@ -113,8 +118,7 @@ class Scatter:
         misfit = np.zeros(len(GROUPS))
         inner = np.linalg.pinv((slope / scale[:, None] / scale)[np.ix_(kept, kept)], rcond=1e-10, hermitian=True)
         misfit[kept] = inner @ (np.mean([s.value for s in scores], axis=0) / scale)[kept] / scale[kept]
-        even = [_roots(s.slope, scale, kept)[1] @ (s.value - s.slope @ misfit) for s in scores]
-        covariance = np.atleast_2d(np.cov(np.array(even)[:, kept], rowvar=False))
+        covariance = _even_covariance(scores, misfit, scale, kept)
         precision = np.zeros_like(slope)
         biased = (len(scores) - kept.size - 2) / (len(scores) - 1)  # mean of the inverse of a Wishart matrix
         precision[np.ix_(kept, kept)] = biased * np.linalg.pinv(covariance, rcond=1e-10, hermitian=True)
@@ -146,6 +150,23 @@ def _roots(slope: Array, scale: Array, kept: NDArray[np.intp]) -> tuple[Array, A
     root[inner] = scale[kept][:, None] * ((vectors * np.where(there, size, 0.0)) @ vectors.T)
     inverse[inner] = ((vectors * np.where(there, 1.0 / np.where(there, size, 1.0), 0.0)) @ vectors.T) / scale[kept]
     return root, inverse
+
+
+def _even_covariance(scores: Sequence[ChangeScore], misfit: Array, scale: Array, kept: NDArray[np.intp]) -> Array:
+    """Covariance of the scores over the roots of their slopes, shape (k, k).
+
+    A direction that a block does not excite counts there with the mean variance of what is excited: it would seem known
+    without any noise otherwise, and the first block that excites it would be a change.
+    """
+    even, excited = [], []
+    for s in scores:
+        root, inverse = _roots(s.slope, scale, kept)
+        even.append((inverse @ (s.value - s.slope @ misfit))[kept])
+        excited.append(((root / scale[:, None]) @ (inverse * scale))[np.ix_(kept, kept)])
+    seen = np.array(even)
+    mean = np.sum((seen - seen.mean(axis=0)) ** 2) / np.trace(np.sum(excited, axis=0))
+    unexcited = np.eye(kept.size) - np.mean(excited, axis=0)
+    return np.atleast_2d(np.cov(seen, rowvar=False)) + mean * unexcited
 
 
 def _memory(said: Array) -> Array:

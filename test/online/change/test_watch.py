@@ -21,7 +21,8 @@ from scipy.signal import lfilter
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.model import Model
-from piezo_hysteresis.online.change.baseline import Baseline
+from piezo_hysteresis.online.change.baseline import Baseline, drive_class
+from piezo_hysteresis.online.change.detector import ChangeDetector
 from piezo_hysteresis.online.change.false_alarm_threshold import (
     CLEARED,
     correlate,
@@ -32,7 +33,7 @@ from piezo_hysteresis.online.change.false_alarm_threshold import (
     largest_windows,
 )
 from piezo_hysteresis.online.change.scatter import Scatter
-from piezo_hysteresis.online.change.score import GROUPS
+from piezo_hysteresis.online.change.score import GROUPS, ChangeScore
 from piezo_hysteresis.online.change.watch import ChangeWatch, baseline_path
 from piezo_hysteresis.online.predictor import Predictor
 
@@ -100,6 +101,27 @@ def test_a_slow_scan_whose_blocks_differ_raises_no_alarm(frequency):
     watch, largest = follow(slow, run(MODEL, slow))
     assert watch.alarms == 0
     assert 0.05 < largest < 1.0
+
+
+@pytest.mark.parametrize("frequency", [0.3, 1.0, 11.0])
+def test_white_scores_vary_alike_in_all_directions_whatever_each_block_excites(frequency):
+    slow = sine(TRAINED + 4.0, frequency)
+    watch, _ = follow(slow, run(MODEL, slow))
+    for scatter in watch.baseline.scatter.values():
+        known = np.linalg.eigvalsh(scatter.precision)
+        assert known[-1] < 4.0 * known[0]
+
+
+def test_the_mean_of_a_class_is_as_uncertain_as_its_own_scores_make_it():
+    slope = np.diag([1.0, 1.0, 1.0, 1.0, 1.0])
+    few, many = (Scatter(n, np.zeros(5), np.eye(5), slope, np.zeros((2, 5)), np.zeros(5), 1.0) for n in (100, 10_000))
+    scores = [ChangeScore(np.ones(5), slope, span, 1.0, k, 1.0) for k, span in enumerate((100.0, 1.0, 1.0, 1.0))]
+    classes = [drive_class(scores[0]), drive_class(scores[1])]
+    detector = ChangeDetector(Baseline(dict(zip(classes, (few, many), strict=True))), 600.0, same_offset=True)
+    for score in scores:
+        change = detector.add(score)
+    expected = (1.0 + (3.0**2 / 10_000 + 1.0 / 100) / 4.0) / 4.0
+    assert change.deviation**2 == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("group", ["gain", "loop", "dynamics", "offset"])
