@@ -14,8 +14,9 @@
 
 """The gap finder: shows where a model is wrong, names the missing effect, and measures the gap after adding it.
 
-`noise_floor` (what no model can explain) → `localise` (where) → `candidates` (score test) → `refit` → `selection`
-(add, repeat, stop) → `gap` (before, after, on unseen records) → `next_experiment`. `diagnose` runs them all.
+`noise_floor` (residual of a perfect model) → `localise` (where the residual is large) → `candidates` (score test) →
+`refit` → `selection` (add, repeat, stop) → `gap` (before and after, on test records) → `next_experiment`. `diagnose`
+runs them all.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From the search to the answer: the last fits, the gap on records set aside, and what follows."""
+"""From the search to the answer: the last fits, the gap on the test records, and the next experiment."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ from .unnamed.offer import offered
 from .verdict import is_explained, is_makeshift, verdict_of
 
 NOISY, WORTHWHILE = 1.1, 0.95
-"""Cost over that of noise from which it is begun anew, and share of it that may be left for another time."""
+"""Ratio of the cost to the cost of noise from which the last fit is restarted, and the largest ratio of the new cost to
+the old one for which it is restarted once more."""
 
 
 def concluded(
@@ -45,20 +46,20 @@ def concluded(
     selection: Selection,
     progress: Progress,
 ) -> Diagnosis:
-    """The last fits, the gap on records set aside, the verdict, and what to record next.
+    """The last fits, the gap on the test records, the verdict, and the next experiment.
 
     Parameters
     ----------
     experiment : Experiment
-        As it was compared.
+        Experiment that was compared with the model.
     setup : BaselineSetup
         Floors, records and baseline.
     where : tuple of ResidualShare
-        Where the baseline disagrees with the measurement.
+        Distribution of the residual of the baseline.
     selection : Selection
-        Outcome of the search.
+        Result of the search.
     progress : callable
-        Called with a word and the fraction done.
+        Called with a message and the fraction done.
     """
     records, least, training_data = setup.records, setup.least, setup.training_data
     progress("gap", 0.85)
@@ -101,7 +102,7 @@ def concluded(
 
 
 def _finished(selection: Selection, training_data: TrainingData, null: float) -> Fit:
-    """The last fit, on all samples, begun anew behind new dynamics while that helps."""
+    """The last fit, to all samples; restarted with newly estimated dynamics while this reduces the cost."""
     final = joint(selection.model, training_data, LAST, PRECISE)
     last = selection.accepted[-1].best
     while final.cost > NOISY * null:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`diagnose`: a loop over the passes of `passes`, up to the one that knows the answer."""
+"""`diagnose`: a loop over the passes of `passes`, up to the first one that returns a diagnosis."""
 
 from __future__ import annotations
 
@@ -41,36 +41,36 @@ def diagnose(
     explicit_step: bool = True,
     time_limit: float = np.inf,
 ) -> Diagnosis:
-    """Find where simulation and measurement disagree, name the missing effect, add it, and show the gap shrink.
+    """Find where simulation and measurement disagree, name the missing effect, and measure the gap after adding it.
 
     Parameters
     ----------
     experiment : Experiment
-        Records of any kind; the more kinds, and the more realisations of each, the surer the name.
+        Records of any kind. More kinds, and more realisations of each kind, make the name more certain.
     model : Model, optional
-        Where the search begins; identified from the experiment by default.
+        Model with which the search begins; identified from the experiment by default.
     effects : collection of Effect classes
-        The library to choose from; the whole catalogue by default.
+        Effects to choose from; the whole catalogue by default.
     progress : callable, optional
-        Called with a word and the fraction done.
+        Called with a message and the fraction done.
     explicit_step : bool
-        Whether the explicit step of Eq. (7) is looked for, which only simulations take, and what it changes is taken
-        out before anything is named.
+        Whether to look for the error of the explicit step of Eq. (7), which only simulated data can contain. If it is
+        found, it is subtracted before an effect is named.
     time_limit : float
-        Time after which the search ends with the best answer so far [s]; the baseline before it and the last fit after
-        it are always made.
+        Time after which the search ends with the best answer so far [s]. It does not limit the baseline before the
+        search and the last fit after it.
 
     Returns
     -------
     Diagnosis
-        Named, nothing missing, or unknown, with the extended model.
+        The verdict (named, nothing missing, or unknown), and the extended model.
 
     Raises
     ------
     ParameterError
         If the time limit is not positive.
     IdentificationError
-        If nothing in the experiment moves.
+        If the drive does not move in any record.
     ModelError
         If the records are faster than the model.
     """
@@ -78,7 +78,7 @@ def diagnose(
         raise ParameterError(f"diagnose: got a time limit of {time_limit:g} s, expected more than 0 s")
     end = time.monotonic() + time_limit
     state = DiagnosisState(experiment, model, effects, progress or (lambda word, fraction: None), end)
-    with np.errstate(over="ignore", invalid="ignore"):  # diverging trials show in their cost
+    with np.errstate(over="ignore", invalid="ignore"):  # diverging trials have a large cost
         for run in (p for p in PASSES if explicit_step or p is not subtract_explicit_steps):
             found = run(state)
             if isinstance(found, Diagnosis):

@@ -33,7 +33,7 @@ from .search.selection_result import Rejection, Selection
 from .unnamed.correction import Correction
 
 SCHEMA = 1
-"""Version of the answer for machines."""
+"""Version of the JSON answer."""
 
 
 class Verdict(StrEnum):
@@ -46,35 +46,35 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Diagnosis(Pictured):
-    """Where a model is wrong, which effect it misses, and the gap after adding it.
+    """Where a model is wrong, which effect is missing, and the gap after adding it.
 
     Parameters
     ----------
     verdict : Verdict
         Named, nothing missing, or unknown.
     reason : str
-        The verdict in one plain sentence.
+        The verdict in one sentence.
     model : Model
-        Extended where effects are named, else the refitted baseline.
+        The model with the named effects; without any, the refitted baseline.
     baseline : Model
-        Refitted, without the effects.
+        The refitted model without the effects.
     selection : Selection or None
-        Every turn of the search; None where the data did not allow one.
+        Every step of the search; None if the data did not allow a search.
     fit : Fit or None
         Last joint fit, with uncertainties.
     where : tuple of ResidualShare
-        Where the baseline disagrees with the measurement.
+        Distribution of the residual of the baseline.
     gap : Gap or None
-        Before and after.
+        Free-run error before and after.
     next_experiment : NextExperiment or None
-        What would separate explanations that the data could not.
+        Phase that would separate explanations that these data cannot separate.
     experiment : Experiment
-        As it was compared: the noise of a measured voltage is removed first. Its notices describe the quality of
-        the data, and what they cannot show.
+        Experiment that was compared with the model, without the noise of a measured voltage. Its notices describe the
+        quality of the data, and the effects that the data cannot show.
     change : ParameterChange or None
-        The parameter of a given model that has changed, where that explains the records.
+        Changed parameter of a given model, if this change explains the records.
     correction : Correction or None
-        After "unknown", the best correction without a name, accepted or refused. It is not part of `model`.
+        After "unknown": the best correction without a name, accepted or refused. It is not part of `model`.
     """
 
     verdict: Verdict
@@ -92,7 +92,7 @@ class Diagnosis(Pictured):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Identifiers of the effects named, in the order of the search."""
+        """Identifiers of the named effects, in the order of the search."""
         if self.change is not None:
             return (self.change.kind.name,)
         if self.verdict is not Verdict.NAMED or self.selection is None:
@@ -101,7 +101,7 @@ class Diagnosis(Pictured):
 
     @property
     def rejected(self) -> tuple[Rejection, ...]:
-        """Effects that were not named, each once, with the reason of the last turn."""
+        """Effects that were not named, each once, with the reason given in the last step."""
         if self.selection is None:
             return ()
         rejections: dict[str, Rejection] = {}
@@ -171,12 +171,12 @@ class Diagnosis(Pictured):
         }
 
     def answer(self, model_file: str = "") -> dict[str, Any]:
-        """The answer in its stable, versioned form.
+        """The answer for ``answer.json``, in a stable, versioned form.
 
         Parameters
         ----------
         model_file : str
-            Where the extended model was written.
+            File to which the extended model was written.
         """
         return {
             "schema": SCHEMA,
@@ -205,24 +205,24 @@ class Diagnosis(Pictured):
         return html_table(repr(self), ("effect", "explained", "family"), rows)
 
     def summary(self) -> str:
-        """The answer in plain words, several lines."""
+        """The answer as text of several lines."""
         lines = [self.reason]
         for row in self.effects():
             closed = 100 * row["explained_fraction"]
             lines.append(f"  {row['name']} ({row['family']}): explains {closed:.0f} % of the gap")
             for name, p in row["parameters"].items():
                 low, high = p["interval_95"]
-                lines.append(f"    {name} = {p['value']:.5g} {p['unit']} (95 %: {low:.5g} to {high:.5g})")
+                lines.append(f"    {name} = {p['value']:.4g} {p['unit']} (95 %: {low:.4g} to {high:.4g})")
             if row["confusable_with"]:
-                lines.append(f"    could also be {', '.join(row['confusable_with'])}")
+                lines.append(f"    the data cannot distinguish it from {', '.join(row['confusable_with'])}")
         if self.gap is not None:
             g = self.gap
             seen = (
-                "on records set aside"
+                "on the test records"
                 if g.unseen
                 else "on the training records, because there were too few for test records"
             )
-            lines.append(f"  gap {g.before:.3g} % → {g.after:.3g} % of range, floor {g.floor:.3g} % ({seen})")
+            lines.append(f"  gap {g.before:.3g} % → {g.after:.3g} % of range, noise floor {g.floor:.3g} % ({seen})")
         if self.correction is not None:
             lines.append(f"  {self.correction.sentence()}")
         lines += [f"  where: {p.axis.replace('_', ' ')}: {p.detail}" for p in self.where[:3]]

@@ -28,18 +28,18 @@ from ..identification.records.excitation_content import SLOW, excitation_content
 from ..record import Notice, Record
 
 HOLD = 1.0
-"""Time for which a level must be held after it was changed, so that creep shows [s]."""
+"""Time for which a level must be held after a change, so that creep becomes visible [s]."""
 MOVED = 0.02
-"""Share of the range of the drive by which a level must have changed."""
+"""Smallest change of level, as a share of the drive range."""
 DISTINCT = 0.8
-"""Ratio of two amplitudes below which they count as different."""
+"""Ratio of the smaller to the larger amplitude below which two amplitudes count as different."""
 REASONS = {
     ExcitationNeed.HELD_LEVEL: ("", "no level is held for a second or more after a change"),
     ExcitationNeed.REPEATED_PHASE: ("", "no kind of phase was recorded twice"),
     ExcitationNeed.SEVERAL_AMPLITUDES: ("", "all loops have the same amplitude"),
     ExcitationNeed.BROADBAND: (" and lags", "no drive excites the dynamics (noise, multisine)"),
 }
-"""What each kind of drive shows besides the effects that declare it, and the message where it is missing."""
+"""For each kind of drive: what it shows besides the effects that declare it, and the message if it is missing."""
 
 
 def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
@@ -48,7 +48,7 @@ def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
     Parameters
     ----------
     records : sequence of Record
-        Those that take part.
+        Records that are used in the diagnosis.
     """
     span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
     contents = [excitation_content(r) for r in records]
@@ -65,11 +65,11 @@ def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
 def _notice(need: ExcitationNeed) -> Notice:
     names = " and ".join(dict.fromkeys(e.public_name() for e in CATALOGUE if e.excitation_need is need))
     others, reason = REASONS[need]
-    return Notice("not_tested", f"these data can hardly show {names}{others}: {reason}")
+    return Notice("not_tested", f"these data can hardly show {names}{others}, because {reason}")
 
 
 def _longest_hold(record: Record, least: float) -> float:
-    """Longest time at one level that differs from the one before [s]."""
+    """Longest time at a level after a change of level [s]."""
     u = np.append(record.settled_voltage, record.voltage)
     ends = np.flatnonzero(np.append(np.diff(u) != 0.0, True))
     starts = np.append(0, ends[:-1] + 1)
@@ -83,7 +83,7 @@ def _longest_hold(record: Record, least: float) -> float:
 
 
 def _has_smaller_loops(records: Sequence[Record]) -> bool:
-    """Whether slow loops of two amplitudes are there, in one record or in two."""
+    """True if there are slow loops of two amplitudes, in one record or in two."""
     sizes: list[float] = []
     for record in records:
         u = record.voltage
@@ -92,7 +92,7 @@ def _has_smaller_loops(records: Sequence[Record]) -> bool:
         if moves.size == 0:
             continue
         turns = moves[np.flatnonzero(np.diff(steps[moves])) + 1]
-        if turns.size < 2:  # a single loop begins and ends where the record does
+        if turns.size < 2:  # a single loop begins and ends with the record
             turns = np.concatenate((moves[:1], turns, moves[-1:] + 1))
         slow = np.diff(turns) * record.sample_period > 0.5 / SLOW
         sizes += np.abs(np.diff(u[turns]))[slow].tolist()

@@ -14,10 +14,10 @@
 
 """Uncertainty of the parameters of a model whose form is not exact.
 
-The standard errors of a fit treat its residual as noise. With a hundred thousand samples they become so small that the
-form of the model decides: another sampling of the same law, another integration, dynamics of another order. Every such
-difference is a structured misfit that no test can see below the adequacy floor, and that effects which trade against
-each other amplify. Brynjarsdóttir and O'Hagan 2014, Sec. 3: an interval that leaves it out excludes the truth.
+The standard errors of a fit treat its residual as noise. With a hundred thousand samples they become so small that
+errors of the model form are larger: another discretisation of the same law, another integration rule, dynamics of
+another order. Such a structured misfit cannot be detected below the adequacy floor, and correlated parameters amplify
+it. An interval that ignores it excludes the true value (Brynjarsdóttir and O'Hagan 2014, Sec. 3).
 """
 
 from __future__ import annotations
@@ -38,20 +38,20 @@ Array = NDArray[np.float64]
 LAG = "lag"
 """Family of the effects that delay."""
 PIECES = 16.0
-"""Independent pieces of the structured misfit in one record, so that a longer record narrows no interval further.
+"""Number of independent pieces of the structured misfit in one record: longer records do not make intervals smaller.
 
 Chosen by the coverage of intervals on stages of other form (`python -m benchmarks.coverage`)."""
 
 
 def with_form_uncertainty(fit: Fit, training_data: TrainingData, noise: Array, span: float) -> Fit:
-    """The fit with a covariance that holds the uncertainty of the model's form.
+    """The fit with a covariance that includes the uncertainty of the model's form.
 
     Parameters
     ----------
     fit : Fit
-        To the training data.
+        Fit to the training data.
     training_data : TrainingData
-        The records that were fitted, and their floors.
+        Records that were fitted, and their floors.
     noise : (r,) ndarray
         Noise of every record [m].
     span : float
@@ -59,12 +59,12 @@ def with_form_uncertainty(fit: Fit, training_data: TrainingData, noise: Array, s
 
     Notes
     -----
-    The misfit of a record is taken as a random function of rms δ that has `PIECES` independent pieces. The right-hand
-    side of the normal equations then has the covariance δ² (n/PIECES) SᵀS, S the sensitivities of n samples. δ is the
-    adequacy floor, or what the residual holds beyond noise where that is more.
+    The misfit of a record is treated as a random function of RMS value δ with `PIECES` independent pieces. The
+    right-hand side of the normal equations then has the covariance δ² (n/PIECES) SᵀS, with the sensitivities S of n
+    samples. δ is the adequacy floor, or the residual beyond noise if this is larger.
 
-    How a signal goes on between two samples is known to neither side: a lag of the model is uncertain by one sample
-    period T, evenly distributed, which adds T²/12 to its variance.
+    The signal between two samples is not known. A lag of the model is therefore uncertain by one sample period T with a
+    uniform distribution, which adds T²/12 to its variance.
     """
     directions = gauge(fit.model, fit.names)
     bread = np.zeros((directions.shape[1],) * 2)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The gap: free-run error before and after the effects were added, on records used neither to fit nor to choose."""
+"""The gap: free-run error before and after effects are added, on records used neither to fit nor to choose."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from .search.cross_validation import ADEQUATE
 Array = NDArray[np.float64]
 
 FALLS = 0.9
-"""Share of V on records set aside that may remain after an effect is named."""
+"""Share of V on the test records that may remain after an effect is named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +47,21 @@ class PhaseGap:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """RMS over records, each counting the same, in % of the range of the experiment.
+    """RMS over records with equal weights, in % of the range of the experiment.
 
     Parameters
     ----------
     before, after, floor : float
-        Of the baseline, of the extended model, and the floor [% of range].
+        Error of the baseline, error of the extended model, and noise floor [% of range].
     interval_95 : (float, float)
-        Interval of `after` with records as units [% of range].
+        95 % interval of `after`, with records as independent units [% of range].
     per_phase : tuple of PhaseGap
-        Record by record.
+        Gap of every record.
     unseen : bool
-        True where none of the records was used for fitting or choosing; False where all had to be.
+        True if none of the records was used for fitting or choosing; False if there were too few records for this.
     live : float
-        Of the extended model without what was fitted in each of these records: the residual to expect of it when it
-        predicts [% of range]. Equal to `after` but for effects that are not predicted live.
+        Expected error of the extended model in live prediction [% of range]: without the numbers that are fitted to
+        each record. It differs from `after` only for effects that are not predicted live.
     """
 
     before: float
@@ -74,10 +74,10 @@ class Gap:
 
     @property
     def falls(self) -> bool:
-        """Whether the extended model is better there, every record in units of its own floor.
+        """Whether the extended model is better, with every record in units of its own floor.
 
-        Records that are quiet beside the others, and show what those hide in noise, then count like them. Where nothing
-        is to be seen before, the effect must do no harm.
+        Records with little noise, which show effects that the other records do not, then have the same weight. If there
+        is no gap before, the extended model must not be worse.
         """
         before, after = (
             float(np.mean([(getattr(p, when) / p.floor) ** 2 for p in self.per_phase])) for when in ("before", "after")
@@ -86,7 +86,7 @@ class Gap:
 
 
 def stating(model: Model, percent: float, stroke: float) -> Model:
-    """The model with the free-run error that was found for it, in % of the `stroke` [m], in its provenance."""
+    """The model with its free-run error in the provenance; `percent` is in % of the `stroke` [m]."""
     return replace(model, provenance={**model.provenance, **free_run(0.01 * percent * stroke, percent)})
 
 
@@ -106,17 +106,17 @@ def measure_gap(
     models : (Model, Model)
         Baseline and extended model.
     records : sequence of Record
-        The whole experiment, so that the state is carried.
+        The whole experiment, so that the state continues from record to record.
     chosen : sequence of int
-        Indices of the records that report.
+        Indices of the records on which the gap is measured.
     floors : sequence of float
         Floor of every record [m].
     stroke : float
         Range of the experiment [m].
     nuisances : (Nuisance, Nuisance)
-        What is free per record under each model.
+        Disturbances that are free in every record, for each model.
     unseen : bool
-        Whether the records chosen had no part in fitting and choosing.
+        Whether the chosen records were used neither for fitting nor for choosing.
     """
     rows: list[list[float]] = []
     for model, nuisance in zip(models, nuisances, strict=True):

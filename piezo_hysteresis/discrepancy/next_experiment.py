@@ -35,21 +35,21 @@ from .search.training_data import TrainingData
 Array = NDArray[np.float64]
 
 SLOW = 1e-2
-"""Sample period of slow phases of the menu [s]."""
+"""Sample period of the slow phases to choose from [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class NextExperiment:
-    """A phase to record, and what it would separate.
+    """A phase to record, and the effects that it would separate.
 
     Parameters
     ----------
     phase : str
         Phase name.
     separates : tuple of str
-        Effects between which it would decide.
+        Effects that it would separate.
     power : float
-        Expected squared distance between the two, in floors² per second of stage time.
+        Expected squared difference between their predictions, in floors² per second of stage time.
     """
 
     phase: str
@@ -58,7 +58,7 @@ class NextExperiment:
 
 
 def menu(training_data: TrainingData, model: Model) -> dict[str, Record]:
-    """Phases to choose from, inside the drive range that was recorded; their displacement, not yet measured, is 0."""
+    """Phases to choose from, inside the recorded drive range; their displacement is not measured yet and set to 0."""
     extent, period = training_data.extent, model.sample_period
     fast = DriveLimits(
         sample_period=period,
@@ -97,19 +97,19 @@ def menu(training_data: TrainingData, model: Model) -> dict[str, Record]:
 
 
 def separations(first: Model, second: Model, training_data: TrainingData) -> dict[str, float]:
-    """How far two fitted models differ on every phase of the menu, beyond what either can still adjust.
+    """Difference of two fitted models on every phase of `menu`, after both have adjusted their parameters.
 
     Parameters
     ----------
     first, second : Model
-        Fitted, one with each effect.
+        Fitted models, one with each effect.
     training_data : TrainingData
-        What has been recorded: it binds the common parameters.
+        Recorded data, which constrain the common parameters.
 
     Returns
     -------
     dict of str to float
-        By phase name the expected squared distance, in floors² per second of stage time.
+        Expected squared difference by phase name, in floors² per second of stage time.
     """
     drives = menu(training_data, first)
     found = distances(first, second, training_data, drives)
@@ -119,16 +119,16 @@ def separations(first: Model, second: Model, training_data: TrainingData) -> dic
 def distances(
     first: Model, second: Model, training_data: TrainingData, drives: Mapping[str, Record]
 ) -> dict[str, float]:
-    """Mean squared distance of two fitted models on every drive, beyond what the first can still adjust, in floors².
+    """Mean squared difference of two models on every drive, after the first has adjusted its parameters, in floors².
 
     Parameters
     ----------
     first, second : Model
-        Fitted, one with each effect.
+        Fitted models, one with each effect.
     training_data : TrainingData
-        What has been recorded: it binds the common parameters.
+        Recorded data, which constrain the common parameters.
     drives : mapping of str to Record
-        From rest; their displacement is not used.
+        Drives from rest; their displacement is not used.
     """
     free = free_numbers(first, training_data)
     directions = gauge(first, free)
@@ -150,16 +150,16 @@ def distances(
 
 
 def propose(first: Model, second: Model, names: tuple[str, str], training_data: TrainingData) -> NextExperiment:
-    """Phase of the menu on which two fitted models differ most.
+    """Phase of `menu` on which two fitted models differ most.
 
     Parameters
     ----------
     first, second : Model
-        Fitted, one with each effect.
+        Fitted models, one with each effect.
     names : (str, str)
-        The effects.
+        Names of the effects.
     training_data : TrainingData
-        What has been recorded.
+        Recorded data.
     """
     powers = separations(first, second, training_data)
     phase = max(powers, key=lambda name: powers[name])
@@ -167,14 +167,14 @@ def propose(first: Model, second: Model, names: tuple[str, str], training_data: 
 
 
 def decide(selection: Selection, training_data: TrainingData) -> NextExperiment | None:
-    """What would decide between the first accepted effect that has a rival, and that rival; None where none has.
+    """Phase that would separate the first accepted effect with a rival from that rival; None if there is no rival.
 
     Parameters
     ----------
     selection : Selection
-        Outcome of the search.
+        Result of the search.
     training_data : TrainingData
-        What has been recorded.
+        Recorded data.
     """
     for step in selection.accepted:
         mine = step.best

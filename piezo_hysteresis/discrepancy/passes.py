@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The passes of a diagnosis: each takes what is known so far, and adds to it or ends with the answer."""
+"""The passes of a diagnosis: each takes the state of the diagnosis, and returns the new state or the final answer."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ from .verdict import FEWEST
 Array = NDArray[np.float64]
 
 VOLTAGE_NOISE = "voltage_noise"
-"""Kind of the notice of an experiment whose voltage is followed but for its noise."""
+"""Kind of the notice about an experiment from whose voltage the noise was removed."""
 STEPS_LEAVE = 10.0
-"""Cost that may be left once the changes of an explicit step are taken out before anything is named."""
+"""Largest cost after the subtraction of an explicit step, if it is subtracted before the search."""
 IDLE = ("idle", "hold", CONDITIONING)
 """Phases that only bring the stage from one state to another."""
 
@@ -62,21 +62,21 @@ class DiagnosisState:
     Parameters
     ----------
     experiment : Experiment
-        As it is compared with models.
+        Experiment that is compared with models.
     model : Model or None
-        Where the search begins; None where it has to be identified.
+        Model with which the search begins; None if it has to be identified.
     effects : collection of Effect classes
-        The library to choose from.
+        Effects to choose from.
     progress : callable
-        Called with a word and the fraction done.
+        Called with a message and the fraction done.
     end : float
-        When the search for effects has to end, on the clock of `time.monotonic` [s].
+        Time at which the search for effects has to end, on the clock of `time.monotonic` [s].
     setup : BaselineSetup or None
         Floors, records, and the baseline that was fitted to them.
     where : tuple of ResidualShare
-        Where the baseline disagrees with the measurement.
+        Distribution of the residual of the baseline.
     selection : Selection or None
-        Outcome of the search.
+        Result of the search.
     """
 
     experiment: Experiment
@@ -96,35 +96,35 @@ class DiagnosisState:
 
     @property
     def moving(self) -> list[int]:
-        """Those of them in which the drive moves."""
+        """Indices of the usable records in which the drive moves."""
         return [i for i in self.usable if _moves(self.experiment, i)]
 
     @property
     def sharpens(self) -> bool:
-        """Whether what slow samples have lost is made good: averages of a noisy voltage would turn back and forth."""
+        """Whether the inter-sample error is corrected; not with a noisy voltage, whose averages reverse at random."""
         return all(n.kind != VOLTAGE_NOISE for n in self.experiment.notices)
 
     @property
     def fitted(self) -> BaselineSetup:
-        """The baseline setup, which an earlier pass has made."""
+        """The baseline setup, from an earlier pass."""
         if self.setup is None:
             raise IdentificationError("diagnose: got no baseline, expected the pass fit_baseline before this one")
         return self.setup
 
     @property
     def searched(self) -> Selection:
-        """The outcome of the search, which an earlier pass has made."""
+        """The result of the search, from an earlier pass."""
         if self.selection is None:
             raise IdentificationError("diagnose: got no search, expected the pass search_effects before this one")
         return self.selection
 
 
 Pass = Callable[[DiagnosisState], DiagnosisState | Diagnosis]
-"""Takes what is known; returns more of it, or the answer, with which the diagnosis ends."""
+"""Takes the state of the diagnosis; returns the new state, or the answer, which ends the diagnosis."""
 
 
 def quiet_voltage(state: DiagnosisState) -> DiagnosisState:
-    """Make the voltage follow only changes larger than its measured noise."""
+    """Remove changes of the voltage that are not larger than its measured noise."""
     experiment = state.experiment
     noise = voltage_noise(experiment.records)
     if not noise.any():
@@ -138,18 +138,18 @@ def quiet_voltage(state: DiagnosisState) -> DiagnosisState:
 
 
 def carry_lead_in(state: DiagnosisState) -> DiagnosisState:
-    """Cut records that begin in an unknown state where a full loop makes it known, as `identify` does."""
+    """Cut records that begin in an unknown state at the point where a full loop determines it, as `identify` does."""
     experiment, notices = known_from_within(state.experiment)
     return replace(state, experiment=experiment.noting(*notices)) if notices else state
 
 
 def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
-    """Ends with "unknown" where the data are damaged.
+    """Ends with "unknown" if the data are damaged.
 
     Raises
     ------
     IdentificationError
-        If nothing in the experiment moves.
+        If the drive does not move in any record.
     """
     experiment, model = state.experiment, state.model
     if not any(_moves(experiment, i) for i in range(len(experiment.records))):
@@ -162,7 +162,7 @@ def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
 
 
 def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosis:
-    """Ends with the parameter that has changed where the given model explains the records but for that."""
+    """Ends with the changed parameter if the given model explains the records apart from this change."""
     if state.model is None:
         return state
     state.progress("changes of the given model", 0.0)
@@ -171,7 +171,7 @@ def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosi
 
 
 def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:
-    """Ends where records are few, or none is broadband: with what the choice of the structure decides."""
+    """Ends if there are few records or none is broadband: the answer follows from the chosen structure."""
     needs_structure = state.model is None and not roles_of(state.experiment).broadband
     if len(state.moving) >= FEWEST and not needs_structure:
         return state
@@ -179,7 +179,7 @@ def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:
 
 
 def fit_baseline(state: DiagnosisState) -> DiagnosisState:
-    """Estimates the floors, sets test records aside, and fits the published model to the others."""
+    """Estimates the floors, chooses the test records, and fits the published model to the others."""
     setup = prepare_baseline(
         state.experiment.records, state.usable, state.model, state.selection, state.sharpens, state.progress
     )
@@ -187,7 +187,7 @@ def fit_baseline(state: DiagnosisState) -> DiagnosisState:
 
 
 def search_effects(state: DiagnosisState) -> DiagnosisState:
-    """Adds effects to the baseline while records left out ask for them."""
+    """Adds effects to the baseline while cross-validation improves."""
     setup = state.fitted
     with ending_at(state.end):
         selection = select(
@@ -211,9 +211,9 @@ def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
 
 
 def subtract_explicit_steps(state: DiagnosisState) -> DiagnosisState:
-    """Subtract the error that an explicit step of the loop has left in the data of a simulation; no stage has it.
+    """Subtract the error of an explicit step of the loop, which only simulated data contain.
 
-    Before the search only where nothing else is missing; after it with the first effects behind which the data show it.
+    Before the search only if nothing else is missing; after it with the first effects with which the data show it.
     """
     setup, selection = state.fitted, state.selection
     training_data, model = setup.training_data, setup.baseline.model
@@ -235,7 +235,7 @@ def _freed(state: DiagnosisState, model: Model) -> DiagnosisState:
 
 
 def conclude(state: DiagnosisState) -> Diagnosis:
-    """Ends with the last fits, the gap on records set aside, and the verdict."""
+    """Ends with the last fits, the gap on the test records, and the verdict."""
     return concluded(state.experiment, state.fitted, state.where, state.searched, state.progress)
 
 

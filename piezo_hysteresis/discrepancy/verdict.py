@@ -27,10 +27,10 @@ from .search.selection_result import Selection
 FEWEST = 4
 """Fewest records from which test records can be taken and an effect can be named."""
 FORESEEN, UNFORESEEN = 1.1, 1.5
-"""Error on the test records in units of the floor. Up to the first value nothing is missing, although V of the training
-records may be a little high. From the second value something is missing, although V of the training records is low."""
+"""Error on the test records in units of the floor. Up to the first value nothing is missing, even if V of the training
+records is a little high. From the second value something is missing, even if V of the training records is low."""
 NAMED, NAMED_FAR = 0.6, 0.75
-"""Explained fraction of the gap from which an effect is named, and the one if the remaining error is large."""
+"""Smallest explained fraction of the gap for a name, and the same if the remaining error is large."""
 FAR = 10.0
 """V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""
 LINEAR_LEAVES = 2.0 * ADEQUATE
@@ -38,19 +38,19 @@ LINEAR_LEAVES = 2.0 * ADEQUATE
 
 
 def is_explained(selection: Selection) -> bool:
-    """Whether the effects that were added explain enough for a name."""
+    """Whether the added effects explain enough of the gap for a name."""
     share = NAMED if selection.score.excess <= FAR else NAMED_FAR
     return bool(selection.accepted) and selection.explained(selection.score) >= share
 
 
 def is_makeshift(selection: Selection) -> bool:
-    """Whether a lag or a resonance leaves a gap: one that is there leaves none, one beside poor dynamics does."""
+    """Whether a lag or a resonance leaves a gap. A real one leaves none; a substitute for poor dynamics does."""
     linear = any(s.best.effect.family == "lag" or s.best.name == ExtraResonance.name for s in selection.accepted)
     return linear and selection.score.excess > LINEAR_LEAVES
 
 
 def not_predicted_live(name: str, live: float) -> str:
-    """What a user must know of an effect that has numbers of its own in every recording; `live` in % of range."""
+    """Message about an effect that is fitted to every recording separately; `live` in % of range."""
     return (
         f"{name.replace('_', ' ').capitalize()} was fitted to each recording separately. It cannot "
         f"be predicted live, where an error of {live:.2g} % of range remains."
@@ -58,18 +58,18 @@ def not_predicted_live(name: str, live: float) -> str:
 
 
 def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Verdict, str]:
-    """Named, nothing missing, or unknown, and why.
+    """Named, nothing missing, or unknown, and the reason.
 
     Parameters
     ----------
     selection : Selection
-        Every turn of the search.
+        Every step of the search.
     named : bool
         Whether its effects are to be named.
     falls : bool
-        Whether they lower the gap on the records that were set aside.
+        Whether they reduce the gap on the test records.
     gap : Gap
-        Before and after.
+        Free-run error before and after.
     """
     if not selection.in_time and not named:
         return Verdict.UNKNOWN, "No effect is named: the time limit ended the search before an answer was found."
@@ -85,7 +85,7 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
         said = f"The model does not contain {names}, which {explain} {100 * closed:.0f} % of the gap; {rest}."
         fitted = [s.best.effect.public_name() for s in selection.accepted if not s.best.effect.is_predicted_live()]
         if not selection.in_time:
-            said += " The time limit ended the search, so that more may be missing."
+            said += " The time limit ended the search; more effects may be missing."
         return Verdict.NAMED, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
     many = gap.unseen and len(gap.per_phase) >= FEWEST
     foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE

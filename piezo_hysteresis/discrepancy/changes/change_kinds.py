@@ -24,8 +24,7 @@ import numpy as np
 from ...effects import Creep, ExtraDelay, ExtraResonance, SecondOrderLowPass, SensorBandwidth, Softening, ThermalDrift
 
 LEAVES = 6.0
-"""V that a change may leave: where more is left, the stage is not the same in all else, or another form of the change
-would fit better."""
+"""Largest V that a change may leave. If more remains, something else has changed too, or the form is different."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +34,17 @@ class ChangeKind:
     Parameters
     ----------
     name : str
-        Effect of the catalogue that it is, or ``gain``, ``loop_height``.
+        Name of an effect of the catalogue, or ``gain``, ``loop_height``.
     family : str
-        As in the catalogue.
+        Family, as in the catalogue.
     parameter : str
-        What changes.
+        Parameter that changes.
     unit : str
-        Of the size.
+        Unit of the size.
     rows : tuple of str
-        Linear changes, or none where it acts on the whole prediction.
+        Linear changes; empty if the change acts on the whole prediction.
     words : str
-        Said of the stage, with the size to be put in.
+        Part of the sentence about the stage, with a place for the size.
     """
 
     name: str
@@ -83,17 +82,17 @@ class ParameterChange:
     Parameters
     ----------
     key : str
-        Of `KINDS`.
+        Key in `KINDS`.
     size : float
-        In the unit of its kind.
+        Size in the unit of its kind.
     interval_95 : (float, float)
-        With pieces of the records as units, and rivals where they explain as much.
+        95 % interval of the size, with pieces of the records as independent units; it includes rivals.
     rivals : tuple of str
         Keys of the changes that explain as much.
     before, after : float
-        V (mean R²) with gain, loop height and zero at their best, and with the change.
+        V (mean R²) with fitted gain, loop height and zero, without and with the change.
     session : mapping of str to float
-        Relative change of ``gain`` and ``loop`` beside it.
+        Relative changes of ``gain`` and ``loop`` that were fitted together with it.
     """
 
     key: str
@@ -106,12 +105,12 @@ class ParameterChange:
 
     @property
     def kind(self) -> ChangeKind:
-        """What it is."""
+        """Kind of the change."""
         return KINDS[self.key]
 
     @property
     def member_certain(self) -> bool:
-        """False where another member of the family explains as much, or much is left."""
+        """False if another member of the family explains as much, or if a large residual remains."""
         return self.after < LEAVES and all(KINDS[r].family != self.kind.family for r in self.rivals)
 
     def row(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ChangeSearch`: the difference between records and what a given model predicts of them, and accounts of it."""
+"""`ChangeSearch`: explanations of the difference between records and the prediction of a given model."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ from .signatures import SHAPES, ChangeablePrediction, predictions
 Array = NDArray[np.float64]
 
 DAY = {"gain": 0.0075, "loop": 0.04}
-"""Relative changes of gain and loop height from one day to another."""
+"""Standard deviation of the relative changes of gain and loop height from one day to another."""
 PRICE = 0.5
-"""What such a change costs in V beside another change."""
+"""Cost in V of such a change of gain or loop height in addition to another change."""
 SHORTEST, LONGEST = 0.02, 100.0
-"""Delays that are looked for [samples]."""
+"""Range of delays in the search [samples]."""
 SHOWN = 0.3
-"""Share of what a change explains that has to remain when a part of the records is left out."""
+"""Smallest share of the explained residual that must remain when a part of the records is left out."""
 AROUND = 0.2
-"""Part of a size, or of a sample, within which it is looked for again without some of the pieces."""
+"""Range of the repeated search without some of the pieces, relative to the size or to one sample."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Account:
-    """One explanation: its cost and its numbers, in the order of `names`."""
+    """One explanation: its cost and its parameters, in the order of `names`."""
 
     key: str
     cost: float
@@ -60,13 +60,13 @@ class ChangeSearch:
     Parameters
     ----------
     model : Model
-        Given.
+        The given model.
     records : sequence of Record
-        In order.
+        Records in order.
     used : sequence of int
-        Records that count.
+        Indices of the records to explain.
     floors : sequence of float
-        Floor of every record, the known error of the model included [m].
+        Floor of every record, including the known error of the model [m].
     """
 
     def __init__(self, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> None:
@@ -77,7 +77,7 @@ class ChangeSearch:
         self.origins = np.concatenate([np.full(records[i].size, i) for i in self.used])
 
     def _weights(self, records: Sequence[Record], floors: Sequence[float]) -> tuple[Array, NDArray[np.int64]]:
-        """Root of the weight of every sample that counts, and the piece it belongs to."""
+        """Square root of the weight of every used sample, and the number of its piece."""
         roots, labels = [], []
         pieces = pieces_of(records, self.used)
         for number, piece in enumerate(p for p in pieces if p.origin in self.used):
@@ -93,7 +93,7 @@ class ChangeSearch:
         return np.concatenate([signals[i] for i in self.used])
 
     def _columns(self, key: str, size: float, names: Sequence[str]) -> tuple[Array, Array]:
-        """Changed prediction of all samples that count, and the columns `names` changed alike."""
+        """Changed prediction of all used samples, and the columns `names` with the same change."""
         shape = SHAPES.get(key)
 
         def changed(p: ChangeablePrediction, signal: Array, before: float) -> Array:
@@ -112,9 +112,9 @@ class ChangeSearch:
     def account(
         self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: NDArray[np.bool_] | None = None
     ) -> Account:
-        """Least squares of the linear numbers beside a change of given size.
+        """Least squares for the linear parameters, with a change of given size.
 
-        Gain and loop height are priced by what days do, unless they are in `free`.
+        Gain and loop height have a penalty that corresponds to their change from day to day, unless they are in `free`.
         """
         names = (*self.sides, *(n for n in (KINDS[key].rows if key in KINDS else ())))
         y, columns = self._columns(key, size, names)
@@ -133,7 +133,7 @@ class ChangeSearch:
         return Account(key, float(left @ left + price @ theta**2), size, theta, names)
 
     def session(self, account: Account) -> dict[str, float]:
-        """Relative changes of gain and loop height of an account, as they act on the model."""
+        """Relative changes of gain and loop height in an account."""
         own = dict(zip(account.names, account.theta.tolist(), strict=False))
         numbers = {n: own[n] for n in self.sides}
         numbers["gain"] -= self.loop_share * numbers.get("loop", 0.0)
@@ -165,7 +165,7 @@ class ChangeSearch:
         return self.account(key, float(found.x), free, mask)
 
     def best(self, key: str, mask: NDArray[np.bool_] | None = None, near: float | None = None) -> Account:
-        """The account of a change, its size in the unit of its kind."""
+        """The account of a change with its best size, in the unit of its kind."""
         if key in SHAPES:
             return self.shaped(key, mask, near)
         found = self.account(key, free=(key,), mask=mask)
@@ -174,9 +174,9 @@ class ChangeSearch:
         return Account(key, found.cost, sum(values[r] for r in rows), found.theta, found.names)
 
     def interval(self, best: Account) -> tuple[float, float]:
-        """95 % interval by leaving out groups of pieces, and by leaving out records: the larger of the two.
+        """95 % interval: the larger one of leaving out groups of pieces and leaving out records.
 
-        A part without which little is left of the change is not left out.
+        A part is not left out if little of the change remains without it.
         """
         numbers = np.unique(self.labels)
         groups = [g for g in np.array_split(numbers, min(6, numbers.size)) if g.size]

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`fit_groups`: the few numbers of the groups that moved, fitted to the last minute of a stream.
+"""`fit_groups`: fits the parameters of the changed groups to the last minute of a stream.
 
-The scores of the change watch are normal equations of the residual in the numbers of every group, with the scatter of
-an unchanged stage as weights. They are summed up from where the change most probably began, the model is changed, and
-is run over the minute again, until the numbers stay.
+The scores of the change watch are normal equations of the residual in the parameters of every group, with the scatter
+of an unchanged stage as weights. They are summed from the most probable onset of the change. Then the model is changed
+and simulates the minute again, until the parameters converge.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ from .moved_group import FULL, changed_by
 Array = NDArray[np.float64]
 
 FEWEST_SCORES = 20
-"""Scores after the onset from which a fit begins."""
+"""Smallest number of scores after the onset for a fit."""
 TURNS = 6
-"""Linearisations at most."""
+"""Largest number of linearisations."""
 SETTLED = 0.1
-"""Last step of a fit that has settled, in standard deviations."""
+"""Largest last step of a converged fit, in standard deviations."""
 TRANSIENT = 0.1
-"""Share of the time since a change within which a loop takes its new shape; not fitted."""
+"""Share of the time since a change that is not fitted, because the loop takes its new shape in it."""
 EXCESS = 1.3
-"""RMS residual after the fit, over that of the baseline, from which the model is no longer good enough."""
+"""Ratio of the RMS residual after the fit to that of the baseline from which the model is not accepted."""
 APART = 0.05
-"""Share of a group's weight that must remain beside the fitted groups, so that it can be told from them."""
+"""Share of a group's weight that must remain after projection on the fitted groups, so that it can be distinguished."""
 SURE = 1.96
 """Half a 95 % interval, in standard deviations."""
 
@@ -60,22 +60,22 @@ _OFFSET = GROUPS.index("offset")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GroupFit:
-    """A model with newly fitted numbers.
+    """A model with newly fitted parameters.
 
     Parameters
     ----------
     model : Model
-        The new one.
+        The new model.
     offset : float
         Sensor minus new model [m].
     groups : tuple of str
-        What was fitted, the offset besides.
+        Groups that were fitted in addition to the offset.
     change, deviation : (5,) ndarray
         Change of every group and its standard deviation, in the order and units of the watch; 0 where not fitted.
     before, after, floor : float
         RMS residual about its mean: with the old model, with the new one, and in the baseline [m].
     duration : float
-        Time of the samples that were fitted [s].
+        Duration of the fitted samples [s].
     """
 
     model: Model
@@ -90,30 +90,30 @@ class GroupFit:
 
 
 def fit_groups(model: Model, minute: Minute, baseline: Baseline, group: str, interval: float) -> GroupFit:
-    """Fit the numbers of a group, and of another one that still differs then.
+    """Fit the parameters of a group, and of a second group if it still differs afterwards.
 
     Parameters
     ----------
     model : Model
-        The running one.
+        The running model.
     minute : Minute
-        What was driven and measured.
+        Drive and measurement.
     baseline : Baseline
-        Of the running model.
+        Baseline of the running model.
     group : str
-        The group that moved: `group_to_fit`.
+        The changed group, from `group_to_fit`.
     interval : float
         Wanted mean time between false alarms of the watch [s].
 
     Returns
     -------
     GroupFit
-        Its residual is back at that of the baseline.
+        A fit whose residual is that of the baseline.
 
     Raises
     ------
     IdentificationError
-        If a few numbers do not explain the change, with what will do instead.
+        If these parameters do not explain the change; the message proposes what to do.
     """
     fit = _Fit(model, minute, baseline, group, interval)
     groups: tuple[str, ...] = (group,)
@@ -139,7 +139,7 @@ class _Fitted:
 
 
 class _Fit:
-    """Scores of the minute under any model, and least squares of them."""
+    """Scores of the minute with any model, and their least-squares solution."""
 
     def __init__(self, model: Model, minute: Minute, baseline: Baseline, group: str, interval: float) -> None:
         self._model, self._minute, self._baseline = model, minute, baseline
@@ -162,7 +162,7 @@ class _Fit:
         )
 
     def of(self, groups: Sequence[str]) -> _Fitted:
-        """The model with the numbers of some groups at their best."""
+        """The model with the fitted parameters of some groups."""
         free = sorted({GROUPS.index(g) for g in groups} | {_OFFSET})
         hidden = [GROUPS[k] for k in free if not self._main.excited[k]]
         if hidden:
@@ -184,7 +184,7 @@ class _Fit:
         return _Fitted(model, change, deviation, scores, self._remaining(scores, free))
 
     def checked(self, groups: tuple[str, ...], found: _Fitted) -> GroupFit:
-        """A fit whose residual is that of the baseline, and whose numbers differ from the old ones."""
+        """The fit, if its residual is that of the baseline and its parameters have changed significantly."""
         before, after = (float(np.sqrt(residual_power(s))) for s in (self._before, found.scores))
         floor = float(np.sqrt(np.mean([self._scatter(s).power for s in self._before])))
         names = " and ".join(groups)
@@ -236,12 +236,12 @@ class _Fit:
         return name
 
     def _scores(self, model: Model, offset: float) -> list[ChangeScore]:
-        """Scores since the change, of the classes of drive that the baseline knows."""
+        """Scores since the change, for the classes of drive that the baseline contains."""
         every = self._minute.scores(model, offset)
         return [s for s in every if drive_class(s) in self._baseline.scatter][self._begun :]
 
     def _onset(self, scores: Sequence[ChangeScore], group: str) -> int:
-        """The score with which a step of a group, and of the offset, most probably began."""
+        """Index of the score at which a step of a group, and of the offset, most probably began."""
         free = sorted({GROUPS.index(group), _OFFSET})
         gram, gradient = np.zeros((len(GROUPS), len(GROUPS))), np.zeros(len(GROUPS))
         best, begun = -np.inf, len(scores)

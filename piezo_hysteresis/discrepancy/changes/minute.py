@@ -30,21 +30,21 @@ from ...online.warmup import chain_at
 Array = NDArray[np.float64]
 
 _PIECE = 8192
-"""Samples that are dealt with together."""
+"""Number of samples that are processed together."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Minute:
-    """The last samples of a stream, and what was driven before.
+    """The last samples of a stream, and the drive before them.
 
     Parameters
     ----------
     drive : DriveHistory
-        Up to the newest sample.
+        Drive up to the newest sample.
     displacement : (k,) ndarray
-        Measured in the last k samples of the drive [m].
+        Displacement measured in the last k samples of the drive [m].
     offset : float
-        Sensor minus model at present [m].
+        Present offset, sensor minus model [m].
     """
 
     drive: DriveHistory
@@ -52,9 +52,9 @@ class Minute:
     offset: float
 
     def scores(self, model: Model, offset: float) -> list[ChangeScore]:
-        """Scores of the samples under a model that is `offset` [m] away from the sensor.
+        """Scores of the samples with a model, where sensor minus model is `offset` [m].
 
-        A drive begins where the stage left its rest; samples from before say nothing.
+        Samples before the stage leaves its rest are not used.
         """
         drive, loop = self.drive, loop_heights(model)
         displacement = self.displacement[max(0, self.displacement.size - drive.full.size) :]
@@ -71,7 +71,7 @@ class Minute:
 def _brought_up(
     model: Model, drive: DriveHistory, first: int, loop: dict[str, float]
 ) -> tuple[Chain, ChainState, ChainTangent]:
-    """Chain, state and sensitivities of a model before sample `first` of the full part of a drive."""
+    """Chain, state and sensitivities of a model before sample `first` of the part of the drive stored in full."""
     fast = chain_at(model, drive.sample_period)
     chain = model.at(drive.slow_period) if drive.slow.size else fast
     state = chain.rest(drive.rest_voltage, drive.start_time)

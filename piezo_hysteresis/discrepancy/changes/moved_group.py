@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Groups of the change watch as numbers of a model: which one a recalibration begins with, and the changed model."""
+"""Groups of the change watch as parameters of a model: the group that is recalibrated first, and the changed model."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from .signatures import shaped_model
 
 Array = NDArray[np.float64]
 
-FULL = "only a full identification will do"
-"""Said where a few numbers will not do."""
+FULL = "identify the stage again"
+"""Advice if the parameters of the groups are not sufficient."""
 
 
 def group_to_fit(groups: Sequence[str]) -> str:
-    """The group that a recalibration begins with.
+    """The group that is recalibrated first.
 
     Parameters
     ----------
@@ -44,19 +44,19 @@ def group_to_fit(groups: Sequence[str]) -> str:
     Raises
     ------
     IdentificationError
-        If there is none, or it is not known which one.
+        If there is no group, or if the drive does not determine which group has changed.
     """
     if not groups:
         raise IdentificationError("no group of parameters is known to have changed; nothing to recalibrate")
     if set(groups) == {"slow", "offset"}:
-        return "offset"  # should it go on, the watch reports it again
+        return "offset"  # if the change continues, the watch reports it again
     if len(groups) > 1:
         raise IdentificationError(
             f"the present drive cannot distinguish {' and '.join(groups)}; drive the stage at another frequency too, "
             f"or {FULL}"
         )
     if groups[0] == "slow":
-        raise IdentificationError(f"a slow change has no number of its own in the model; {FULL}")
+        raise IdentificationError(f"the model has no parameter for a slow change; {FULL}")
     return groups[0]
 
 
@@ -66,14 +66,15 @@ def changed_by(model: Model, change: Array) -> Model:
     Parameters
     ----------
     model : Model
-        Before the change.
+        The model before the change.
     change : (5,) ndarray
-        In the order of the groups of the watch; slow and offset are no numbers of a model.
+        Changes in the order of the groups of the watch; slow and offset are not used, because the model has no
+        parameters for them.
 
     Raises
     ------
     ParameterError
-        If a number leaves its bounds.
+        If a parameter leaves its bounds.
     """
     gain, loop, lag, *_ = change.tolist()
     if loop:

@@ -14,9 +14,9 @@
 
 """`find_change`: which parameter of a given model has changed since it was identified, and by how much.
 
-Gain and loop height differ a little from day to day. They may move beside every change, at a price that grows with the
-square of the distance, and are named where they moved farther. A change is named when it explains what such a day
-leaves, and no other explains as much.
+Gain and loop height differ a little from day to day. They are fitted together with every change, with a quadratic
+penalty, and are named themselves if they changed by more. A change is named if it explains the residual that these
+small changes leave, and if no other change explains as much.
 """
 
 from __future__ import annotations
@@ -37,45 +37,45 @@ from .signatures import SHAPES, shaped_model
 Array = NDArray[np.float64]
 
 EXPLAINS = 0.7
-"""Share of V that a change may leave beside gain, loop height and zero."""
+"""Largest share of V that a change may leave, relative to V with fitted gain, loop height and zero."""
 NEARLY_ALL = 0.08
-"""Share of V that a change may leave where it leaves more than `LEAVES`."""
+"""Largest share of V that a change may leave if V remains above `LEAVES`."""
 SEEN = 0.7
-"""Size of a change, RMS in floors, from which it is reported."""
+"""Smallest size of a reported change, RMS in floors."""
 RIVAL = 1.15
-"""Ratio of V up to which another change explains as much."""
+"""Largest ratio of V for which another change counts as explaining as much."""
 GAIN, LOOP = 0.015, 0.08
-"""Relative changes of gain and loop height beyond what days do."""
+"""Relative changes of gain and loop height that are larger than from day to day."""
 MOVED = (0.9, 0.95, 0.98, 1.02, 1.05, 1.1)
-"""Shares of its frequency at which the search for a resonance that has moved begins."""
+"""Start values of the search for a shifted resonance, relative to its frequency."""
 TURNS = 4
-"""Linearisations of that search."""
+"""Number of linearisations of that search."""
 UNCERTAIN = 0.6
-"""Error of the given model that may look like the change, in floors of the records."""
+"""Error of the given model that can resemble a change, in floors of the records."""
 SURE = 2.5
-"""Standard errors by which a change must differ from none."""
+"""Smallest significant change, in standard errors."""
 
 
 def find_change(
     model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
 ) -> ParameterChange | None:
-    """The change of one parameter that explains what a model leaves of records.
+    """The change of one parameter that explains the residual of a given model.
 
     Parameters
     ----------
     model : Model
-        Identified before the change.
+        Model identified before the change.
     records : sequence of Record
-        Taken after it, in order.
+        Records after the change, in order.
     used : sequence of int
-        Indices of those that count.
+        Indices of the records to explain.
     floors : sequence of float
-        Floor of every record [m], the error that the model is known to have included.
+        Floor of every record [m], including the known error of the model.
 
     Returns
     -------
     ParameterChange or None
-        None where nothing changed, or nothing that has a name here.
+        None if nothing changed, or if none of the known changes explains the residual.
     """
     search = ChangeSearch(model, records, used, floors)
     day = search.account("none")
@@ -103,7 +103,7 @@ def find_change(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Explanation:
-    """An account, and the search about whose model it is linear."""
+    """An account, and the search with the model around which it is linearised."""
 
     search: ChangeSearch
     account: Account
@@ -115,7 +115,7 @@ class _Explanation:
         return self.moved + self.account.size
 
     def interval(self, before: float) -> tuple[float, float]:
-        """95 % interval of the size; V was `before` without the change."""
+        """95 % interval of the size; `before` is V without the change."""
         low, high = self.search.interval(self.account)
         alike = UNCERTAIN * abs(self.size) / float(np.sqrt(max(before - self.account.cost, 1e-12)))
         half = float(np.hypot(0.5 * (high - low), alike))
@@ -125,10 +125,10 @@ class _Explanation:
 def _simulated(
     found: _Explanation, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
 ) -> _Explanation:
-    """A delay or a filter with what it leaves when the model simulates it.
+    """A delay or a filter, with the residual that remains when the model simulates it.
 
-    An interpolated prediction leaves more where a stage rings between few samples. Its size is the surer one: the model
-    interpolates too, and its delay was fitted with what that does.
+    An interpolated prediction leaves a larger residual if a stage rings within a few samples. Its size is more certain,
+    because the delay of the model was fitted with the same interpolation.
     """
     key, size = found.account.key, found.account.size
     if key not in SHAPES or size < 0.0:
@@ -142,7 +142,7 @@ def _simulated(
 def _moved_resonance(
     model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
 ) -> _Explanation:
-    """The resonance at another frequency: linear only next to where it is, so that the search goes there."""
+    """The resonance at another frequency. The change is linear only near the solution, so the search iterates."""
     name = f"{ExtraResonance.name}.f0"
     before = model.values()[name]
     lowest, highest = 0.5 * before, 2.0 * before

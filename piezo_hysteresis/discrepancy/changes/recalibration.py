@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`recalibrate`: an old model of the same stage made to fit a new record, by gain, offset, loop height and lag only.
+"""`recalibrate`: fits an old model of the same stage to new records, by gain, offset, loop height and lag only.
 
-Records of one stage differ by half a per cent from one day to another. A model of many records, taken over with these
-four numbers, predicts more than a new model of the one new record would.
+Records of one stage differ by about 0.5 % from one day to another. A model of many records with these four new numbers
+predicts more than a new model of one new record.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ class Recalibration:
     Parameters
     ----------
     model : Model
-        The new one; the old one where nothing is gained.
+        The new model; the old one if the error does not become smaller.
     gain, loop_height : float
-        Relative changes [1]; 0 where the model has no loop.
+        Relative changes [1]; 0 if the model has no loop.
     lag : float
         Change of the lag [s].
     offset : float
         Reading at zero displacement [m].
     before, after : float
-        Free-run error, one zero for each record [% of range].
+        Free-run error with the zero fitted in every record [% of range].
     """
 
     model: Model
@@ -69,14 +69,14 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     Parameters
     ----------
     model : Model
-        Identified earlier from the same stage.
+        Model identified earlier from the same stage.
     experiment : Experiment
         New records.
 
     Returns
     -------
     Recalibration
-        New model and the four numbers.
+        New model and the four changes.
 
     Raises
     ------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Recalibrations`: what was recalibrated on a stage and when, as a table that grows in a file."""
+"""`Recalibrations`: the recalibrations of a stage, as a table in a file."""
 
 from __future__ import annotations
 
@@ -36,23 +36,22 @@ FILE = "recalibrations.csv"
 
 @dataclass(frozen=True, slots=True)
 class RecalibratedNumber:
-    """One number of a model that was fitted anew: one line of the history.
+    """One recalibrated parameter of a model: one line of the history.
 
     Parameters
     ----------
     time : str
-        When the model was changed, ISO 8601, UTC.
+        Time at which the model was changed, ISO 8601, UTC.
     group, parameter, unit : str
-        Group of the change watch, name of the number and its unit.
+        Group of the change watch, name of the parameter and its unit.
     old, new, low, high : float
-        Value before and after, and the 95 % interval of the one after.
+        Value before and after, and the 95 % interval of the new value.
     statistic : float
-        Of the change watch, over its threshold, when it was asked for.
+        Statistic of the change watch over its threshold, at the request.
     residual_before, residual_after, residual_baseline : float
-        RMS residual about its mean: on the samples fitted with the old model and with the new one, and in the
-        baseline [m].
+        RMS residual about its mean [m]: of the fitted samples with the old and the new model, and in the baseline.
     duration : float
-        Time of the samples fitted [s].
+        Duration of the fitted samples [s].
     model_before, model_after : str
         Hashes of the models.
     """
@@ -75,7 +74,7 @@ class RecalibratedNumber:
 
 
 _TEXTS = ("time", "group", "parameter", "unit", "model_before", "model_after")
-"""Columns that are no numbers."""
+"""Columns that contain text."""
 _COLUMNS = tuple(field.name for field in fields(RecalibratedNumber))
 """All columns, in order."""
 
@@ -83,22 +82,22 @@ _COLUMNS = tuple(field.name for field in fields(RecalibratedNumber))
 def numbers_of(
     model: Model, old_offset: float, fit: GroupFit, time: str, statistic: float, hashes: tuple[str, str]
 ) -> tuple[RecalibratedNumber, ...]:
-    """The numbers that a fit has changed.
+    """The parameters that a fit has changed.
 
     Parameters
     ----------
     model : Model
-        Before the fit.
+        Model before the fit.
     old_offset : float
         Sensor minus that model [m].
     fit : GroupFit
-        What was fitted.
+        Result of the fit.
     time : str
-        ISO 8601, UTC.
+        Time of the change, ISO 8601, UTC.
     statistic : float
-        Of the change watch.
+        Statistic of the change watch over its threshold.
     hashes : (str, str)
-        Of the model before and after.
+        Hashes of the model before and after.
     """
     found = []
     for group in fit.groups:
@@ -116,7 +115,7 @@ def numbers_of(
 
 
 def _number(model: Model, group: str, offset: float) -> tuple[str, str, float, float]:
-    """Name, unit and value of the number that stands for a group, and its change per change of the group."""
+    """Name, unit and value of the parameter that represents a group, and its change per unit change of the group."""
     if group == "gain":
         return "displacement_scale", "m", model.displacement_scale, model.displacement_scale
     if group == "loop":
@@ -148,14 +147,14 @@ def read_numbers(text: str, source: str) -> tuple[RecalibratedNumber, ...]:
     Parameters
     ----------
     text : str
-        As `write_numbers` made it.
+        Output of `write_numbers`.
     source : str
-        Where it comes from, for messages.
+        Origin of the text, for messages.
 
     Raises
     ------
     RecordingError
-        If it is no such table.
+        If the text is not such a table.
     """
     lines = list(csv.reader(io.StringIO(text)))
     if not lines or tuple(lines[0]) != _COLUMNS:
@@ -182,17 +181,17 @@ class Recalibrations:
     Parameters
     ----------
     folder : Path
-        Where the file is, or will be.
+        Folder of the file, which need not exist yet.
 
     Attributes
     ----------
     numbers : tuple of RecalibratedNumber
-        The oldest first.
+        Oldest first.
 
     Raises
     ------
     RecordingError
-        If there is a file that is no history.
+        If the file exists and is not a history.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -204,12 +203,12 @@ class Recalibrations:
         self.numbers = read_numbers(text, str(self.path))
 
     def add(self, numbers: Sequence[RecalibratedNumber]) -> None:
-        """Add numbers and write the file, whole or not at all.
+        """Add numbers and write the file atomically.
 
         Raises
         ------
         RecordingError
-            If the file cannot be written; the numbers are known all the same.
+            If the file cannot be written; `numbers` contains the new numbers nevertheless.
         """
         self.numbers += tuple(numbers)
         partial = self.path.with_suffix(".partial")

@@ -42,16 +42,16 @@ UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
 def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Diagnosis | None:
-    """Name the parameter that has changed since `model` was identified; None where none explains the records.
+    """Name the parameter that has changed since `model` was identified; None if no change explains the records.
 
     Parameters
     ----------
     experiment : Experiment
-        Taken after the change.
+        Experiment after the change.
     model : Model
-        Identified before it, from other data.
+        Model identified before the change, from other data.
     used : sequence of int
-        Indices of the records that count.
+        Indices of the records to explain.
     """
     records = experiment.records
     if model.provenance.get(HASH) == data_hash(experiment) or not used:
@@ -106,12 +106,12 @@ def sentence_of(change: ParameterChange) -> str:
     words = kind.words.format(how="later" if change.size > 0.0 else "earlier", size=size)
     rivals = ", ".join(KINDS[r].name for r in change.rivals)
     alike = f"; {rivals} explains as much" if rivals else ""
-    left = "" if change.after < LEAVES else " More is left than the known error of the model: the form is not certain."
+    left = "" if change.after < LEAVES else " The remaining error is above the known error: the form is not certain."
     return f"The stage is the same, but {words}: {kind.name} ({kind.family}){alike}.{left}"
 
 
 def changed_model(model: Model, change: ParameterChange, records: Sequence[Record]) -> Model:
-    """The given model with the change, and with gain and loop height of the day."""
+    """The given model with the change, and with the new gain and loop height."""
     values = model.values()
     gain, loop = change.session.get("gain", 0.0), change.session.get("loop", 0.0)
     numbers = {n: v * (1.0 + loop) for n, v in loop_numbers(model).items()} if loop else {}
@@ -125,7 +125,7 @@ def changed_model(model: Model, change: ParameterChange, records: Sequence[Recor
         tau = max(1.0, DRIFT_TIME * longest)
         model = model.with_effect(ThermalDrift(D=-change.size / float(np.expm1(-longest / tau)), tau=tau))
     elif change.kind.name == Softening.name:
-        # the cube of the displacement, by the cube of the drive
+        # the coefficient applies to the cube of the displacement, the fit used the cube of the drive
         span = stroke(records)
         cubic = next((n for n in model.hysteresis.linear_numbers() if n == "p1"), None)
         if cubic is not None:

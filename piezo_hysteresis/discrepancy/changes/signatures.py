@@ -45,21 +45,21 @@ from ...record import Record
 Array = NDArray[np.float64]
 
 DRIFT_TIME = 3.0
-"""Time constant of a drift, times the longest record: within it a stage drifts almost evenly."""
+"""Time constant of a drift over the length of the longest record: the drift within a record is almost linear."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ChangeablePrediction:
-    """A model's prediction of one record, and its slopes.
+    """Prediction of one record by a model, and its derivatives.
 
     Parameters
     ----------
     record : Record
-        What was measured.
+        The measured record.
     y : (n,) ndarray
-        Displacement that the model predicts, without the zero of its sensor [m].
+        Predicted displacement without the zero of the sensor [m].
     before : float
-        The same before the first sample [m].
+        Predicted displacement before the first sample [m].
     rows : mapping of str to (n,) ndarray
         Change of y per unit of every linear change [m].
     """
@@ -71,14 +71,14 @@ class ChangeablePrediction:
 
 
 def loop_numbers(model: Model) -> dict[str, float]:
-    """Numbers that together are the height of the loop, with their values."""
+    """Parameters that together determine the height of the loop, with their values."""
     values = model.values()
     names = [f"{effect.name}.{number}" for effect in model.effects for number in effect.loop_numbers()]
     return {name: values[name] for name in names if values[name]}
 
 
 def creep_numbers(model: Model) -> dict[str, float]:
-    """Numbers that together are the rate of the creep, with their values."""
+    """Parameters that together determine the rate of creep, with their values."""
     values = model.values()
     names = [f"{e.name}.gamma" for e in (Creep, CreepFractional)]
     names += [f"{CreepTwoRates.name}.{n}" for n in ("gamma_fast", "gamma_slow")]
@@ -86,9 +86,9 @@ def creep_numbers(model: Model) -> dict[str, float]:
 
 
 def predictions(model: Model, records: Sequence[Record]) -> tuple[list[ChangeablePrediction], float]:
-    """Free run of every record with its slopes by the linear changes, and the share of the loop in the displacement.
+    """Free run of every record with its derivatives by the linear changes; share of the loop in the displacement.
 
-    A change of the loop height leaves the gain as it is: that share of the displacement is taken back.
+    A change of the loop height does not change the gain, because that share of the displacement is subtracted.
     The changes are ``gain``, ``loop`` and ``creep``, relative; ``resonance`` in Hz; ``softening`` per cube of the
     range; ``drift`` in m at the end of the longest record.
     """
@@ -127,7 +127,7 @@ def predictions(model: Model, records: Sequence[Record]) -> tuple[list[Changeabl
 
 
 def _loop_apart(found: Sequence[ChangeablePrediction]) -> float:
-    """Take from the slopes by the loop height what a gain does, and return the share."""
+    """Subtract the influence of a gain from the derivatives by the loop height, and return its share."""
     if "loop" not in found[0].rows:
         return 0.0
     moving = np.concatenate([p.y - p.y.mean() for p in found])
@@ -139,7 +139,7 @@ def _loop_apart(found: Sequence[ChangeablePrediction]) -> float:
 
 
 def settled(model: Model, voltage: float) -> float:
-    """Displacement of a stage that has been at `voltage` for long [m]."""
+    """Displacement of a stage that has been at `voltage` for a long time [m]."""
     chain, x = model.at(model.sample_period), voltage
     for block in chain.blocks:
         x = block.static(x)
@@ -147,13 +147,13 @@ def settled(model: Model, voltage: float) -> float:
 
 
 def delayed(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
-    """A signal of the record, `tau` later [s]; earlier where negative. It was `before` until the first sample."""
+    """A signal of the record, delayed by `tau` [s], which may be negative. It was `before` until the first sample."""
     samples = np.arange(signal.size)
     at = samples - tau / prediction.record.sample_period
     padded = np.concatenate(([before], signal))
     low = np.clip(np.floor(at).astype(int), -1, signal.size - 2)
     part = np.clip(at - low, 0.0, 1.0)
-    # cubic inside, so that a fast sine does not lose height between its samples
+    # cubic interpolation, so that a fast sine keeps its amplitude
     value = padded[low + 1] * (1.0 - part) + padded[low + 2] * part
     inner = (low >= 1) & (low < signal.size - 2)
     k, t = low[inner], part[inner]
@@ -169,7 +169,7 @@ def delayed(prediction: ChangeablePrediction, signal: Array, before: float, tau:
 
 
 def filtered(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
-    """A signal of the record behind one pole of time constant `tau` [s], linear between samples."""
+    """A signal of the record, filtered with one pole of time constant `tau` [s], linear between samples."""
     if tau <= 0.0:
         return signal
     x = prediction.record.sample_period / tau
@@ -182,7 +182,7 @@ def filtered(prediction: ChangeablePrediction, signal: Array, before: float, tau
 
 
 def filtered_twice(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
-    """A signal of the record behind a Butterworth filter of second order with time constant `tau` [s]."""
+    """A signal of the record, filtered with a second-order Butterworth filter of time constant `tau` [s]."""
     if tau <= 0.0:
         return signal
     period = prediction.record.sample_period
@@ -198,7 +198,7 @@ SHAPES: dict[str, Shaped] = {"delay": delayed, "low_pass": filtered, "low_pass_2
 
 
 def shaped_model(model: Model, key: str, size: float) -> Model:
-    """The model with a change of `SHAPES`: later by `size` [s], or behind a low-pass of that time constant [s]."""
+    """The model with a change of `SHAPES`: delayed by `size` [s], or with a low-pass of that time constant [s]."""
     for name, effect in (("low_pass", SensorBandwidth), ("low_pass_2", SecondOrderLowPass)):
         if key == name:
             present = model[effect.name]["tau"] if effect.name in model else 0.0

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Live diagnosis: which phase is played next, how likely every explanation is after it, and when it is enough."""
+"""Live diagnosis: which phase is played next, how likely every explanation is after it, and when it ends."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`LiveDiagnosis`: after every tier it updates what is likely, and either stops or says what is played next."""
+"""`LiveDiagnosis`: after every tier it updates the probabilities, and either ends or chooses the next phases."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ from .time_to_decide import Separation, best_drive
 from .update import End, Update, percent
 
 ERROR_RATE = 0.005
-"""Probability of a wrong answer that a user accepts, unless stated otherwise."""
+"""Default of the accepted probability of a wrong answer."""
 LONGEST = 600.0
-"""Stage time after which the answer is what it is [s]."""
+"""Default of the longest stage time [s]."""
 MOST_RIVALS = 3
-"""Rivals between which a drive is chosen; with more of them the fixed order goes on."""
+"""Largest number of rivals for which a drive is chosen; with more rivals the fixed order continues."""
 
 
 MOST_CHOSEN = 4
-"""Drives that are chosen one after the other at most; expected to decide and not doing so, the prediction is wrong."""
+"""Largest number of consecutive chosen drives. If none of them decides, the prediction of their outcome is wrong."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,41 +53,41 @@ class LiveDiagnosis:
     Parameters
     ----------
     limits : DriveLimits
-        Of the stage; every phase stays inside them.
+        Limits of the stage; every phase stays inside them.
     plan : tuple of Tier
-        The fixed order, cheap tiers first.
+        The fixed order, short tiers first.
     error_rate : float
-        Probability of a wrong answer that is accepted, between 0 and 0.5.
+        Accepted probability of a wrong answer, between 0 and 0.5.
     longest : float
-        Stage time that may be used [s].
+        Longest stage time [s].
     seed : int
-        Of everything random in the phases.
+        Seed of the random waveforms.
     explicit_step : bool
         As for `diagnose`.
     effects : tuple of Effect classes
-        The library to choose from.
+        Effects to choose from.
     chooses : bool
-        Whether drives are chosen where rivals are left; else the fixed order goes on.
+        Whether drives are chosen to separate rivals; otherwise the fixed order continues.
     due : tuple of ProtocolPhase
-        To be played next; empty at the end.
+        Phases to play next; empty at the end.
     due_name : str
-        What they are, in a few words.
+        Short description of these phases.
     tier : int
         Number of tiers that were played or are due.
     chosen : int
-        Number of drives that were chosen one after the other since the last tier.
+        Number of consecutive drives that were chosen since the last tier.
     time : float
         Stage time so far [s].
     updates : tuple of Update
-        After every decision.
+        Probabilities after every decision.
     found : Diagnosis or None
         The last diagnosis.
     separation : Separation or None
-        What the best drive would tell about rivals, where that was asked last.
+        Expected separation of the rivals by the best drive, at the last choice.
     untested : tuple of str
         Public names of the effects that the phases so far could not show.
     end : End or None
-        Why it has ended; None while it goes on.
+        Reason of the end; None before the end.
     """
 
     limits: DriveLimits
@@ -117,7 +117,7 @@ class LiveDiagnosis:
         experiment : Experiment
             Everything recorded so far.
         progress : callable, optional
-            Called with a word and the fraction done.
+            Called with a message and the fraction done.
 
         Raises
         ------
@@ -149,7 +149,7 @@ class LiveDiagnosis:
         return self.found.verdict is Verdict.NAMED and " + ".join(self.found.names) == update.likeliest
 
     def reason(self) -> str:
-        """Why it ended, in one sentence."""
+        """Reason of the end, in one sentence."""
         update = self.updates[-1]
         likeliest = update.likeliest.replace("_", " ")
         share = percent(update.probabilities[update.likeliest])
@@ -157,10 +157,10 @@ class LiveDiagnosis:
             return f"Stopped after {update.time:.1f} s: {likeliest} has a probability of {share}."
         if self.end is End.UNDECIDABLE and self.separation is not None:
             return f"Undecidable within the limits and {self.longest:g} s of stage time. {self.separation.sentence()}"
-        return f"Everything was played ({update.time:.1f} s), and no explanation is sure: {update.sentence()}."
+        return f"All phases were played ({update.time:.1f} s), and no explanation is certain: {update.sentence()}."
 
     def answer(self) -> dict[str, Any]:
-        """For machines: the part ``live`` of ``answer.json``."""
+        """The part ``live`` of ``answer.json``."""
         return {
             "end": None if self.end is None else str(self.end),
             "reason": self.reason(),
@@ -183,12 +183,12 @@ class LiveDiagnosis:
         }
 
     def _left(self) -> tuple[Tier, ...]:
-        """Tiers that were not played and fit into the time."""
+        """Tiers that were not played yet and fit into the remaining time."""
         left = self.plan[self.tier :]
         return left if left and left[0].duration <= self.longest - self.time else ()
 
     def _untested_by(self, found: Diagnosis, time: float) -> tuple[str, ...]:
-        """Effects that only phases still to come can show."""
+        """Effects that only later phases can show."""
         left = [phase for tier in self.plan[self.tier :] for phase in tier.phases]
         if not left:
             return ()

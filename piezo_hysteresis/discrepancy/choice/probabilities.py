@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How likely every explanation is: each candidate, nothing, and none of these. They sum to one.
+"""Probability of every explanation: each candidate, "nothing", and "none of these". They sum to one.
 
-The evidence is the likelihood of records that were left out of the fit (criterion C of docs/gap.md). What one record
-contributes is limited, so that no record decides alone.
+The evidence is the likelihood of records that were left out of the fit (criterion C of docs/gap.md). The contribution
+of each record is limited, so that no single record decides.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from ..verdict import FAR, NAMED, NAMED_FAR
 Array = NDArray[np.float64]
 
 NOTHING, NONE_OF_THESE = "nothing", "none of these"
-"""The two explanations that are no effect of the catalogue."""
+"""The two explanations that are not effects of the catalogue."""
 PRIOR_NOTHING, PRIOR_NONE = 0.4, 0.1
-"""Probability before any data that nothing is missing, and that what is missing is not in the catalogue."""
+"""Prior probabilities that nothing is missing, and that the missing effect is not in the catalogue."""
 ONE_RECORD = 4.0
-"""Most that one record adds to the log-odds of two explanations: at an error rate of 0.5 % no record decides alone."""
+"""Largest contribution of one record to the log-odds of two explanations: no record reaches an error rate of 0.5 %."""
 
 
 def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collection[str] = ()) -> dict[str, float]:
@@ -48,16 +48,17 @@ def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collecti
     Parameters
     ----------
     found : Diagnosis
-        Of the records so far.
+        Diagnosis of the records so far.
     effects : collection of str
-        Public names of the catalogue.
+        Public names of the effects in the catalogue.
     unplayed : collection of str
-        Effects that the phases so far could not show: they stay as likely as before where nothing is seen.
+        Effects that the phases so far could not show; they keep their prior probability if nothing is missing.
 
     Returns
     -------
     dict of str to float
-        Several effects together are one explanation, ``"creep + backlash"``. The values sum to one.
+        Probability by explanation; they sum to one. Several effects together are one explanation, e.g.
+        ``"creep + backlash"``.
     """
     prior = {NOTHING: PRIOR_NOTHING, NONE_OF_THESE: PRIOR_NONE}
     prior |= dict.fromkeys(sorted(effects), (1.0 - PRIOR_NOTHING - PRIOR_NONE) / max(len(effects), 1))
@@ -92,14 +93,14 @@ def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collecti
 
 
 def turn_probabilities(step: Step, prior: Mapping[str, float], null: float) -> dict[str, float]:
-    """Probability of every explanation in one turn of the search.
+    """Probability of every explanation in one step of the search.
 
     Parameters
     ----------
     step : Step
-        The turn, with every candidate that was tried.
+        The step, with every candidate that was tried.
     prior : mapping of str to float
-        Before the data; the candidates and the two others.
+        Prior probabilities of the candidates and of the two other explanations.
     null : float
         V of a perfect model.
     """
@@ -121,13 +122,13 @@ def turn_probabilities(step: Step, prior: Mapping[str, float], null: float) -> d
 
 
 def log_odds(best: Score, other: Score) -> float:
-    """Log-odds of the records for the first of two explanations, Σ min(4, m/2 (C_other − C_best)) over the records."""
+    """Log-odds of the first explanation against the second, Σ min(4, m/2 (C_other − C_best)) over the records."""
     leads = 0.5 * PIECES * (other.logs - best.logs)
     return max(0.0, float(np.sum(np.clip(leads, -ONE_RECORD, ONE_RECORD))))
 
 
 def scatter_odds(best: Score, other: Score) -> float:
-    """Log-odds that the mean lead is no chance of which records were taken: Student's t, with records as units."""
+    """Log-odds that the mean lead is not due to the choice of records: Student's t, with records as units."""
     lead, error = best.better_than(other)
     if not np.isfinite(error):
         return 0.0
@@ -136,12 +137,12 @@ def scatter_odds(best: Score, other: Score) -> float:
 
 
 def tolerant(score: Score) -> Score:
-    """The model as it is, where an error up to the adequacy limit counts as none."""
+    """The score with errors up to the adequacy limit set to the floor."""
     return Score(score.ratios / np.sqrt(ADEQUATE), score.step)
 
 
 def part_explained(before: Score, null: float) -> Score:
-    """What a wrong name may explain by chance: the share of the gap from which an effect is named, in every record."""
+    """Score of a wrong explanation that fits by chance: in every record, the share of the gap needed for a name."""
     share = NAMED if before.excess <= FAR else NAMED_FAR
     gap = np.maximum(before.ratios**2 - null, 0.0)
     return Score(np.sqrt(null + (1.0 - share) ** 2 * gap), before.step)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Rivals: the fitted explanations that are too likely to be left out, and what is missing to decide between them."""
+"""Rivals: the fitted explanations that are too likely to be excluded, and the log-odds needed to separate them."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from .probabilities import NONE_OF_THESE, NOTHING
 
 
 def missing_log_odds(probabilities: Mapping[str, float], error_rate: float) -> float:
-    """Log-odds between the two likeliest explanations that are missing for a sure answer.
+    """Additional log-odds between the two likeliest explanations that a certain answer needs.
 
     Parameters
     ----------
     probabilities : mapping of str to float
-        Of every explanation.
+        Probability of every explanation.
     error_rate : float
-        Probability of a wrong answer that is accepted.
+        Accepted probability of a wrong answer.
 
     Examples
     --------
@@ -46,14 +46,14 @@ def missing_log_odds(probabilities: Mapping[str, float], error_rate: float) -> f
 
 
 def rivals_of(found: Diagnosis | None, probabilities: Mapping[str, float], error_rate: float) -> list[FittedCandidate]:
-    """The best fit of every effect in question, best first.
+    """The best fit of every effect that is still possible, best first.
 
-    Empty where "nothing" or "none of these" is in question too: no drive is chosen against what cannot be simulated.
+    Empty if "nothing" or "none of these" is possible too: these cannot be simulated, so no drive can be chosen.
 
     Parameters
     ----------
     found : Diagnosis or None
-        The last one.
+        The last diagnosis.
     probabilities, error_rate
         As for `missing_log_odds`.
     """

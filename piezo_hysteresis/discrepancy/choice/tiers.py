@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Tier`: phases that are played together before the next decision. `tiers` lists them, the cheap ones first."""
+"""`Tier`: phases that are played together before the next decision. `tiers` lists them, the short ones first."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from ...record import CONDITIONING
 SLOW, SLOWEST = 1e-3, 1e-2
 """Sample periods at which slow phases are stored [s]."""
 SLOW_FAMILIES = (Creep.family, GainDrift.family)
-"""Families that only long phases show."""
+"""Families of effects that only long phases show."""
 FAST_TIERS = 2
-"""Tiers after which every kind of fast drive was played: the others add only longer holds and repeats."""
+"""Number of tiers that contain every kind of fast drive; later tiers only add longer holds and repeats."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -40,9 +40,9 @@ class Tier:
     Parameters
     ----------
     name : str
-        What they show, in a few words.
+        Short description.
     phases : tuple of ProtocolPhase
-        In the order in which they are played.
+        Phases in the order in which they are played.
     """
 
     name: str
@@ -105,9 +105,9 @@ def tiers(limits: DriveLimits, seed: int = 0) -> tuple[Tier, ...]:
     Parameters
     ----------
     limits : DriveLimits
-        Clock and limits; every sample of every phase stays inside them.
+        Sample period and limits; every sample of every phase stays inside them.
     seed : int
-        Of everything random.
+        Seed of the random waveforms.
     """
     made = _Phases(limits, seed)
     corners = (0.0, 1.0, 0.0, *excitation.decaying_loops(0.5, 0.7, 12))
@@ -143,12 +143,12 @@ def tiers(limits: DriveLimits, seed: int = 0) -> tuple[Tier, ...]:
     made.rest(0.0, 3.0)
     made.triangle((1.0, 0.25))
     made.multisine(0.3)
-    fourth = Tier("long holds, and what was played before once more", made.taken())
+    fourth = Tier("long holds, and repetitions of earlier phases", made.taken())
     return first, second, third, fourth
 
 
 def spare_drives(limits: DriveLimits, seed: int = 0) -> tuple[ProtocolPhase, ...]:
-    """Further drives to choose from where rivals are left: longer, faster or larger than those of the tiers."""
+    """Further drives to separate rivals: longer, faster or larger than those of the tiers."""
     made = _Phases(limits, seed + 1000)
     made.staircase((0.0, 0.8, 0.2), 10.0)
     made.add("staircase", excitation.hold(limits, 0.8, 40.0), SLOWEST)
@@ -163,5 +163,5 @@ def spare_drives(limits: DriveLimits, seed: int = 0) -> tuple[ProtocolPhase, ...
 
 
 def whole_plan(limits: DriveLimits, seed: int = 0) -> Protocol:
-    """All tiers as one protocol: the most that is played unless rivals are left."""
+    """All tiers as one protocol: the longest one that is played if no rivals remain."""
     return Protocol("live diagnosis", limits, tuple(p for tier in tiers(limits, seed) for p in tier.phases))

@@ -30,12 +30,12 @@ from ..search.candidates import FittedCandidate
 from .probabilities import ONE_RECORD
 
 REPEATS = (1, 2, 4, 8)
-"""How often a drive may be repeated before the next decision."""
+"""Possible numbers of repeats of a drive before the next decision."""
 
 
 @dataclass(frozen=True, slots=True)
 class Separation:
-    """What the best drive within the limits would tell about two rivals.
+    """Expected separation of two rivals by the best drive within the limits.
 
     Parameters
     ----------
@@ -44,13 +44,13 @@ class Separation:
     drive : str
         Phase name of the drive.
     repeats : int
-        How often it is played.
+        Number of repeats.
     duration : float
         Stage time of all repeats [s].
     expected_z : float
         Expected separation in standard deviations, √(2 Λ) of the expected log-odds Λ.
     needed_z : float
-        The one that the error rate asks for, from what is known so far.
+        Separation that the accepted error rate still needs.
     """
 
     rivals: tuple[str, str]
@@ -66,7 +66,7 @@ class Separation:
         return self.expected_z >= self.needed_z
 
     def sentence(self) -> str:
-        """For the user."""
+        """The separation in one sentence."""
         names = " and ".join(name.replace("_", " ") for name in self.rivals)
         return (
             f"The best drive for {names} is '{self.drive}', played {self.repeats} times in {self.duration:.1f} s: "
@@ -75,15 +75,15 @@ class Separation:
 
 
 def z_of(log_odds: float) -> float:
-    """Separation in standard deviations that gives these log-odds on average: the mean log-odds of it are z²/2."""
+    """Separation z in standard deviations that gives these log-odds on average, z²/2."""
     return float(np.sqrt(2.0 * max(log_odds, 0.0)))
 
 
 def expected_log_odds(distance: float, excess: float, repeats: int) -> float:
     """Log-odds that a drive is expected to add.
 
-    Λ = r min(4, m/2 ln(1 + d²/V)): d² the mean squared distance of the rivals in floors², V = max(1, R²) the noise and
-    the form uncertainty in floors², r the number of repeats.
+    Λ = r min(4, m/2 ln(1 + d²/V)), with the mean squared difference d² of the rivals in floors², the noise and the form
+    uncertainty V = max(1, R²) in floors², and the number r of repeats.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def expected_log_odds(distance: float, excess: float, repeats: int) -> float:
     excess : float
         Mean R² of the better rival on the records so far.
     repeats : int
-        Records of the drive.
+        Number of repeats.
 
     Examples
     --------
@@ -110,21 +110,21 @@ def best_drive(
     missing: float,
     time_left: float,
 ) -> tuple[tuple[ProtocolPhase, ...], Separation] | None:
-    """The drive and its repeats with the shortest time to decide; None where no drive fits into the time.
+    """The drive and its repeats with the shortest time to decide; None if no drive fits into the time.
 
-    Every pair of rivals has to be decided, so that a drive counts by the pair that it separates least. Where no drive
-    decides, the one that separates most is returned, and its separation says so.
+    Every pair of rivals has to be separated, so a drive is judged by the pair that it separates least. If no drive
+    decides, the one with the largest separation is returned, and its `decides` is False.
 
     Parameters
     ----------
     rivals : sequence of FittedCandidate
-        Two or three, best first.
+        Two or three rivals, best first.
     drives : sequence of ProtocolPhase
-        To choose from, inside the limits.
+        Drives to choose from, inside the limits.
     missing : float
-        Log-odds that are still missing for the least decided pair.
+        Log-odds that the least separated pair still needs.
     time_left : float
-        Stage time [s].
+        Remaining stage time [s].
     """
     records = {str(k): _as_record(phase) for k, phase in enumerate(drives)}
     pairs = list(combinations(rivals, 2))
@@ -155,6 +155,6 @@ def best_drive(
 
 
 def _as_record(phase: ProtocolPhase) -> Record:
-    """The drive as it will be stored; what it will measure is not known yet."""
+    """The drive as it will be stored; the displacement is not known yet."""
     record = Record(phase.voltage, np.zeros(phase.voltage.size), phase.sample_period, phase.name)
     return record.decimate(phase.stored_every) if 1 < phase.stored_every <= record.size else record

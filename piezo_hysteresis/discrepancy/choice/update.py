@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Update`: what is likely after some phases. `End`: why a live diagnosis has ended."""
+"""`Update`: the probabilities after some phases. `End`: the reason why a live diagnosis has ended."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ class End(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Update:
-    """What is likely after some phases.
+    """Probabilities of the explanations after some phases.
 
     Parameters
     ----------
     time : float
         Stage time so far [s].
     played : str
-        What was played last.
+        Phases that were played last.
     probabilities : dict of str to float
-        By explanation, the likeliest first; they sum to one.
+        Probability by explanation, largest first; they sum to one.
     """
 
     time: float
@@ -52,13 +52,13 @@ class Update:
         return next(iter(self.probabilities))
 
     def sentence(self) -> str:
-        """For status lines: the three likeliest."""
+        """The three likeliest explanations, for status lines."""
         three = list(self.probabilities.items())[:3]
         return ", ".join(f"{name} {percent(p)}" for name, p in three)
 
 
 def percent(probability: float) -> str:
-    """A probability in %; one that is nearly 1 is not rounded up to it.
+    """A probability in %; a value near 1 is not rounded to 100 %.
 
     >>> percent(0.25), percent(0.99999)
     ('25.0 %', '> 99.9 %')

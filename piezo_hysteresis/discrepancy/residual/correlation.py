@@ -29,14 +29,14 @@ from ...errors import RecordError
 Array = NDArray[np.float64]
 
 FALSE_ALARMS = 0.01
-"""Chance that any lag of an independent residual lies beyond the bounds: they hold for all lags together."""
+"""Probability that any lag of an independent residual exceeds the bounds; it applies to all lags together."""
 
 LONGEST_MEMORY, SHARE_OF_MEMORY = 40, 20
-"""Highest order of the autoregression of the residual; it takes at most one part in so many of the samples."""
+"""Highest order of the autoregression of the residual, and smallest number of samples per coefficient."""
 FEWEST_INDEPENDENT = 20.0
-"""Effective number of samples below which the cross-correlation decides nothing."""
+"""Effective number of samples below which the cross-correlation is not tested."""
 PREDICTABLE = 1e-9
-"""Share of the residual's power below which its innovations are rounding: it is a sum of few sines."""
+"""Share of the residual's power below which its innovations are rounding errors: the residual is a sum of few sines."""
 
 CAPTION = (
     "The cross-correlation judges the model. If it exceeds its bounds, the residual depends on "
@@ -44,7 +44,7 @@ CAPTION = (
     "its bounds, the noise of the sensor may be coloured. For the cross-correlation, residual "
     "and drive pass the filter that makes the residual white."
 )
-"""How to read the test of whiteness."""
+"""Explanation of the test of whiteness."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -62,12 +62,12 @@ class Correlation:
     cross_lag : (2k + 1,) ndarray
         Lags of the cross-correlation [s]; positive where e follows u.
     cross : (2k + 1,) ndarray
-        Cross-correlation of e'(t + lag) with u'(t): both filtered by the autoregression that makes e white.
+        Cross-correlation of e'(t + lag) with u'(t), both filtered by the autoregression that makes e white.
     cross_bound : float
-        99 % bound for an e that does not depend on u, from the effective number of samples; below 1 wherever
-        `decides`.
+        99 % bound for an e that does not depend on u, from the effective number of samples; below 1 if `decides` is
+        True.
     effective_samples : float
-        Number of independent samples that know as much as the n that were taken, n/Σ ρ_e' ρ_u'.
+        Number of independent samples that contain the same information as the n samples, n/Σ ρ_e' ρ_u'.
     """
 
     lag: Array
@@ -80,17 +80,17 @@ class Correlation:
 
     @property
     def decides(self) -> bool:
-        """False where the drive holds too few frequencies, or the residual too little, for any conclusion."""
+        """False if the drive contains too few frequencies, or the residual is too small, for any conclusion."""
         return self.effective_samples >= FEWEST_INDEPENDENT
 
     @property
     def is_white(self) -> bool:
-        """True where no lag of the auto-correlation but 0 lies beyond the bound."""
+        """True if the auto-correlation exceeds its bound at lag 0 only."""
         return bool(np.all(np.abs(self.auto[1:]) <= self.auto_bound))
 
     @property
     def is_independent(self) -> bool:
-        """True where no lag of the cross-correlation lies beyond the bound."""
+        """True if the cross-correlation exceeds its bound at no lag."""
         return bool(np.all(np.abs(self.cross) <= self.cross_bound))
 
 
@@ -116,9 +116,10 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
     Notes
     -----
     Ljung, *System Identification*, 2nd ed., Sec. 16.6, with pre-whitening (Box and Jenkins, *Time Series Analysis*,
-    Sec. 11.2): a slow residual and a slow drive agree by chance, their innovations do not. The sum over the colours
-    that are left is taken over all lags, as the product of the two spectra (Bartlett). The bound is tanh(z/√(n' − 3))
-    (Fisher), z the normal quantile of 1 % shared by all lags (Bonferroni), n' the effective number of samples.
+    Sec. 11.2): a slow residual and a slow drive can correlate by chance, their innovations do not. The remaining
+    correlations enter as a sum over all lags, computed from the product of the two spectra (Bartlett). The bound is
+    tanh(z/√(n' − 3)) (Fisher), with the normal quantile z of 1 % divided among all lags (Bonferroni) and the effective
+    number n' of samples.
     """
     n = residual.size
     if n < 16:
@@ -152,14 +153,14 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
 
 
 def autoregression(auto: Array, size: int) -> Array:
-    """Filter (p + 1,) that makes a signal of the auto-correlation given (k,) white; its order by Schwarz's criterion.
+    """Filter (p + 1,) that whitens a signal with the given auto-correlation; Schwarz's criterion chooses the order.
 
     Parameters
     ----------
     auto : (k,) ndarray
         Auto-correlation from lag 0, normalised to 1.
     size : int
-        Number of samples it was taken from.
+        Number of samples from which it was computed.
 
     Examples
     --------
@@ -177,7 +178,7 @@ def autoregression(auto: Array, size: int) -> Array:
 
 
 def _products(first: Array, second: Array) -> tuple[Array, Array, Array]:
-    """Inner products of `first` later than `second` at all lags, circular, and of either with itself."""
+    """Circular cross-correlation of `first` and `second` at all lags, and the auto-correlation of each."""
     length = next_fast_len(2 * first.size, real=True)
     a, b = rfft(first, length), rfft(second, length)
     return irfft(a * np.conj(b), length), irfft(np.abs(a) ** 2, length), irfft(np.abs(b) ** 2, length)

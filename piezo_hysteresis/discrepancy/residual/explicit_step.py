@@ -14,9 +14,9 @@
 
 """Recognises simulated data whose hysteresis loop was computed with the explicit step of Eq. (7).
 
-A loop without memory of speed goes through a jump as through a slow ramp. The explicit step does not: from one sample
-to the next it moves straight on, by 1 % of the range too far in a jump of a tenth of it. What it changes has no number
-of its own; it is all in the data, or nothing of it.
+A rate-independent loop responds to a jump as to a slow ramp. The explicit step does not: it extrapolates linearly over
+one sample, with an error of 1 % of the range in a jump of a tenth of the range. This error has no free parameter: the
+data contain it completely or not at all.
 """
 
 from __future__ import annotations
@@ -56,17 +56,17 @@ from .sampling import at_period, less
 Array = NDArray[np.float64]
 
 KIND = "explicit_step"
-"""Of the notice of an experiment from which the changes are taken."""
+"""Kind of the notice about an experiment from which the error was subtracted."""
 SEEN = 0.5
-"""Change of a record in floors from which it can be reported."""
+"""Smallest detectable change of a record, in floors."""
 BETTER = 0.9
-"""Share of the cost that may be left once the changes are taken out."""
+"""Largest share of the cost that may remain after the subtraction."""
 PRESENT, LEFT = 0.7, 0.3
-"""How far from the whole of the changes the share may be that the residual holds, and share left when they are out."""
+"""Tolerance of the share of the changes in the residual: from 1 before the subtraction, and from 0 after it."""
 TURNS = 4
-"""Times that the changes are computed at most."""
+"""Largest number of iterations."""
 LINEARISATIONS, PRECISE = 9, 1e-3
-"""Linearisations of a fit at most, and relative decrease of the cost at which it has converged."""
+"""Largest number of linearisations of a fit, and relative decrease of the cost at convergence."""
 
 
 @kernel
@@ -106,24 +106,24 @@ class ExplicitBlock(BoucWenBlock):
 
 
 def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
-    """What the explicit step changes in the displacement [m] of records at the model's own sample period.
+    """Error of the explicit step in the displacement [m] of records at the sample period of the model.
 
     Parameters
     ----------
     model : Model
-        With the exact loop, and its terms.
+        Model with the exact loop and its terms.
     records : sequence of Record
-        In order.
+        Records in order.
 
     Returns
     -------
     list of (n,) ndarray
-        By record; zero where the sample period is longer, so that many steps stand behind every sample.
+        Error by record; zero if the sample period is longer, because each sample then results from many steps.
 
     Raises
     ------
     DivergenceError
-        Where the explicit step runs away.
+        If the explicit step diverges.
     """
     loop = ExplicitBoucWen(**model[BoucWen.name].values)
     explicit = replace(model, effects=tuple(loop if e.name == BoucWen.name else e for e in model.effects))
@@ -133,19 +133,19 @@ def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
 
 
 def explicit_model(model: Model, training_data: TrainingData, leaves: float = np.inf) -> Model | None:
-    """The model behind data whose loop takes the explicit step; None where the residual does not hold its changes.
+    """The model of data that were simulated with the explicit step; None if the residual does not contain its error.
 
-    Changes of a model that was fitted to stepped data are a little wrong: they are taken out and the model is fitted
-    again, until both agree.
+    The error computed with a model that was fitted to such data is not exact. The error is subtracted and the model
+    fitted again, until both agree.
 
     Parameters
     ----------
     model : Model
-        Fitted to the training data.
+        Model fitted to the training data.
     training_data : TrainingData
         Records and floors.
     leaves : float
-        Cost at most without the changes: a large effect that is still missing may look alike.
+        Largest cost after the subtraction. A large missing effect can have a similar residual.
     """
     if BoucWen.name not in model:
         return None
@@ -171,12 +171,12 @@ def explicit_model(model: Model, training_data: TrainingData, leaves: float = np
 
 
 def _largest(changes: Sequence[Array], floors: Array) -> float:
-    """Largest change of a record in units of its floor, rms."""
+    """Largest RMS change of a record, in units of its floor."""
     return max(float(np.sqrt(np.mean(c**2))) / f for c, f in zip(changes, floors, strict=True))
 
 
 def _share(model: Model, training_data: TrainingData, changes: list[Array]) -> float:
-    """Share of the changes that the residual holds beside all that the model can still adjust, by linear estimate."""
+    """Share of the changes in the residual, fitted linearly together with all free parameters of the model."""
     names = free_numbers(model, training_data)
     rows = [c[None, :] for c in changes]
     products = grams(model, training_data.records, names, training_data.nuisance, rows)
@@ -184,7 +184,7 @@ def _share(model: Model, training_data: TrainingData, changes: list[Array]) -> f
 
 
 def without_steps(experiment: Experiment, model: Model) -> Experiment:
-    """The experiment as the exact loop would have answered; a notice reports this."""
+    """The experiment without the error of the explicit step, with a notice about this."""
     records = tuple(at_period(r, model.sample_period) if _is_faster(r, model) else r for r in experiment.records)
     freed = less(records, step_changes(model, records))
     message = (

@@ -14,8 +14,8 @@
 
 """Inter-sample error: in a slow record, whose samples are averages, the drive may jump or turn between two samples.
 
-Straight lines between averages cut the peaks of a drive off, and a model that follows them is judged for what the
-recorder has lost.
+Linear interpolation between averages cuts off the peaks of the drive. Without a correction the model would be judged by
+an error of the recorder.
 """
 
 from __future__ import annotations
@@ -32,37 +32,37 @@ from .quick_dynamics import quick_dynamics
 Array = NDArray[np.float64]
 
 PARTS = 16
-"""Parts into which a sample is divided at most."""
+"""Largest number of parts into which a sample is divided."""
 SMOOTHER = 0.97
-"""Share of the unevenness, or of the square, of a residual that a change leaves at most."""
+"""Largest share of the squared second differences, or of the square, of a residual that a correction may leave."""
 KINKED = 3.0
-"""How far a bend of the drive stands out of those three samples before and behind where it is a kink: curves go on."""
+"""Ratio of a second difference of the drive to those three samples before and after from which it is a kink."""
 TINY = 1e-12
-"""Share of the drive below which it stands still."""
+"""Share of the drive range below which the drive counts as constant."""
 ITS_SIZE = (0.7, 1.3)
-"""Range of the fitted factor of a change, if the change explains the residual (1 is ideal)."""
+"""Range of the fitted factor of a correction that explains the residual (ideal: 1)."""
 
 
 def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
-    """Change of the simulation where slow drives turn within their samples, and averages are compared [m].
+    """Correction of the simulation for slow drives that turn within a sample, if samples are averages [m].
 
-    Averages do not show whether a drive ramped or jumped to the next level. The displacement decides for every record:
-    a wrong choice gives large residuals in single samples. A slow record does not hold the ringing after a turn either.
-    A change that stands out in no sample, and that the residual does not hold in its size, is left alone: it is one of
-    dynamics that are not known well. What relaxes over more than one sample is not hidden between samples, and is left
-    out of G.
+    Averages do not show whether a drive ramped or jumped to the next level. The displacement decides this for every
+    record, because a wrong choice gives large residuals in single samples. A slow record also does not show the ringing
+    after a turn. No correction is made if it does not stand out in single samples and the residual does not contain it
+    in the right size, because it may then result from inaccurate dynamics. Relaxations that are slower than one sample
+    are visible in the samples, and are left out of G.
 
     Parameters
     ----------
     model : Model
-        Hysteresis and dynamics, as they are known.
+        Model with the present hysteresis and dynamics.
     records : sequence of Record
-        In order.
+        Records in order.
 
     Returns
     -------
     list of (n,) ndarray
-        By record; zero where nothing is lost, or the record is not slow.
+        Correction by record; zero if the record is not slow or needs none.
     """
     most = [min(PARTS, 2 * int(0.5005 * r.sample_period / model.sample_period)) for r in records]
     parts = [n if n > 1 and _turns_sharply(r) else 1 for r, n in zip(records, most, strict=True)]
@@ -81,14 +81,14 @@ def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
 
 
 def _better(residual: Array, gradual: Array, abrupt: Array) -> Array:
-    """The change that leaves the residual more even, or none where neither does much."""
+    """The correction that leaves the smoother residual; zero if neither improves it much."""
     change = gradual if _unevenness(residual - gradual) <= _unevenness(residual - abrupt) else abrupt
     smoother = _unevenness(residual - change) < SMOOTHER * _unevenness(residual)
     return change if smoother or _holds(residual, change) else np.zeros_like(change)
 
 
 def _holds(residual: Array, change: Array) -> bool:
-    """Whether the residual holds the change in its size, and is much the smaller without it."""
+    """Whether the residual contains the correction in its size, and is much smaller without it."""
     residual, change = residual - residual.mean(), change - change.mean()
     power, size = float(residual @ residual), float(change @ change)
     if size == 0.0:
@@ -98,7 +98,7 @@ def _holds(residual: Array, change: Array) -> bool:
 
 
 def _turns_sharply(record: Record) -> bool:
-    """Whether the drive has kinks; what a model says otherwise of a curve at another rate, it owes to its dynamics."""
+    """Whether the drive has kinks. For a smooth drive, a difference between two rates comes from the dynamics."""
     before = [float(record.voltage[0]) if record.continues else record.settled_voltage] * 5
     bends = np.abs(np.diff(np.concatenate((before, record.voltage, record.voltage[-1:].repeat(3))), 2))
     around = np.maximum(bends[:-6], bends[6:])
@@ -119,23 +119,23 @@ def _sharpened(record: Record, parts: int, abrupt: bool) -> Record:
 
 
 def sharp_drive(averages: Array, before: float, parts: int, *, abrupt: bool = False) -> Array:
-    """A drive of the averages given that turns, runs or jumps within a sample.
+    """A drive with the given averages that turns, ramps or jumps within a sample.
 
     Parameters
     ----------
     averages : (n,) ndarray
-        Of the drive over every sample [V].
+        Average of the drive over every sample [V].
     before : float
         Drive before the first sample [V].
     parts : int
-        Values wanted per sample, an even number.
+        Number of values per sample, an even number.
     abrupt : bool
-        Whether it jumps wherever it goes on in one direction.
+        Whether the drive jumps where it continues in one direction.
 
     Returns
     -------
     (n parts,) ndarray
-        From one border of a sample to the next by way of its middle; by a jump where that would overshoot.
+        The drive [V]: in each sample from its start through its middle to its end; a jump where it would overshoot.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def sharp_drive(averages: Array, before: float, parts: int, *, abrupt: bool = Fa
 
 
 def _borders(v: Array) -> Array:
-    """Drive between neighbours of padded averages: on the straightest of three lines, from either side or across."""
+    """Drive at the borders between padded averages: on the straightest line from the left, the right or between."""
     a, b, c, d, e, f = (v[k : v.size - 5 + k] for k in range(6))
     lines = np.array([c + 0.5 * (c - b), 0.5 * (c + d), d - 0.5 * (e - d)])
     bends = np.abs([a - 2.0 * b + c, b - c - d + e, d - 2.0 * e + f])

@@ -44,9 +44,9 @@ class ResidualShare:
         ``phase``, ``frequency``, ``amplitude``, ``direction``, ``turning_point_distance``,
         ``time_since_level_change`` or ``absolute_time``.
     share : float
-        Share of the residual power beyond the floor that lies in the bins named in `detail`, 0 to 1.
+        Share of the residual power beyond the floor in the bins of `detail`, 0 to 1.
     detail : str
-        The bins that hold it, in plain words.
+        The bins with the largest shares, as text.
     bins : tuple of (str, float)
         Share of every bin; they add up to 1.
     """
@@ -69,12 +69,12 @@ def localise(
     residuals : sequence of (n,) ndarray
         Measured minus simulated displacement [m].
     floors : sequence of float
-        Floor of every record [m]; power is counted in units of it, every record the same weight.
+        Floor of every record [m], the unit of the residual; every record has the same weight.
 
     Returns
     -------
     tuple of ResidualShare
-        Ordered by how much more the residual concentrates than evenly spread power would.
+        Ordered by concentration of the residual in comparison with evenly distributed power.
     """
     power = [e * e / (f * f * e.size) for e, f in zip(residuals, floors, strict=True)]
     total = sum(float(p.sum()) for p in power)
@@ -118,7 +118,7 @@ def _place(axis: str, held: Array, room: Array, labels: Sequence[str]) -> tuple[
     chosen = [k for k in np.argsort(-excess) if excess[k] > 0.25 * max(excess.max(), 1e-12)][:3]
     share = float(shares[chosen].sum())
     message = ", ".join(f"{labels[k]} ({100 * shares[k]:.0f} %)" for k in chosen)
-    # concentration: how far the shares are from where the samples are
+    # concentration: difference between the shares of power and of samples
     concentration = float(np.abs(excess).sum() / 2.0)
     return ResidualShare(
         axis, share, message, tuple((n, float(s)) for n, s in zip(labels, shares, strict=True))
@@ -172,7 +172,7 @@ def _drive_bins(record: Record, span: float) -> dict[str, Bins]:
     steps = np.diff(u, prepend=record.settled_voltage)
     moving = np.abs(steps) > 1e-6 * scale
     sign = np.where(moving, np.sign(steps), 0.0)
-    # direction of the last move, carried through rests
+    # direction of the last motion, also during rests
     last_move = np.maximum.accumulate(np.where(moving, np.arange(u.size), -1))
     going = np.where(last_move >= 0, sign[np.maximum(last_move, 0)], 0.0)
     turned = np.diff(going, prepend=going[0]) != 0

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The floor of every record: the smallest residual in which an effect can be seen, at the record's sample period.
+"""The floor of every record: the smallest RMS residual in which an effect can be seen, at the record's sample period.
 
-Four parts: white noise from the top of the spectrum, where a stage no longer moves; the scatter between periods of a
-periodic record, which also holds jitter and 1/f noise; the steps of the converter, q/√12; and an adequacy floor of
-0.03 % of range, below which a model is as good as any lab needs.
+It is the largest of four values: white noise from the top of the spectrum, where a stage does not move; the scatter
+between periods of a periodic record, which includes jitter and 1/f noise; the resolution of the converter, q/√12; and
+an adequacy floor of 0.03 % of the range, below which a model is good enough for any laboratory.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from ...record import Record
 Array = NDArray[np.float64]
 
 ADEQUACY = 3e-4
-"""Share of the range of the experiment that counts as perfect."""
+"""Adequacy floor: error that counts as perfect, as a share of the range of the experiment."""
 MAINS = (50.0, 60.0)
 """Mains frequencies [Hz]."""
 ALIKE, UNLIKE = 1e-6, 0.1
-"""Share of the power of the drive by which it may differ from itself one period later, and differs in between."""
+"""Shares of the drive power: largest difference after one period, and smallest difference in between."""
 FASTEST = 3
-"""Periodic records, the fastest, from which jitter is taken: the one in which least else differs between periods."""
+"""Number of fastest periodic records from which jitter is estimated; the smallest of their estimates is used."""
 UNUSUAL = 2.0
-"""How far the scatter of a record may lie above what the others let expect before it counts as a stage not settled."""
+"""Ratio of the scatter of a record to the value expected from the others from which the stage counts as not settled."""
 TOP_BAND = 0.7
-"""Share of the Nyquist frequency above which a record holds noise alone."""
+"""Share of the Nyquist frequency above which a record contains only noise."""
 
 
 def stroke(records: Sequence[Record]) -> float:
-    """Range of displacement over all records [m]: the 100 % of every percentage."""
+    """Range of the displacement over all records [m], to which all percentages refer."""
     low = min(float(r.displacement.min()) for r in records)
     return max(float(r.displacement.max()) for r in records) - low
 
@@ -62,17 +62,17 @@ def white_noise(record: Record) -> float:
     frequency = np.linspace(0.0, np.pi, density.size)
     response = (2.0 * np.sin(frequency / 2.0)) ** 4
     top = slice(int(TOP_BAND * density.size), -1)
-    # a periodogram is exponentially distributed: its median is ln 2 of its mean
+    # values of a periodogram have an exponential distribution, whose median is ln 2 times its mean
     at_top = float(np.sqrt(np.median(density[top] / response[top]) / np.log(2.0) / 2.0))
-    # jumps fill all of the spectrum, but few of the samples; fast motion is in all samples, but not at the top
+    # jumps are in all of the spectrum but in few samples; fast motion is in all samples but not at the top
     return min(at_top, noise_on_motion(record.displacement, 3))
 
 
 def period_scatter(record: Record) -> float | None:
-    """RMS of what does not repeat from one drive period to the next [m]; None for fewer than three periods.
+    """RMS of the part that does not repeat from one drive period to the next [m]; None for fewer than three periods.
 
-    The first period settles and is left out; mains hum, which is an effect and no floor, is taken out, and so is what
-    stands out of its band of the spectrum: a resonance still ringing, a drift.
+    The first period is left out, because the stage settles in it. Mains hum is removed, because it is an effect; so are
+    peaks of the spectrum, such as a ringing resonance or a drift.
     """
     period = drive_period(record.voltage)
     if period is None or record.size < 3 * period:
@@ -82,10 +82,10 @@ def period_scatter(record: Record) -> float | None:
 
 
 def _scatter(record: Record, period: int, first: int) -> float:
-    """Scatter from the sample `first` on: a stage may still ring when its drive has long been periodic."""
+    """Scatter from the sample `first` on, because a stage may still ring after its drive has become periodic."""
     y = record.displacement[first:]
     steps = y[period:] - y[:-period]
-    # a period that is no whole number of samples leaves a little of the drive; the other axis need not repeat
+    # a period that is not a whole number of samples leaves a part of the drive; other axes need not be periodic
     rest = record.voltage[first + period :] - record.voltage[first:-period]
     others = [values for name, values in record.channels.items() if quantity_of(name) == "displacement"]
     seen = [other[first + period :] - other[first:-period] for other in others]
@@ -96,7 +96,7 @@ def _scatter(record: Record, period: int, first: int) -> float:
     steps = steps - np.linalg.lstsq(basis.T, steps, rcond=1e-6)[0] @ basis
     window = scipy.signal.windows.hann(steps.size)
     frequency, density = scipy.signal.periodogram(steps, window=window, detrend=False)
-    # the difference of two periods is a comb: white noise has this mean spectrum, twice its variance in all
+    # the difference of two periods is a comb filter: white noise gets this mean spectrum, with twice its variance
     alike = window[period:] @ window[:-period] / (window @ window) if steps.size > period else 0.0
     comb = 1.0 - alike * np.cos(2.0 * np.pi * frequency * period)
     noise = np.where(comb > 0.2, density / np.maximum(comb, 0.2), np.nan)
@@ -104,7 +104,7 @@ def _scatter(record: Record, period: int, first: int) -> float:
 
 
 def _broad(density: Array) -> float:
-    """Sum of a spectrum by the medians of its octaves, without dc: peaks of few bins do not count."""
+    """Sum of a spectrum from the medians of its octaves, without dc, so that narrow peaks are ignored."""
     edges = [1]
     while edges[-1] < density.size:
         edges.append(min(max(2 * edges[-1], edges[-1] + 8), density.size))
@@ -113,15 +113,15 @@ def _broad(density: Array) -> float:
 
 
 def quantum(record: Record) -> float:
-    """Step of the converter [m]: the smallest difference of readings that repeat; 0 where they do not."""
+    """Resolution of the converter [m]: the smallest difference between readings; 0 if readings do not repeat."""
     levels = np.unique(record.displacement)
     return float(np.diff(levels).min()) if 1 < levels.size <= record.size // 2 else 0.0
 
 
 def drive_period(voltage: Array) -> int | None:
-    """Samples of the shortest exact period of a drive that holds at least two; None where it has none.
+    """Shortest exact period of a drive with at least two periods [samples]; None if it is not periodic.
 
-    Neighbouring samples of a slow drive are alike as well: a period comes after the drive has become unlike itself.
+    Neighbouring samples of a slow drive are similar too, so the drive must first differ from itself before it repeats.
     """
     moving = voltage - voltage.mean()
     power = float(moving @ moving)
@@ -147,8 +147,8 @@ def drive_period(voltage: Array) -> int | None:
 def noise_floors(records: Sequence[Record]) -> Array:
     """Noise of every record at its own sample period [m], shape (r,), without the adequacy floor.
 
-    Scatter between periods is white noise, slower noise in proportion to it, and jitter of the clock, which adds in
-    proportion to the speed. Records without periods take what the periodic ones show.
+    Scatter between periods is the sum of white noise, slower noise in proportion to it, and jitter of the clock in
+    proportion to the speed. Records without periods use the estimates of the periodic ones.
     """
     white = np.array([max(white_noise(r), quantum(r) / np.sqrt(12.0)) for r in records])
     speed = np.array([_speed(r, w) for r, w in zip(records, white, strict=True)])
@@ -165,7 +165,7 @@ def noise_floors(records: Sequence[Record]) -> Array:
 
 
 def _speed(record: Record, noise: float) -> float:
-    """RMS speed of the stage [m/s], the sensor's noise taken out."""
+    """RMS speed of the stage without the noise of the sensor [m/s]."""
     if record.size < 3:
         return 0.0
     steps = np.diff(record.displacement)
@@ -173,5 +173,5 @@ def _speed(record: Record, noise: float) -> float:
 
 
 def floors(records: Sequence[Record], noise: Array | None = None) -> Array:
-    """Floor of every record [m], shape (r,): the larger of its noise, if known already, and the adequacy floor."""
+    """Floor of every record [m], shape (r,): the larger of its noise, which can be given, and the adequacy floor."""
     return np.maximum(noise_floors(records) if noise is None else noise, ADEQUACY * stroke(records))

@@ -60,9 +60,9 @@ class Error:
     largest : float
         Largest absolute residual [m].
     fit : float
-        100·(1 − ‖e‖/‖y − mean y‖) [%]; NaN where the displacement is constant.
+        100·(1 − ‖e‖/‖y − mean y‖) [%]; NaN if the displacement is constant.
     has_known_start : bool
-        False where the state of the stage at the first sample is not known: a conditioning phase, a truncated record.
+        False if the state of the stage at the first sample is not known: a conditioning phase, a truncated record.
     """
 
     phase: str
@@ -85,9 +85,9 @@ class Errors:
     range : float
         Peak-to-peak of the measured displacement over the experiment [m].
     zero : float
-        Constant added to the simulation before it was compared [m]; 0 where none was free for the whole experiment.
+        Constant added to the simulation before the comparison [m]; 0 if none was free for the whole experiment.
     rows : tuple of Error
-        One per record, in order.
+        One error per record, in order.
     predicted, residuals : tuple of (n,) ndarray
         Simulated displacement with its offset, and measured minus simulated [m], per record.
     """
@@ -100,12 +100,12 @@ class Errors:
 
     @property
     def judged(self) -> tuple[Error, ...]:
-        """Rows that count: those whose start is known, or all where none is."""
+        """Rows with a known initial state; all rows if there is none."""
         return tuple(row for row in self.rows if row.has_known_start) or self.rows
 
     @property
     def rms(self) -> float:
-        """Root of the mean over the judged records of their mean square [m]: every phase counts the same."""
+        """RMS over the judged records with equal weights [m]."""
         return float(np.sqrt(np.mean([row.rms**2 for row in self.judged])))
 
     @property
@@ -126,7 +126,7 @@ class Errors:
 
     @property
     def by_phase(self) -> dict[str, float]:
-        """Error in % of range of every phase name; repetitions of a phase count the same."""
+        """Error in % of range of every phase name; repetitions of a phase have equal weights."""
         names = dict.fromkeys(row.phase for row in self.rows)
         return {n: float(np.sqrt(np.mean([r.percent**2 for r in self.rows if r.phase == n]))) for n in names}
 
@@ -147,17 +147,18 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
     Parameters
     ----------
     model : Model
-        Simulated from rest, state carried into records that continue.
+        Model, simulated from rest; its state continues into records that continue the one before.
     experiment : Experiment
         Records, each at its own sample period.
     nuisance : Nuisance, optional
-        What is free per record. Default: one constant for the whole experiment, since the zero of a displacement sensor
-        means nothing; and in every record the hum of a model that has some, whose phase no model knows in advance.
+        Disturbances that are free in every record. Default: one constant for the whole experiment, because the zero of
+        a displacement sensor is arbitrary; and mains hum in every record if the model contains hum, because its phase
+        cannot be predicted.
 
     Returns
     -------
     Errors
-        Table, simulation and residual.
+        Errors, simulation and residual of every record.
 
     Raises
     ------
@@ -166,7 +167,7 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
     ModelError
         If a record is faster than the model.
     DivergenceError
-        If the simulation runs away.
+        If the simulation diverges.
     """
     span = stroke(experiment.records)
     if not span > 0.0:
@@ -190,12 +191,12 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
 
 
 def hum_of(model: Model) -> Nuisance:
-    """The mains hum of a model, free in every record: nothing where the model has none."""
+    """The mains hum of a model, free in every record; nothing if the model contains no hum."""
     return Nuisance(hum_frequency=model[MainsHum.name]["f"] if MainsHum.name in model else None)
 
 
 def zero_per_phase(model: Model) -> Nuisance:
-    """A zero of the sensor in every record, as in `identify`, and the hum of a model that has some."""
+    """A sensor zero in every record, as in `identify`, and the hum of a model that contains hum."""
     return replace(hum_of(model), offset=True)
 
 

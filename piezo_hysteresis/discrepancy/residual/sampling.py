@@ -14,9 +14,9 @@
 
 """Conversion of every record to the sample period and length that the search needs.
 
-A slow phase at 50 kHz holds the same averages over and over; a minute of noise says no more about the dynamics than a
-tenth of a second. A drive that moves the dynamics, stored at a longer period than theirs, is interpolated: gain and
-group delay alone would not describe what it does.
+A slow phase at 50 kHz is redundant, and a minute of noise contains no more information about the dynamics than a
+tenth of a second. A drive that excites the dynamics but is stored at a longer period than theirs is interpolated,
+because gain and group delay alone would not describe the response.
 """
 
 from __future__ import annotations
@@ -35,32 +35,32 @@ from ...record import Record
 Array = NDArray[np.float64]
 
 FEWEST_BENDS = 50
-"""Number of second differences of a voltage from which its noise is estimated."""
+"""Smallest number of second differences of a voltage for an estimate of its noise."""
 WHITE = 0.65
-"""Share of second differences that have another sign than the next: 0.73 in white noise, 0.5 by chance, 0 in curves."""
+"""Share of sign changes between second differences: 0.73 in white noise, 0.5 by chance, 0 in smooth curves."""
 NOISE_WIDTH = 3.0
-"""Standard deviations of the noise of a voltage within which it is not followed."""
+"""Largest change of a voltage that counts as noise, in standard deviations of its noise."""
 ENOUGH = 10_000
-"""Samples of a record above which it is thinned out."""
+"""Number of samples above which a record is averaged."""
 SLOWEST = 2e-3
-"""Sample period to which slow records are averaged at most [s]: mains hum stays visible."""
+"""Longest sample period of averaged slow records [s]; mains hum stays visible."""
 FAITHFUL = 3e-4
-"""Share of its range by which the drive may differ from straight lines between its block averages, rms."""
+"""Largest RMS deviation of the drive from straight lines between its block averages, relative to its range."""
 FAST = 1e-3
-"""Curvature of a fast drive, mean of its second differences over its standard deviation; slow loops have 1e-5."""
+"""Smallest curvature of a fast drive: mean second difference over standard deviation; slow loops have 1e-5."""
 SMOOTH = 2e-3
-"""Share of its range by which a spline through every second sample of a smooth drive may miss the others, rms."""
+"""Largest RMS error of a spline through every second sample of a smooth drive, relative to its range."""
 MOST = 200_000
-"""Samples of an interpolated record at most."""
+"""Largest number of samples of an interpolated record."""
 ALIKE = 0.1
-"""Share by which the drive of a part may differ from that of the whole, in size and in speed."""
+"""Largest relative difference, in size and in speed, between the drive of a part and the whole drive."""
 
 
 def voltage_noise(records: Sequence[Record]) -> Array:
-    """Standard deviation of the noise on the voltage of every record that was measured [V]; 0 where it was commanded.
+    """Standard deviation of the voltage noise of every record [V]; 0 if the voltage is a command and not measured.
 
-    Noise makes second differences that change sign from one to the next; ramps, holds and rests that were commanded
-    have none at all. Block averages hold the less of it the longer they are.
+    The second differences of noise change sign from one to the next; those of commanded ramps, holds and rests are
+    zero. Longer block averages contain less noise.
     """
     least, density, is_white = np.inf, np.inf, False
     for record in records:
@@ -78,10 +78,10 @@ def voltage_noise(records: Sequence[Record]) -> Array:
 
 
 def quieted(record: Record, noise: float) -> Record:
-    """The record with a voltage that does not follow noise of that size [V] back and forth.
+    """The record without voltage changes that are smaller than noise of that size [V].
 
-    A loop of hysteresis goes along with every small turn, and forgets on the way: the drive as it was measured is not
-    the drive that the stage has seen.
+    A hysteresis loop responds to every small turn of the voltage and loses memory. The stage has not seen the measured
+    noise, so the model must not see it.
     """
     voltage = np.empty(record.size)
     run_play(np.array(record.voltage), NOISE_WIDTH * noise, record.voltage[:1].copy(), voltage)
@@ -89,17 +89,17 @@ def quieted(record: Record, noise: float) -> Record:
 
 
 def less(records: Sequence[Record], changes: Sequence[Array]) -> tuple[Record, ...]:
-    """The records with changes, one each, taken out of their displacement [m]."""
+    """The records with one array of changes each subtracted from their displacement [m]."""
     return tuple(replace(r, displacement=r.displacement - c) for r, c in zip(records, changes, strict=True))
 
 
 def slowed(record: Record) -> Record:
-    """The record at a longer sample period where it is long and straight lines between block averages show its drive.
+    """The record at a longer sample period, if it is long and block averages describe its drive.
 
     Parameters
     ----------
     record : Record
-        Of any length.
+        Record of any length.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def _averaged(record: Record, factor: int) -> Record:
 
 
 def _differs(record: Record, factor: int) -> bool:
-    """Whether block averages lose what the drive does."""
+    """Whether block averages do not describe the drive."""
     u = record.voltage
     blocks = u.size // factor
     means = u[: blocks * factor].reshape(blocks, factor).mean(axis=1)
@@ -125,17 +125,17 @@ def _differs(record: Record, factor: int) -> bool:
 
 
 def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
-    """Every record with about `most` samples: slow ones averaged, fast ones cut where the beginning stands for all.
+    """Every record with about `most` samples: slow ones averaged, fast ones cut if the beginning represents all.
 
-    A record that another one continues is not cut, and neither is one whose drive changes on its way. One that moves
-    the dynamics is not averaged: at a longer period the model knows them as a lag only.
+    A record is not cut if another one continues it, or if its drive changes. A record that excites the dynamics is not
+    averaged, because at a longer period the model describes the dynamics by a lag only.
 
     Parameters
     ----------
     records : sequence of Record
-        In order.
+        Records in order.
     most : int
-        Samples.
+        Number of samples.
     """
     followed = [*(r.continues for r in records[1:]), False]
     return tuple(
@@ -163,13 +163,13 @@ def _is_alike(record: Record, most: int) -> bool:
 
 
 def common_period(records: Sequence[Record]) -> float:
-    """The sample period for the dynamics [s]: that of the fastest record that determines them, else of the fastest."""
+    """Sample period for the dynamics [s]: the shortest one of records that determine them, otherwise of all records."""
     broadband = [r.sample_period for r in records if r.size > 64 and excitation_content(r).is_broadband]
     return min(broadband or [r.sample_period for r in records])
 
 
 def at_period(record: Record, period: float) -> Record:
-    """The record at `period` [s] where it is faster, or slower with a drive that moves the dynamics; else itself."""
+    """The record at `period` [s], if it is faster, or slower with a drive that excites the dynamics; or unchanged."""
     if record.sample_period < 0.999 * period:
         factor = round(period / record.sample_period)
         whole = abs(factor * record.sample_period - period) < 1e-3 * period and record.size >= factor

@@ -94,7 +94,7 @@ def test_without_time_for_more_the_answer_says_that_it_is_not_sure():
     states = driven({}, longest=15.0)
     holds_its_promises(states)
     assert states[-1].end is End.EXHAUSTED
-    assert "no explanation is sure" in states[-1].reason()
+    assert "no explanation is certain" in states[-1].reason()
 
 
 @pytest.mark.parametrize("choices", [{"error_rate": 0.0}, {"error_rate": 0.5}, {"longest": 5.0}])
