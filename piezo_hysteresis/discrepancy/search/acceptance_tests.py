@@ -30,15 +30,15 @@ from .refit import Fitted
 from .selection_result import Rejection, typical
 
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
-"""Fewest periods of the mains in a record, longest sample period in mains periods, and fewest such records."""
+"""Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
 STEADY = 0.3
-"""Least ratio of the quartiles of that amplitude."""
+"""Smallest ratio of the quartiles of the hum amplitude."""
 SEEN = 0.5
-"""Change in units of the floor."""
+"""Smallest visible change of a record, in units of its floor."""
 
 
 DECISIVE = 0.5
-"""Gain over the model fitted anew without an effect from which it needs no other proof that it is not off."""
+"""Gain over the model refitted without the effect from which the test of its off values is not needed."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,13 +48,13 @@ class Trial:
     Parameters
     ----------
     best : FittedCandidate
-        The refit with the effect.
+        Refit with the effect.
     alone : Fitted or None
-        The model fitted anew without it; None where that diverges.
+        Refit without the effect; None if it diverges.
     null : float
         V of a perfect model.
     keeps : float
-        Share of V beyond noise that the effect may leave.
+        Largest share of V beyond noise that may remain.
     """
 
     best: FittedCandidate
@@ -64,26 +64,26 @@ class Trial:
 
     @property
     def owed(self) -> float:
-        """Gain that the effect alone is owed; 0 where the model without it is not known."""
+        """Gain that is due to the effect alone; 0 if there is no model without it."""
         return 0.0 if self.alone is None else self.alone.score.cost - self.best.score.cost
 
     def rejection(self, reason: str) -> Rejection:
-        """Of the candidate, for a reason."""
+        """Rejection of the candidate, with a reason."""
         return Rejection(self.best.name, reason)
 
 
 AcceptanceTest = Callable[[Trial], Rejection | None]
-"""What speaks against an effect that gains; None where nothing does."""
+"""Returns the reason against an effect that improves the prediction, or None."""
 
 
 def share_left(after: Score, before: Score, null: float) -> float:
-    """Share of V beyond noise that is left; the worst record does not decide."""
+    """Share of V beyond noise that remains; the worst record is ignored."""
     first, second = typical(before, after)
     return max(0.0, second - null) / max(first - null, 1e-12)
 
 
 def gains_by_itself(trial: Trial) -> Rejection | None:
-    """Rejects what the model fitted anew gains without the effect as well."""
+    """Rejects an effect if a refit without it improves the model as much."""
     alone = trial.alone
     if alone is None:
         return None
@@ -94,19 +94,19 @@ def gains_by_itself(trial: Trial) -> Rejection | None:
 
 
 def is_not_off(trial: Trial) -> Rejection | None:
-    """Rejects an effect of little gain whose numbers may all have their off value."""
+    """Rejects an effect with a small gain if all its parameters may have their off values."""
     if trial.owed >= DECISIVE or not may_be_off(trial.best):
         return None
     return trial.rejection("its parameters do not differ significantly from their off values")
 
 
 def can_be_seen(trial: Trial) -> Rejection | None:
-    """Rejects an effect that no record shows."""
+    """Rejects an effect that changes no record visibly."""
     return None if is_seen(trial.best) else trial.rejection("it changes no record by more than half its floor")
 
 
 def limits_the_drive(trial: Trial) -> Rejection | None:
-    """Rejects a limit that is a curve over the whole drive."""
+    """Rejects a limit that bends over the whole drive range."""
     bends = bends_all_along(trial.best)
     return (
         trial.rejection("its bend is wider than the drive range, so that it is a curve and not a limit")
@@ -116,7 +116,7 @@ def limits_the_drive(trial: Trial) -> Rejection | None:
 
 
 def ignores_the_drive(trial: Trial) -> Rejection | None:
-    """Rejects a hum that follows the drive."""
+    """Rejects a hum whose amplitude depends on the drive."""
     if trial.best.name != MainsHum.name or is_steady(trial.best):
         return None
     return trial.rejection("its amplitude depends on the drive, which mains hum does not")
@@ -129,18 +129,18 @@ ACCEPTANCE_TESTS: tuple[AcceptanceTest, ...] = (
     limits_the_drive,
     ignores_the_drive,
 )
-"""In the order in which they are asked; the first rejection is the reason that is reported."""
+"""The tests in order; the first rejection is reported."""
 
 
 def first_rejection(trial: Trial) -> Rejection | None:
-    """What the acceptance tests say of a fitted candidate; None where it passes all."""
+    """First rejection of a fitted candidate; None if it passes all tests."""
     return next((found for test in ACCEPTANCE_TESTS if (found := test(trial)) is not None), None)
 
 
 def is_seen(candidate: FittedCandidate) -> bool:
-    """Whether the effect changes any record by so much as could be seen; hum, free per record, has its own rule.
+    """Whether the effect changes any record visibly. Hum, which is free in every record, has its own test.
 
-    A change that is the same in all records is the sensor's zero.
+    A constant change that is the same in all records is the zero of the sensor.
     """
     training_data, model = candidate.training_data, candidate.fit.model
     with_it, without_it = (
@@ -157,9 +157,9 @@ def is_seen(candidate: FittedCandidate) -> bool:
 
 
 def may_be_off(candidate: FittedCandidate) -> bool:
-    """Whether the numbers of the effect could as well all have their off value: Wald's test, the others held.
+    """Whether all parameters of the effect may have their off values: Wald test with the other parameters held.
 
-    A time constant or an exponent has no off value; while it is held, its correlation with a size blurs nothing.
+    Time constants and exponents have no off value. They are held, so their correlation with a size does not matter.
     """
     fitted = candidate.fit
     assert fitted is not None
@@ -176,13 +176,13 @@ def may_be_off(candidate: FittedCandidate) -> bool:
 
 
 def bends_all_along(candidate: FittedCandidate) -> bool:
-    """Whether a limit bends over more than the whole drive: that is a curve, and no end of a range."""
+    """Whether a limit bends over more than the whole drive range, so that it is a curve and not a limit."""
     saturates = candidate.name == AmplifierSaturation.name
     return saturates and candidate.effect["corner"] > candidate.training_data.extent.span
 
 
 def is_steady(candidate: FittedCandidate) -> bool:
-    """Whether a hum has about one amplitude in all records: mains does not care what the drive does."""
+    """Whether a hum has about the same amplitude in all records, as mains hum does not depend on the drive."""
     training_data, lines = candidate.training_data, 2 * candidate.training_data.nuisance.harmonics
     frequency = training_data.nuisance.hum_frequency or 0.0
     amplitudes = np.array(

@@ -14,8 +14,8 @@
 
 """The baseline: the published model with all its parameters fitted jointly.
 
-What is missing may only be judged from a baseline that misses nothing it could have had: with dynamics of too low an
-order any linear effect would be a gain.
+Missing effects can only be judged from a baseline that describes the data as well as the published model can. With
+dynamics of too low an order, any linear effect would improve it.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ from ...model.model import Model
 from ...record import CONDITIONING, Experiment, Record
 
 ORDERS = (8, 8)
-"""na and nb, as in the paper; the joint fit leaves at zero what the data do not ask for."""
+"""na and nb, as in the paper; coefficients that the data do not need stay at zero in the joint fit."""
 
 
 def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:
     """Hysteresis from the slow loops, delay from the steps, dynamics from the broadband records.
 
-    What is missing may lead the iterations of the dynamics astray: after the model from many there is one from few.
-    Noise may hide modes that larger motion shows: the last one is from all records that move.
+    A missing effect can disturb the iterations of the dynamics, so a model after few iterations follows the one after
+    many. Noise may hide modes that larger motion shows, so the last model uses all records that move.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     Yields
     ------
     Model
-        Each to be fitted jointly.
+        A start for the joint fit.
     """
     experiment = Experiment(tuple(records))
     roles, at_full_rate = roles_of(experiment), _at_full_rate(experiment, fitted)
@@ -91,12 +91,12 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
 
 
 def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:
-    """The model with sums of modes for its dynamics: modes far below the sampling rate hide from iterations.
+    """The model with sums of modes as dynamics; ARX iterations do not find modes far below the sampling rate.
 
     Parameters
     ----------
     model : Model
-        With a hysteresis that has been fitted.
+        Model with fitted hysteresis.
     records : sequence of Record
         The experiment, in order.
     fitted : collection of int
@@ -105,7 +105,7 @@ def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int
     Yields
     ------
     Model
-        From broadband records, and from all that move; each to be fitted jointly.
+        Starts for the joint fit: from broadband records, and from all records that move.
     """
     experiment = Experiment(tuple(records))
     broadband, moving = _telling_dynamics(roles_of(experiment), fitted, _at_full_rate(experiment, fitted))
@@ -118,7 +118,7 @@ def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int
 
 
 def _fitted_only(experiment: Experiment, fitted: Collection[int]) -> Experiment:
-    """The records up to the last that is fitted; the others among them only carry the state of the stage."""
+    """The records up to the last fitted one; records in between that are not fitted only determine the state."""
     records = enumerate(experiment.records[: max(fitted) + 1])
     return Experiment(tuple(r if i in fitted else replace(r, phase=CONDITIONING) for i, r in records))
 
@@ -130,7 +130,7 @@ def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:
 def _telling_dynamics(
     roles: Roles, fitted: Collection[int], at_full_rate: Collection[int]
 ) -> tuple[list[int], list[int]]:
-    """Broadband records, and beside them all at the full rate that move; sines alone determine no dynamics."""
+    """Broadband records, and all records at the full rate that move; sines alone do not determine the dynamics."""
     broadband = [i for i in roles.broadband if i in fitted]
     return broadband, [i for i in at_full_rate if broadband and not roles.contents[i].is_slow]
 
@@ -139,28 +139,28 @@ def _with_dynamics(
     start: Model, records: Sequence[Record], choices: Sequence[Collection[int]], delay: int, iterations: int
 ) -> Model:
     for chosen in choices:
-        with suppress(IdentificationError):  # noise without low frequencies, or behind plays, leaves the dc gain open
+        with suppress(IdentificationError):  # noise may not determine the dc gain
             return with_dynamics(start, dynamics_behind(start, records, chosen, delay, ORDERS, iterations).arx)
     return start.with_effect(follower(start, delay, ORDERS))
 
 
 def _delay_without_steps(model: Model, records: Sequence[Record], broadband: Collection[int]) -> int:
-    """The delay that noise shows, unless dynamics describe it better without one: hum hides the first response."""
+    """Delay from the noise records, or 0 if this predicts better, because hum can hide the first response."""
     found = delay_of(hysteresis_signals(model, records, broadband))
     errors = {}
     for delay in (found, 1):
-        with suppress(IdentificationError):  # dynamics that do not settle show nothing about the delay
+        with suppress(IdentificationError):  # unstable dynamics do not determine the delay
             errors[delay] = dynamics_behind(model, records, broadband, delay, ORDERS).free_run_error
     return min(errors, key=errors.__getitem__, default=found)
 
 
 def exact(model: Model) -> Model:
-    """The model with the exact loop, which the terms of the catalogue join, and with a sensor zero.
+    """The model with the exact loop, which accepts the terms of the catalogue, and with a sensor zero.
 
     Raises
     ------
     ModelError
-        On a published loop of another exponent than n = 1, for which there is no exact step.
+        If a published loop has another exponent than n = 1, for which there is no exact step.
     """
     return with_zero(model.with_hysteresis(model.hysteresis.exact()) if model.has_hysteresis else model)
 

@@ -45,9 +45,9 @@ from .training_data import TrainingData, extent_of
 Array = NDArray[np.float64]
 
 SEARCHED, FITTED = 6_000, 50_000
-"""Samples of a fast record that take part in the search, and in the last fit."""
+"""Number of samples of a fast record in the search, and in the last fit."""
 UNSURE = 0.3
-"""Share of what slow samples have lost that counts as floor: the rest is made good."""
+"""Share of the inter-sample error that is added to the floor; the correction removes the rest."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,21 +57,22 @@ class BaselineSetup:
     Parameters
     ----------
     given, records : tuple of Record
-        In experiment order, at the period of the dynamics or slower; and with what slow samples have lost made good.
+        In experiment order, at the period of the dynamics or slower; without and with the correction of the
+        inter-sample error.
     lost : list of (n,) ndarray
-        That, by record [m].
+        The inter-sample error by record [m].
     noise, least : (r,) ndarray
         Noise and floor of every record [m].
     span : float
         Range of the displacement [m].
     usable, fitted, test_records : sequence of int
-        Records that are informative; of these those for fitting and choosing, and those set aside for the gap.
+        Indices of the usable records, the training records and the test records.
     training_data : TrainingData
-        The records that are fitted, shortened.
+        The training records, shortened.
     baseline : Fit
-        The model without further effects.
+        Fit of the model without further effects.
     score : Score
-        Of the baseline.
+        Score of the baseline.
     """
 
     given: tuple[Record, ...]
@@ -94,16 +95,16 @@ class BaselineSetup:
 
     @property
     def whole(self) -> tuple[Record, ...]:
-        """The records that are fitted, long."""
+        """The training records in full length."""
         return tuple(select_records(shortened(self.records, FITTED), self.least.tolist(), self.fitted)[0])
 
     @property
     def whole_noise(self) -> Array:
-        """Noise of those records [m]; infinite where one only carries the state of the stage."""
+        """Noise of those records [m]; infinite for a record that only determines the state of the stage."""
         return np.array(select_records(self.records, self.noise.tolist(), self.fitted)[1])
 
     def is_coarse(self, model: Model) -> bool:
-        """Whether by this model slow samples have lost something else, by more than the floor of a record."""
+        """Whether the inter-sample error computed with this model differs by more than the floor of a record."""
         again = intersample_error(model, self.given)
         return any(np.std(a - b) > f for a, b, f in zip(again, self.lost, self.least, strict=True))
 
@@ -123,15 +124,15 @@ def prepare_baseline(
     given : sequence of Record
         The experiment, in order.
     usable : sequence of int
-        Records that are informative.
+        Indices of the usable records.
     model : Model or None
-        Where to begin.
+        Start of the fit.
     known : Selection or None
-        An earlier search; its model corrects averaged samples better than the baseline does.
+        Result of an earlier search, whose model corrects averaged samples better than the baseline does.
     sharpens : bool
-        Whether what slow samples have lost is made good: averages of a noisy voltage would turn back and forth.
+        Whether the inter-sample error is corrected.
     progress : callable
-        Called with a word and the fraction done.
+        Called with a message and the fraction done.
 
     Raises
     ------
@@ -181,7 +182,7 @@ def prepare_baseline(
 
 
 def _best(found: Fit, score: Score, starts: Iterator[Model], training_data: TrainingData) -> tuple[Fit, Score]:
-    """The fit and its score, or those from another start: one that records left out prefer, and that fits better."""
+    """The fit and its score, or those from another start if cross-validation and fit are better."""
     with suppress(*FAILURES):
         for start in map(exact, starts):
             if score_model(start, training_data).cost < score.cost:

@@ -27,31 +27,31 @@ from .cross_validation import ADEQUATE, Score
 from .refit import better, from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
-"""Least gain in mean ln max(1, R²) for which an effect is accepted."""
+"""Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
 CLOSE = 0.3
-"""Share of the best gain by which a rival may lie behind."""
+"""Largest lag of a rival behind the best candidate, as a share of the best gain."""
 HOPELESS_BESIDE = 0.6
-"""Share of the gain of a best at the floor by which another one may lie behind it and still be refitted."""
+"""The same for a further refit if the best candidate has reached the floor."""
 AGAIN = 3
-"""Refits that begin once more behind dynamics found anew."""
+"""Number of refits that are repeated with newly estimated dynamics."""
 RESTARTS = 4
-"""Refits of a candidate from other start values at most."""
+"""Largest number of refits of a candidate from other start values."""
 WORTHWHILE = 0.8
-"""Share of the cost above which beginning anew once more is not worth it."""
+"""Ratio of the new to the old cost above which a refit is not repeated."""
 FIRST, LATER = 3, 9
-"""Linearisations of a refit before the field is thinned out, and after."""
+"""Number of linearisations of a refit, before and after candidates far behind are dropped."""
 FEWEST_STARTS = 3
-"""Starts of an effect from which all are tried where the likeliest led to no floor."""
+"""Number of starts of an effect from which all are tried if the best start did not lead to the floor."""
 TIE = 0.02
-"""Gain up to which the effect with the fewest numbers is taken."""
+"""Difference in gain up to which the effect with the fewest parameters is taken."""
 FINER = 0.05
-"""Gain from which the finer form of an effect is taken."""
+"""Additional gain from which the form of an effect with more parameters is taken."""
 
 
 def refit_candidates(
     model: Model, candidates: Sequence[Candidate], before: Score, progress: Progress
 ) -> list[FittedCandidate]:
-    """Joint refits, best first: a few linearisations of all, dynamics anew for the leaders, the best to the end."""
+    """Joint refits, best first: few linearisations for all, then new dynamics, then convergence for the best ones."""
     refits: list[FittedCandidate] = []
     for k, candidate in enumerate(candidates):
         if refits and _is_far_behind(candidate, refits[0], before):
@@ -77,12 +77,12 @@ def refit_candidates(
 
 
 def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
-    """Refits of effects of the drive and of the loop that dynamics have taken up, so that no score test sees them."""
+    """Refits of effects of the drive and the loop that the dynamics have absorbed, so that no score test shows them."""
     return _settled_from_all_starts(model, [c for c in candidates if _bends_dynamics(c)], before)
 
 
 def _bends_dynamics(candidate: Candidate) -> bool:
-    """Whether the effect stands before the dynamics, which imitate it, and every size has a valley of its own."""
+    """Whether the effect acts before the dynamics, which can imitate it, so that the cost has several minima."""
     effect = candidate.effect
     many = len(type(effect).starts(candidate.training_data.extent)) >= FEWEST_STARTS
     return effect.place is ChainPosition.DRIVE or (effect.host is not None and many)
@@ -91,10 +91,10 @@ def _bends_dynamics(candidate: Candidate) -> bool:
 def refits_of_twins(
     model: Model, candidates: Sequence[Candidate], best: FittedCandidate, before: Score
 ) -> list[FittedCandidate]:
-    """Refits of candidates that slow drives cannot distinguish from the best one; only other dynamics separate them.
+    """Refits of candidates that are equal to the best one on slow drives; only other dynamics separate them.
 
-    Each begins where the best has ended, since the loop is the same with either. A best that has not come to the floor
-    may stand behind wrong dynamics: then every start is tried as well.
+    Each refit begins with the fitted model of the best one, because the loop is the same. If the best one has not
+    reached the floor, its dynamics may be wrong; then every start value is tried as well.
     """
     twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
     beside = (refit(best.fit.model.without(best.name), c, LATER) for c in twins)
@@ -108,8 +108,8 @@ def _settled_from_all_starts(model: Model, candidates: Sequence[Candidate], befo
 
 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:
-    """The refit behind dynamics found anew; an effect of the drive, behind which all else stands, from every start."""
-    if candidate.score.cost <= LEAST_GAIN:  # less is left than counts as a gain
+    """The refit with newly estimated dynamics; for an effect of the drive, from every start value."""
+    if candidate.score.cost <= LEAST_GAIN:  # no further gain is possible
         return candidate
     anew = restart(candidate, FIRST)
     if anew.effect.place is not ChainPosition.DRIVE or anew.score.excess <= ADEQUATE:
@@ -118,9 +118,9 @@ def _anew(candidate: FittedCandidate) -> FittedCandidate:
 
 
 def _from_elsewhere(best: FittedCandidate, before: Score) -> FittedCandidate:
-    """The best, begun once more at every start of its effect where it has come to no floor.
+    """The best candidate, refitted from every start value of its effect if it has not reached the floor.
 
-    An effect of the drive has had all of its starts, and one with few has no valleys to choose from.
+    Effects of the drive have already used all start values; effects with few start values have one minimum.
     """
     starts = type(best.effect).starts(best.training_data.extent)
     gains_nothing = before.cost - best.score.cost < LEAST_GAIN
@@ -136,13 +136,13 @@ def _from_elsewhere(best: FittedCandidate, before: Score) -> FittedCandidate:
 
 
 def _is_far_behind(candidate: Candidate, best: FittedCandidate, before: Score) -> bool:
-    """Whether the best is at the floor and the other by so much short of it that it is no rival."""
+    """Whether the best candidate is at the floor and the other one so far above it that it is not a rival."""
     most = 2.0 * LEAST_GAIN if best.score.cost <= LEAST_GAIN else HOPELESS_BESIDE * (before.cost - best.score.cost)
     return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > most
 
 
 def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
-    """The refit to its end, and begun anew while that closes much of what is left."""
+    """The converged refit, repeated with new dynamics while this removes much of the remaining cost."""
     for _ in range(RESTARTS):
         cost = candidate.fit.cost
         candidate = proceed(candidate, LATER)
@@ -155,7 +155,7 @@ def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
 
 
 def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
-    """The candidate in its finer form where that is asked for, and better."""
+    """The candidate in its form with more parameters, if the data need it and it is better."""
     finer = candidate.effect.refined()
     gain = before.cost - candidate.score.cost
     if finer is None or candidate.score.excess <= ADEQUATE or gain < LEAST_GAIN:
@@ -167,9 +167,9 @@ def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
 
 
 def simplest(refits: list[FittedCandidate]) -> FittedCandidate:
-    """The refit with the fewest numbers among those that are as good as the best.
+    """The refit with the fewest parameters among those that are as good as the best.
 
-    A further number in the law of an effect must gain as much as an effect if the law without it is at the floor.
+    If the law of an effect reaches the floor, an additional parameter must gain as much as an additional effect.
     """
     best = refits[0]
 

@@ -14,9 +14,9 @@
 
 """Candidates for the missing effect: a projected score test of the whole catalogue.
 
-A residual is not a signature: the signature of an effect counts only as far as nothing in the present model can imitate
-it. So residual and sensitivities are projected off everything the model can still adjust, which the inner products of
-`identification.normal_equations` do at once for all effects, and the score is taken on records left out.
+An effect is only visible in the residual as far as the present model cannot imitate it. Residual and sensitivities are
+therefore projected orthogonally to all free parameters of the model. The inner products of
+`identification.normal_equations` do this for all effects at once. The score is computed on records left out of the fit.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Candidate:
-    """An effect that was screened: its start values, and its score on records left out.
+    """An effect after the score test: its start values, and its score on records left out.
 
     Parameters
     ----------
     effect : Effect
-        At the start of the search; in the model at its end.
+        The effect with its start values, or with fitted values after a refit.
     training_data : TrainingData
-        Records, and what is free in each of them with this effect.
+        Records, and the disturbances that are free in each of them with this effect.
     score : Score
-        Linearised at the start, or after the refit.
+        Score from a linearisation at the start values, or after the refit.
     """
 
     effect: Effect
@@ -76,7 +76,7 @@ class FittedCandidate(Candidate):
 
 
 def free_numbers(model: Model, training_data: TrainingData) -> list[str]:
-    """Parameters of a model that a joint fit adjusts: all except chosen ones, the delay, and those free per record.
+    """Parameters that a joint fit adjusts: all except fixed ones, the delay, and those that are free per record.
 
     `settling` of the offset is not adjusted if all records start at one level, because the data do not determine it.
     """
@@ -89,18 +89,18 @@ def free_numbers(model: Model, training_data: TrainingData) -> list[str]:
     if training_data.nuisance.offset or not training_data.begins_at_levels:
         skipped.add(f"{Offset.name}.settling")
     skipped |= {f"{MainsHum.name}.f"}
-    if loop_is_off(model):  # and stays so
+    if loop_is_off(model):  # it stays off
         skipped |= {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.memory_names}
     return [n for n in names if n not in skipped]
 
 
 def loop_is_off(model: Model) -> bool:
-    """Whether the model has a loop that takes no part."""
+    """Whether the loop of the model is switched off."""
     return model.has_hysteresis and not model.hysteresis.has_memory
 
 
 def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
-    """Columns for `cross_validate`: free parameters with the gauge held, then `extra` rows; the residual has none."""
+    """Columns for `cross_validate`: free parameters at constant G(1), then `extra` rows; none for the residual."""
     free = gauge(model, names)
     columns = np.zeros((len(names) + extra + 1, free.shape[1] + extra))
     columns[: len(names), : free.shape[1]] = free
@@ -130,9 +130,10 @@ def _products(model: Model, training_data: TrainingData) -> tuple[list[Gram], Ar
 
 
 def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:
-    """Score test of every effect of the catalogue at every start it proposes, best first.
+    """Score test of every effect of the catalogue at each of its start values, best first.
 
-    Effects that are off at their start share one pass over the data; a finite start enters by the change it makes.
+    Effects that are off at their start share one pass over the data. An effect with a finite start is represented by
+    the change that it makes.
     """
     base = free_numbers(model, training_data)
     starts = [
@@ -207,13 +208,13 @@ def _screen_moves(model: Model, training_data: TrainingData, base: list[str], mo
         score = cross_validate(
             products, training_data.floors, columns[:, [*range(kept), kept + k]], training_data.alone
         )
-        if score.step[-1] > 0.0:  # else its opposite would help
+        if score.step[-1] > 0.0:  # otherwise the effect with opposite sign would improve the prediction
             found.append(Candidate(effect, training_data, score))
     return found
 
 
 def alikeness(first: FittedCandidate, second: FittedCandidate, model: Model) -> float:
-    """|cos| between the signatures of two effects after projection off the model; 1 is indistinguishable.
+    """|cos| between the signatures of two effects, orthogonal to the free parameters; 1 means indistinguishable.
 
     For effects of several numbers the signature is the direction of the linearised step.
     """
@@ -240,6 +241,6 @@ def alikeness(first: FittedCandidate, second: FittedCandidate, model: Model) -> 
 
 
 def weighted_sum(products: Sequence[Gram], floors: Array) -> Array:
-    """Sum of the inner products, every record by its size and floor."""
+    """Sum of the inner products, each record weighted by its size and floor."""
     total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(products, floors, strict=True))
     return total

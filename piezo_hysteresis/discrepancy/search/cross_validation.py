@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Scores on data that were not fitted, by cross-validation over records from inner products alone.
+"""Scores on data that were not fitted, by cross-validation over records, computed from inner products.
 
-With the inner products of every record at hand, leaving one out is one small linear solution: the parameters take the
-step that the other records ask for, and the record left out is judged with it. No record needs to be simulated again.
+Leaving one record out needs the solution of one small linear system: the parameters take the Gauss-Newton step of the
+other records, and the record left out is judged with it. No record has to be simulated again.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ Array = NDArray[np.float64]
 ADEQUATE = 1.5
 """Mean R² up to which nothing is missing beyond noise."""
 RIDGE = 1e-9
-"""Relative size below which a direction of the parameters counts as undetermined and stays where it is."""
+"""Relative size below which a direction of the parameters counts as undetermined and is not changed."""
 TINY = 1e-200
 """Inner product below which a direction counts as zero."""
 SPOILT = 0.2
-"""Error from noise alone, in R², beyond which a record says nothing when it is left out."""
+"""Error from noise alone, in R², from which a record is not left out."""
 FARTHEST = 100.0
-"""How far leaving a record out may raise its R² over that of the fit to all: beyond, nothing is linear any more."""
+"""Largest ratio of R² with a record left out to R² of the fit to all; above it the linearisation is invalid."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -64,7 +64,7 @@ class Score:
 
     @property
     def logs(self) -> Array:
-        """ln max(1, R²) of every record: no bad record decides alone."""
+        """ln max(1, R²) of every record; the logarithm limits the influence of a single bad record."""
         return np.log(np.maximum(1.0, self.ratios**2))
 
     @property
@@ -81,19 +81,18 @@ class Score:
 def cross_validate(
     grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array, alone: Collection[int] = ()
 ) -> Score:
-    """Score of a model extended by `columns`, every record judged with parameters from the others.
+    """Score of a model extended by `columns`; every record is judged with parameters from the others.
 
     Parameters
     ----------
     grams : sequence of Gram
-        Of the records, all over the same rows.
+        Inner products of the records, with the same rows in all.
     floors : (r,) array_like
-        Floor of every record [m]; those with an infinite one only carry the state of the stage and do not count.
+        Floor of every record [m]; records with an infinite floor only determine the state of the stage.
     columns : (rows, q) ndarray
-        Directions in which the parameters may move, as combinations of the rows of `grams`; the residual's row,
-        the last, is zero.
+        Directions of the parameters as combinations of the rows of `grams`; zero in the last row, the residual.
     alone : collection of int
-        Indices of records whose kind has no other: they are judged with the parameters from all.
+        Indices of records that are the only ones of their kind; they are judged with the parameters from all records.
     """
     counted, products = _counted(grams, floors)
     hessians = np.array([columns.T @ p @ columns for p in products])
@@ -109,11 +108,11 @@ def cross_validate(
 
 
 def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array) -> tuple[int, ...]:
-    """Indices of records without which a direction is so little known that noise alone would spoil their judgement.
+    """Indices of records without which a direction of the parameters is not determined well enough to judge them.
 
-    For example, the only rest at a high level is the only record that shows how a stage settles there. With a share μ
-    of what is known about a direction, a record of n samples that is left out is off by μ/(1 − μ)/n in R² from the
-    noise of the others.
+    For example, the only rest at a high level is the only record that shows how a stage settles there. If a record of n
+    samples contains the share μ of the information about a direction, noise of the other records adds μ/(1 − μ)/n to
+    its R² when it is left out.
 
     Parameters
     ----------
@@ -134,19 +133,19 @@ def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, column
 
 
 def _counted(grams: Sequence[Gram], floors: Sequence[float] | Array) -> tuple[list[int], list[Array]]:
-    """Indices of the records that count, and their inner products in squares of the floor."""
+    """Indices of the records with a finite floor, and their inner products in units of the squared floor."""
     counted = [i for i, floor in enumerate(floors) if np.isfinite(floor)]
     return counted, [grams[i].matrix / (grams[i].size * floors[i] ** 2) for i in counted]
 
 
 def _scale(hessian: Array) -> Array:
-    """Unit of every direction; none for one without influence, of which rounding may leave less than nothing."""
+    """Unit of every direction; 0 for a direction without influence, whose square may be negative by rounding."""
     power = np.diag(hessian)
     return np.where(power > TINY, 1.0 / np.sqrt(np.maximum(power, TINY)), 0.0)
 
 
 def _solve(matrices: Array, rights: Array, scale: Array) -> Array:
-    """Solutions (r, q) of r normal equations; what is undetermined stays at zero."""
+    """Solutions (r, q) of r normal equations; undetermined directions stay at zero."""
     values, vectors = np.linalg.eigh(matrices * np.outer(scale, scale))
     known = values > RIDGE * np.maximum(values[:, -1:], 1e-300)
     along = np.einsum("rjk,rj->rk", vectors, scale * rights)

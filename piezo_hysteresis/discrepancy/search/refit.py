@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joint refits of candidates: from their start values, continued, with newly estimated dynamics, and without it.
+"""Joint refits of candidates: from start values, continued, with newly estimated dynamics, and without the effect.
 
-Linearised scores rank effects. The worth of an effect is the improvement of a refit of the whole model with the effect
-over a refit without it that had the same number of iterations.
+Linearised scores only rank effects. The gain of an effect is the improvement of a refit of the whole model with the
+effect over a refit without it that had the same number of iterations.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ from .time_limit import check_time
 from .training_data import TrainingData
 
 LINEAR = ("lag", "dynamics")
-"""Families that dynamics of an order high enough can hold."""
+"""Families of effects that dynamics of sufficient order can contain."""
 TOLERANCE = 1e-3
-"""Relative decrease of the cost at which a refit has converged."""
+"""Relative decrease of the cost at convergence of a refit."""
 LAST, PRECISE = 25, 1e-4
-"""Linearisations of a last fit, and relative decrease of the cost at which it has converged."""
+"""Number of linearisations of a last fit, and relative decrease of the cost at convergence."""
 ANEW, CLEARLY = 3, 0.7
-"""Times that a baseline is begun anew at most, and share of V that it may leave: a little better is a fit also by
-another account of what is missing."""
+"""Largest number of restarts of a baseline, and largest ratio of the new V to the old one: a small improvement may only
+be another way of absorbing the missing effect."""
 MODAL_GAIN = 0.1
-"""Gain from which a sum of modes is taken for the dynamics."""
+"""Gain from which a sum of modes is used as the dynamics."""
 FAILURES = (DivergenceError, IdentificationError, ModelError, ParameterError)
-"""What a trial may end with."""
+"""Errors with which a trial fit may end."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,25 +60,25 @@ class Fitted:
 
 
 def joint(model: Model, training_data: TrainingData, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
-    """All free numbers of a model fitted to the training data at once.
+    """Joint fit of all free parameters of a model to the training data.
 
     Parameters
     ----------
     model : Model
-        Where to begin.
+        Model with start values.
     training_data : TrainingData
-        Records, floors, and what is free in each record.
+        Records, floors, and the disturbances that are free in each record.
     max_iterations : int
-        Linearisations.
+        Largest number of linearisations.
     tolerance : float
-        Relative decrease of the cost at which the fit has converged.
+        Relative decrease of the cost at convergence.
 
     Raises
     ------
     DivergenceError, ParameterError, ModelError, IdentificationError
         As `fit` does.
     TimeSpentError
-        Where the search has a time limit, which is over.
+        If the time limit of the search has passed.
     """
     check_time()
     return fit(
@@ -93,9 +93,9 @@ def joint(model: Model, training_data: TrainingData, max_iterations: int, tolera
 
 
 def clearly_better(start: Model, found: Fit, score: Score, training_data: TrainingData) -> tuple[Fit, Score] | None:
-    """The fit from another start, and its score, where records left out prefer it clearly; None elsewhere.
+    """The fit from another start and its score, if cross-validation prefers it clearly; otherwise None.
 
-    They judge the start first, after one linear step: one that is no better then has not become clearly better.
+    The start is judged first, after one linear step. A start that is not better then is not fitted.
     """
     with suppress(*FAILURES):
         if score_model(start, training_data).excess >= score.excess:
@@ -108,9 +108,9 @@ def clearly_better(start: Model, found: Fit, score: Score, training_data: Traini
 
 
 def renewed(found: Fit, score: Score, training_data: TrainingData) -> tuple[Fit, Score]:
-    """A baseline and its score, begun anew behind dynamics found anew, while that helps.
+    """A baseline and its score, refitted with newly estimated dynamics while this improves the score.
 
-    Dynamics are found behind the hysteresis of the model before, which was fitted without them.
+    The new dynamics are estimated with the hysteresis of the model before.
     """
     for _ in range(ANEW):
         anew = _behind_anew(found.model, training_data)
@@ -122,7 +122,7 @@ def renewed(found: Fit, score: Score, training_data: TrainingData) -> tuple[Fit,
 
 
 def refit(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
-    """Fit the model with the candidate jointly, from its start; None where that diverges."""
+    """Fit the model with the candidate jointly, from its start values; None if this diverges."""
     return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
 
 
@@ -143,19 +143,19 @@ def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Fitted
 
 
 def restart(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
-    """The refit once more behind dynamics found anew; itself where that is no better.
+    """The refit with newly estimated dynamics; the old one if this is not better.
 
-    The dynamics of the model before were biased by the missing effect; from there a joint fit needs many iterations.
+    The missing effect biased the old dynamics. A joint fit that starts with them needs many iterations.
     """
     anew = _behind_anew(candidate.fit.model, candidate.training_data)
     return candidate if anew is None else better(_refitted(anew.model, candidate, max_iterations), candidate)
 
 
 def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
-    """Refit of the model with the candidate begun at the best start of its effect; None where all diverge.
+    """Refit of the model with the candidate from the best start of its effect; None if all starts diverge.
 
-    Every start is judged behind dynamics found anew, by few iterations: noise that a limit cuts to pieces bends the
-    dynamics so much that every size has a valley of its own.
+    Every start is judged with newly estimated dynamics after few iterations. Noise that a limit distorts changes the
+    estimated dynamics so much that the cost has several minima.
     """
     starts = type(candidate.effect).starts(candidate.training_data.extent)
     found = [_behind_anew(model.with_effect(start), candidate.training_data, (FEW_ITERATIONS,)) for start in starts]
@@ -170,9 +170,9 @@ def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> 
 def _behind_anew(
     model: Model, training_data: TrainingData, choices: Sequence[int] = (FEW_ITERATIONS, ITERATIONS)
 ) -> Fitted | None:
-    """The model with dynamics found anew; None if the records do not determine them.
+    """The model with newly estimated dynamics; None if the records do not determine them.
 
-    While an effect is still missing, iterations that improve the broadband records may worsen the others.
+    While an effect is missing, iterations that improve the fit of the broadband records may worsen that of the others.
     """
     check_time()
     broadband = training_data.broadband()
@@ -198,14 +198,14 @@ def _behind_anew(
 
 
 def better(anew: FittedCandidate | None, candidate: FittedCandidate) -> FittedCandidate:
-    """The refit that fits better; the first may have failed."""
+    """The refit with the smaller cost; the first one is None if it failed."""
     return candidate if anew is None or anew.fit.cost >= candidate.fit.cost else anew
 
 
 def without(candidate: FittedCandidate, max_iterations: int) -> Fitted | None:
-    """The candidate's model without its effect, all else fitted on; None where that diverges.
+    """The candidate's model refitted without its effect; None if this diverges.
 
-    What this has gained over the model before belongs to dynamics and hysteresis, and to no effect.
+    The gain of this model over the model before is due to dynamics and hysteresis, and not to the effect.
     """
     model = candidate.fit.model.without(candidate.name)
     training_data = candidate.training_data.without(candidate.name)
@@ -226,9 +226,9 @@ def without(candidate: FittedCandidate, max_iterations: int) -> Fitted | None:
 
 
 def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Model | None:
-    """The model with dynamics that imitate those of `extended`, which has one more linear effect; None without records.
+    """The model with dynamics that imitate `extended`, which has one more linear effect; None without records.
 
-    A joint fit may have stopped before its G held a mode that it has room for: what G can hold is no missing effect.
+    A joint fit may have stopped before G contained this mode. An effect that G can contain is not a missing effect.
     """
     broadband = training_data.broadband()
     if not broadband or not isinstance(model[Arx.name], Arx):

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Forward selection of missing effects: screen, refit the best, choose on records left out, add, repeat, stop.
+"""Forward selection of missing effects: score test, refit of the best, choice by cross-validation, repeat, stop.
 
-Bacher and Madsen 2011 for the forward selection; Brynjarsdóttir and O'Hagan 2014 for why discrepancy needs structure.
+Forward selection: Bacher and Madsen 2011. Why a discrepancy needs a structure: Brynjarsdóttir and O'Hagan 2014.
 """
 
 from __future__ import annotations
@@ -50,19 +50,19 @@ from .time_limit import TimeSpentError
 from .training_data import TrainingData
 
 ALONE = 4.0
-"""Residual in floors up to which one record alone asks for no further effect."""
+"""Residual in floors up to which a single record does not require a further effect."""
 KEEPS = (0.8, 0.5)
-"""Share of V beyond noise that may remain after the first accepted effect, and after further ones."""
+"""Largest share of V beyond noise that may remain after the first accepted effect, and after further ones."""
 REFITS = 6
-"""Candidates that are refitted jointly."""
+"""Number of candidates that are refitted jointly."""
 HOPELESS = 0.02
 """Linearised gain below which an effect that is not among the first two is not refitted."""
 MOST = 3
-"""Effects at most."""
+"""Largest number of effects."""
 MOST_TURNS = 5
-"""Turns at most."""
+"""Largest number of steps."""
 ALIKE = 0.97
-"""|cos| of two signatures from which they count as one."""
+"""|cos| between two signatures from which they count as equal."""
 
 NO_GAIN = 0.005
 """Smallest gain in cross-validation that is stated as a number: below it, it would read 0.00."""
@@ -76,22 +76,22 @@ def select(
     effects: Collection[type[Effect]] = CATALOGUE,
     progress: Progress | None = None,
 ) -> Selection:
-    """Add effects while records left out ask for them.
+    """Add effects while cross-validation improves.
 
     Parameters
     ----------
     model : Model
         Fitted baseline.
     training_data : TrainingData
-        Records that fit and choose.
+        Records for fitting and choosing.
     score : Score
-        Of the baseline.
+        Score of the baseline.
     null : float
         V of a perfect model.
     effects : collection of Effect classes
-        The library to choose from.
+        Effects to choose from.
     progress : callable, optional
-        Called with a word and the fraction done.
+        Called with a message and the fraction done.
     """
     report = progress or (lambda word, fraction: None)
     baseline, steps, accepted, in_time = model, list[Step](), 0, False
@@ -114,7 +114,7 @@ def select(
 
 
 def _is_enough(score: Score, accepted: int) -> bool:
-    """Whether nothing more is looked for: for one record that is a little off, no second name is forced."""
+    """Whether the search ends: no second effect is added because of a small misfit of a single record."""
     if score.excess <= ADEQUATE:
         return True
     worst = int(np.argmax(score.ratios))
@@ -123,7 +123,7 @@ def _is_enough(score: Score, accepted: int) -> bool:
 
 
 def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score]:
-    """Take back effects that a later one makes superfluous; `steps` is updated."""
+    """Remove effects that a later one makes superfluous; `steps` is updated."""
     accepted = [k for k, step in enumerate(steps) if step.accepted]
     for k in accepted[:-1]:
         name, last = steps[k].best.name, steps[accepted[-1]].best
@@ -200,19 +200,19 @@ def _turn(
 
 
 def _best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
-    """Of the refits of every effect the best one, best first."""
+    """The best refit of every effect, best first."""
     worst_first = sorted(refits, key=lambda c: -c.score.cost)
     return sorted({c.name: c for c in worst_first}.values(), key=lambda c: c.score.cost)
 
 
 def _others(screened: list[Candidate], refits: list[FittedCandidate]) -> list[Candidate]:
-    """Those that were not refitted."""
+    """Candidates that were not refitted."""
     names = {r.name for r in refits}
     return [c for c in screened if c.name not in names]
 
 
 def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Rejection | None:
-    """Objection to an effect whose twin is left out of the library: the data cannot distinguish the two."""
+    """Rejection of an effect whose twin is not among the candidates, because the data cannot distinguish the two."""
     twins = {e.public_name() for e in CATALOGUE if effect.twin == e.name or e.twin == effect.name}
     untried = sorted(twins - {e.public_name() for e in effects})
     if not untried:
@@ -223,7 +223,7 @@ def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Re
 def _judged(
     refits: list[FittedCandidate], before: Score, null: float, keeps: float
 ) -> tuple[FittedCandidate, Fitted | None, Rejection | None]:
-    """The best refit, the model fitted anew without it where it comes to that, and what speaks against the effect."""
+    """The best refit, the refit without the effect (None if not needed), and the rejection of the effect or None."""
     best = finest(simplest([c for c in refits if not bends_all_along(c)] or refits), before)
     gain, left = before.cost - best.score.cost, share_left(best.score, before, null)
     if gain < LEAST_GAIN or left > keeps:

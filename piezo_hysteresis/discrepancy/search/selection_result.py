@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Step` and `Selection`: what the forward selection did, turn by turn, as data."""
+"""`Step` and `Selection`: the result of the forward selection, step by step."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from .refit import Fitted
 from .training_data import TrainingData
 
 MANY = 8
-"""Records from which the worst one has no say in what an effect explains."""
+"""Number of records from which the worst one is ignored in the explained share."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """An effect that was not added, and why."""
+    """An effect that was not added, and the reason."""
 
     name: str
     reason: str
@@ -40,24 +40,24 @@ class Rejection:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Step:
-    """One turn of the selection.
+    """One step of the selection.
 
     Parameters
     ----------
     before : Score
-        Of the model without the effect.
+        Score of the model without the effect.
     best : FittedCandidate
         The best refit.
     accepted : bool
-        Whether it was added.
+        Whether the effect was added.
     rivals : tuple of FittedCandidate
         Refits that cross-validation cannot distinguish from the best.
     rejected : tuple of Rejection
-        All others.
+        All other effects.
     tried : tuple of Candidate
-        Every effect of this turn with its score: refitted, or linearised at its start where it was too far behind.
+        Every effect of this step with its score, refitted or, if it was too far behind, linearised at its start.
     renewed : Fitted or None
-        The model without the effect, better than before only by what the search found on its way.
+        A better fit of the model without the effect, if the search found one.
     """
 
     before: Score
@@ -70,37 +70,37 @@ class Step:
 
     @property
     def confusable_with(self) -> tuple[str, ...]:
-        """Effects that would explain the same."""
+        """Effects that explain the data equally well."""
         names = dict.fromkeys(r.effect.public_name() for r in self.rivals)
         return tuple(n for n in names if n != self.best.effect.public_name())
 
     @property
     def member_certain(self) -> bool:
-        """True where no other member of the same family is a rival."""
+        """True if no other member of the same family is a rival."""
         mine = self.best.effect
         return all(r.effect.family != mine.family or r.effect.public_name() == mine.public_name() for r in self.rivals)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Selection:
-    """Outcome of the forward selection.
+    """Result of the forward selection.
 
     Parameters
     ----------
     baseline : Model
-        What the selection began with.
+        Model at the start of the selection.
     model : Model
-        With all accepted effects.
+        Model with all accepted effects.
     score : Score
-        Of `model`.
+        Score of `model`.
     steps : tuple of Step
-        In order; the last may not be accepted.
+        Steps in order; the last one may not be accepted.
     null : float
-        V that a perfect model would have.
+        V of a perfect model.
     in_time : bool
-        False where the time limit ended the search, so that more may be missing.
+        False if the time limit ended the search, so that more effects may be missing.
     training_data : TrainingData or None
-        Records of the search; None where the verdict came from single records.
+        Records of the search; None if the verdict comes from single records.
     """
 
     baseline: Model
@@ -113,17 +113,17 @@ class Selection:
 
     @property
     def accepted(self) -> tuple[Step, ...]:
-        """The turns that added an effect."""
+        """The steps that added an effect."""
         return tuple(s for s in self.steps if s.accepted)
 
     def explained(self, score: Score) -> float:
-        """Share X of the gap of the baseline that a score has closed, 0 to 1; the worst record does not decide."""
+        """Share X of the gap of the baseline that is explained at a score, 0 to 1; the worst record is ignored."""
         first = self.steps[0].before if self.steps else self.score
         return explained(*typical(first, score), self.null)
 
 
 def typical(before: Score, after: Score) -> tuple[float, float]:
-    """V of two models without the record that the second describes worst, where there are many."""
+    """V of two models; with many records, without the one that the second model describes worst."""
     kept = np.arange(after.ratios.size)
     if kept.size >= MANY and before.ratios.size == kept.size:
         kept = np.delete(kept, int(np.argmax(after.ratios)))

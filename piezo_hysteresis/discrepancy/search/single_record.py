@@ -14,8 +14,9 @@
 
 """Diagnosis of few records, or of records without a broadband one: from the best model that `identify` finds.
 
-The published model stays the baseline that measures the gap. The structure that predicts what was left out is where
-the search begins, and the least that is delivered. What it needs to predict other rates and amplitudes is named.
+The published model remains the baseline of the gap. The search begins with the structure that predicts best in
+cross-validation, and the saved model is at least as good. Effects that this structure needs to predict other rates and
+amplitudes are named.
 """
 
 from __future__ import annotations
@@ -57,20 +58,20 @@ from .time_limit import ending_at
 from .training_data import TrainingData, extent_of
 
 BLOCKS = 16
-"""Blocks into which the records are cut, about."""
+"""Approximate number of blocks into which the records are cut."""
 FEWEST = 256
-"""Samples of a block at least."""
+"""Smallest number of samples in a block."""
 LAST, PRECISE = 25, 1e-6
-"""Linearisations of a fit, and relative decrease of the cost at which it has converged."""
+"""Largest number of linearisations of a fit, and relative decrease of the cost at convergence."""
 SEARCHED = 20_000
-"""Samples of a slow record that take part in the search."""
+"""Number of samples of a slow record in the search."""
 EXTENDS = 0.1
-"""Gain on rates, amplitudes and records left out (mean ln R²) from which an extended model is delivered."""
+"""Gain on rates, amplitudes and records left out (mean ln R²) from which an extended model is saved."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Delivered:
-    """The model that is saved, its fit, and the disturbances that are free in every record."""
+    """The saved model, its fit, and the disturbances that are free in every record."""
 
     model: Model
     fit: Fit | None
@@ -85,22 +86,22 @@ def diagnose_few(
     progress: Progress,
     end: float = np.inf,
 ) -> Diagnosis:
-    """Extend the best model as far as what is left out asks for it, and name what is decided.
+    """Extend the best model while cross-validation improves, and name the effects that are certain.
 
     Parameters
     ----------
     experiment : Experiment
-        Records, in order.
+        Records in order.
     model : Model or None
-        Where to begin; identified from the experiment where None.
+        Model with which the search begins; None to identify one from the experiment.
     used : collection of int
         Indices of the records in which the drive moves.
     effects : collection of Effect classes
-        The library to choose from.
+        Effects to choose from.
     progress : callable
-        Called with a word and the fraction done.
+        Called with a message and the fraction done.
     end : float
-        When the search for further effects has to end, on the clock of `time.monotonic` [s].
+        Time at which the search for further effects has to end, on the clock of `time.monotonic` [s].
     """
     records = experiment.records
     aside = reporting(records, used) if len(used) >= FEWEST_RECORDS else ()
@@ -140,7 +141,7 @@ def diagnose_few(
     progress("gap", 0.9)
     chosen = sorted(aside or fitted)
     free = Nuisance(offset=True), replace(final.nuisance, offset=True)
-    first = model or baseline.model  # the gap of a given model is that of the model as it was given
+    first = model or baseline.model  # the gap of a given model is measured before any refit
     models = first, final.model
     gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), free, bool(aside))
     missing = missing_excitation([records[i] for i in used])
@@ -161,7 +162,7 @@ def diagnose_few(
 
 
 def _without(experiment: Experiment, aside: Collection[int]) -> Experiment:
-    """The experiment in which the records set aside only carry the state of the stage."""
+    """The experiment in which the test records only determine the state of the stage."""
     records = tuple(replace(r, phase=CONDITIONING) if i in aside else r for i, r in enumerate(experiment.records))
     return Experiment(records, experiment.source)
 
@@ -186,7 +187,7 @@ def _delivered(
     least: Sequence[float],
     fitted: Collection[int],
 ) -> tuple[_Delivered, bool]:
-    """What predicts rates, amplitudes and records left out best; a model that was there stays unless it is beaten."""
+    """The model that predicts rates, amplitudes and records left out best; a given model stays if none is better."""
     free = Nuisance(offset=True)
     if found is not None:
         start = _Delivered(found.model, found.fit, free)
@@ -213,7 +214,7 @@ def _delivered(
 def _verdict(
     selection: Selection, decided: Sequence[Step], before: Score, gap: Gap, count: int, missing: Sequence[Notice]
 ) -> tuple[Verdict, str]:
-    """The verdict, and why."""
+    """The verdict and its reason."""
     closed = explained(before.excess, selection.score.excess, selection.null)
     names = [s.best.effect.public_name() for s in selection.accepted]
     if decided and gap.falls:
@@ -228,7 +229,7 @@ def _verdict(
         named = bool(selection.accepted) and gap.falls and closed >= NAMED
         return verdict_of(selection, named, gap.falls, gap)
     if before.excess <= ADEQUATE:
-        message = "the published model reaches the floor, so that the data give no information on further effects"
+        message = "the error of the published model is at the noise floor, so the data cannot show further effects"
     elif names:
         message = (
             f"the closest effect is {' with '.join(names)}, which explains {100 * closed:.0f} % of the "
@@ -236,8 +237,8 @@ def _verdict(
         )
     else:
         message = (
-            f"the model has the structure that predicts best what was left out, which closes {100 * closed:.0f} % of "
-            "the gap of the published model"
+            "the saved model has the structure that predicts best in cross-validation; it explains "
+            f"{100 * closed:.0f} % of the gap of the published model"
         )
     records = "one record" if count == 1 else f"{count} records"
     reason = "; ".join(
@@ -247,12 +248,12 @@ def _verdict(
 
 
 def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Record], list[int | None]]:
-    """Blocks of the records `used`, a leading jump apart, and of which record each is; None where it only carries.
+    """Blocks of the records `used`, a leading jump apart, and the record of each (None: it only sets the state).
 
     Parameters
     ----------
     records : sequence of Record
-        In order.
+        Records in order.
     used : collection of int
         Indices of the records to cut.
     """

@@ -44,7 +44,7 @@ from .selection_result import Step
 from .training_data import TrainingData
 
 DECIDES = 0.35
-"""Lead in score (mean ln R²) from which what was left out decides that an effect is there: 1.2 in the error."""
+"""Lead in cross-validation (mean ln R²) from which an effect counts as certain: a factor of 1.2 in the error."""
 ORDER = (
     MEMORY.name,
     ExtraResonance.name,
@@ -55,13 +55,13 @@ ORDER = (
 )
 """Optional effects of a structure, the largest first."""
 SLOW = (Creep.name, CreepTwoRates.name)
-"""Effects that a drift may imitate."""
+"""Effects that drift can imitate."""
 FEW = 8
-"""Linearisations of a model on the way: it begins next to its optimum."""
+"""Number of linearisations of an intermediate model, which starts near its optimum."""
 
 
 def decided(found: Identification) -> list[str]:
-    """Effects of the chosen structure that what was left out asks for clearly, the largest first."""
+    """Effects of the chosen structure that cross-validation clearly requires, largest first."""
     if found.structure is None:
         return []
     leads = found.structure.leads
@@ -76,22 +76,22 @@ def structure_steps(
     floors: Sequence[float],
     fitted: Collection[int],
 ) -> list[Step]:
-    """One accepted step for every effect that is decided, in the order of their size.
+    """One accepted step for every certain effect, in the order of their size.
 
     Parameters
     ----------
     found : Identification
-        With its structure chosen.
+        Identification with a chosen structure.
     before : Score
-        Of the published model.
+        Score of the published model.
     training_data : TrainingData
-        What scores are taken on.
+        Data for the scores.
     records : sequence of Record
-        In order.
+        Records in order.
     floors : sequence of float
         Floor of every record [m].
     fitted : collection of int
-        Indices of the records that were fitted.
+        Indices of the fitted records.
     """
     names = decided(found)
     steps: list[Step] = []
@@ -129,7 +129,7 @@ def _rivals(
     floors: Sequence[float],
     fitted: Collection[int],
 ) -> tuple[FittedCandidate, ...]:
-    """A drift in the place of creep, where it predicts what was left out about as well."""
+    """A drift instead of creep, if cross-validation is about as good."""
     if name not in SLOW or ThermalDrift.name in found.model:
         return ()
     start = ThermalDrift.starts(training_data.extent)[0]

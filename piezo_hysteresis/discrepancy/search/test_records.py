@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which records report the gap: they are used neither for fitting nor for choosing an effect."""
+"""Choice of the test records, which are used neither for fitting nor for choosing an effect."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from collections.abc import Collection, Sequence
 from ...record import Record
 
 SHARE = 3
-"""One record of so many of a kind reports."""
+"""Number of records of a kind per test record."""
 
 
 def reporting(records: Sequence[Record], usable: Collection[int]) -> tuple[int, ...]:
-    """Indices of the records set aside for the report.
+    """Indices of the test records.
 
-    Of every kind of phase with at least three realisations one in three, from the middle of its list, so that the
-    extremes of amplitude and frequency stay in the fit; of a kind named ``validation`` all.
+    If a kind of phase has at least three realisations, one in three is a test record, from the middle of the list, so
+    that the extremes of amplitude and frequency are fitted. All phases named ``validation`` are test records.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The time that a search for effects may take: refits ask before they begin, and the search keeps what it has."""
+"""Time limit of a search for effects: refits check it before they begin, and the search keeps its result so far."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ _END: ContextVar[float] = ContextVar("end of the search", default=float("inf"))
 
 
 class TimeSpentError(Exception):
-    """The time of the search is over; `select` ends with what it has found so far."""
+    """The time limit of the search has passed; `select` ends with its result so far."""
 
 
 @contextmanager
 def ending_at(end: float) -> Iterator[None]:
-    """Let refits inside raise `TimeSpentError` from a time on.
+    """Refits in this context raise `TimeSpentError` after a time.
 
     Parameters
     ----------
     end : float
-        On the clock of `time.monotonic` [s]; infinite for no limit.
+        Time on the clock of `time.monotonic` [s]; infinite for no limit.
     """
     before = _END.set(end)
     try:
@@ -46,12 +46,12 @@ def ending_at(end: float) -> Iterator[None]:
 
 
 def check_time() -> None:
-    """Go on, or end the search.
+    """Check the time limit of the search.
 
     Raises
     ------
     TimeSpentError
-        When its time is over.
+        If it has passed.
     """
     if time.monotonic() > _END.get():
         raise TimeSpentError

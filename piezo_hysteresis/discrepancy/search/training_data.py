@@ -32,7 +32,7 @@ from ...record import Record
 Array = NDArray[np.float64]
 
 LEVELS_APART = 0.05
-"""Share of the voltage range from which two levels at which records begin count as two."""
+"""Smallest difference between two initial levels of records, as a share of the voltage range."""
 MOVES = 30.0
 """Power over noise from which the spectrum of the displacement counts as motion."""
 
@@ -46,13 +46,13 @@ class TrainingData:
     records : tuple of Record
         In experiment order.
     floors : (r,) ndarray
-        Floor of every record [m]; infinite where a record only carries the state of the stage.
+        Floor of every record [m]; infinite for a record that only determines the state of the stage.
     nuisance : Nuisance
-        Free per record.
+        Disturbances that are free in every record.
     extent : Extent
-        What the records span.
+        Ranges that the records cover.
     alone : tuple of int
-        Records whose kind has no other, or that alone determine a parameter; they are never left out.
+        Indices of records that are the only ones of their kind or alone determine a parameter; never left out.
     """
 
     records: tuple[Record, ...]
@@ -63,10 +63,7 @@ class TrainingData:
 
     @property
     def begins_at_levels(self) -> bool:
-        """Whether the stage had settled at more than one level.
-
-        What it does there beyond a constant can be determined.
-        """
+        """Whether the stage had settled at more than one level, so that settling at rest can be determined."""
         levels = [r.settled_voltage for r in self.records if not r.continues]
         return bool(levels) and max(levels) - min(levels) > LEVELS_APART * self.extent.span
 
@@ -81,22 +78,22 @@ class TrainingData:
         ]
 
     def with_peaks(self, left: Sequence[Array]) -> TrainingData:
-        """With the frequencies at which the residuals `left` of the records stand out."""
+        """The same data with the frequencies of peaks in the residuals `left` of the records."""
         counted = [i for i, floor in enumerate(self.floors) if np.isfinite(floor)]
         peaks = peaks_of([self.records[i] for i in counted], [left[i] for i in counted])
         return replace(self, extent=replace(self.extent, peaks=peaks))
 
     def with_hum(self, frequency: float) -> TrainingData:
-        """With mains hum of its own amplitude and phase in every record."""
+        """The same data with mains hum of free amplitude and phase in every record."""
         return replace(self, nuisance=replace(self.nuisance, hum_frequency=frequency))
 
     def without(self, effect: str) -> TrainingData:
-        """Where `effect` is no part of the model: hum, free in every record, is then not free either."""
+        """The same data for a model without `effect`; without mains hum, hum is not free in the records."""
         return replace(self, nuisance=replace(self.nuisance, hum_frequency=None)) if effect == MainsHum.name else self
 
 
 def extent_of(records: Sequence[Record], model: Model) -> Extent:
-    """What the records span."""
+    """Ranges that the records cover."""
     known = [float(r.temperature.mean()) for r in records if r.temperature is not None]
     return Extent(
         voltage_min=min(float(r.voltage.min()) for r in records),
@@ -131,9 +128,9 @@ def longest_run(records: Sequence[Record]) -> float:
 
 
 def peaks_of(records: Sequence[Record], left: Sequence[Array], most: int = 3) -> tuple[float, ...]:
-    """Frequencies at which the residual stands out of the displacement most [Hz]: seeds for a resonance.
+    """Frequencies with the largest ratio of residual to displacement [Hz], as start values of a resonance.
 
-    Only where the stage moves well above the noise, which is read off the top of the band.
+    Only frequencies are used at which the motion is well above the noise at the top of the band.
     """
     period = min(r.sample_period for r in records)
     grid = np.geomspace(20.0, 0.45 / period, 200)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Correction`: what was offered after the verdict "unknown", and how much it removes where it took no part."""
+"""`Correction`: a correction after the verdict "unknown", and the share of the gap that it removes on test records."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ class Correction:
     Parameters
     ----------
     effect : UnnamedCorrection
-        Its form and numbers.
+        Form and parameters of the correction.
     displacement_scale : float
-        Of the model [m].
+        Displacement scale of the model [m].
     model : Model or None
-        The model with it, and its envelope in the provenance; None where it is refused.
+        The model with the correction, and its range in the provenance; None if it is refused.
     gain_rate, gain_amplitude : float
         G with groups of similar rate left out of the fit, and with groups of similar amplitude.
     gap : Gap or None
-        On the records set aside, without and with the correction; None where it was refused before.
+        Error on the test records without and with the correction; None if it was refused before.
     removed : float
-        Share X of the gap of these records that it removes.
+        Share X of the gap on these records that it removes.
     refusal : str
-        Why it is refused; empty where it is accepted.
+        Reason of the refusal; empty if it is accepted.
     """
 
     effect: UnnamedCorrection
@@ -59,16 +59,16 @@ class Correction:
 
     @property
     def accepted(self) -> bool:
-        """Whether it may be used inside its envelope."""
+        """Whether it may be used inside its range."""
         return not self.refusal
 
     @property
     def worst(self) -> float:
-        """Error with the correction over that without it, of the record set aside that gets worst."""
+        """Largest ratio of the error with the correction to the error without it, over the test records."""
         return max(p.after / p.before for p in self.gap.per_phase) if self.gap is not None else np.nan
 
     def sentence(self) -> str:
-        """What a user must know of it."""
+        """The correction in words."""
         if not self.accepted:
             return f"A correction without a name was refused: {self.refusal}."
         assert self.gap is not None and self.model is not None
@@ -78,12 +78,12 @@ class Correction:
         return (
             f"A correction without a name, a function of the {self.effect.depends_on}, removes "
             f"{100 * self.removed:.0f} % of the gap on the test records "
-            f"({self.gap.before:.3g} % → {self.gap.after:.3g} % of range). It says nothing of the cause, and holds "
+            f"({self.gap.before:.3g} % → {self.gap.after:.3g} % of range). It does not state the cause, and is valid "
             f"only from {low:.3g} to {high:.3g} V and from {slow:.3g} to {fast:.3g} Hz."
         )
 
     def answer(self) -> dict[str, Any]:
-        """As in ``answer.json``."""
+        """The correction as in ``answer.json``."""
         gap, shape = self.gap, self.effect.shape(self.displacement_scale)
         return {
             "accepted": self.accepted,
@@ -101,7 +101,7 @@ class Correction:
 
 
 def without_corrections(model: Model) -> Model:
-    """The model without corrections that have no name: they would hide what is to be named."""
+    """The model without unnamed corrections, which could hide a missing effect."""
     for effect in model.effects:
         if isinstance(effect, UnnamedCorrection):
             model = model.without(effect.name)

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Errors at rates and amplitudes that took no part in a fit.
+"""Errors at rates and amplitudes that were not fitted.
 
 The records are divided into groups of similar rate, and again into groups of similar amplitude. Every group is left out
-once: the numbers are fitted to the other groups, and judged on this one. A form with free weights learns the rates that
-it was shown, and fails here.
+once: the parameters are fitted to the other groups and judged on this one. A form with free weights fits only the rates
+in its data, and fails here.
 """
 
 from __future__ import annotations
@@ -39,22 +39,22 @@ Array = NDArray[np.float64]
 GROUPS = 3
 """Groups of similar rate, and of similar amplitude: slow, middle and fast; small, middle and large."""
 ALIKE = 1.05
-"""Factor between two rates or amplitudes up to which they are the same, so that no limit of a group separates them."""
+"""Factor between two rates or amplitudes up to which they belong to the same group."""
 STIFFNESS = 1e-6
-"""Share of what all records know about a number by which it stays where it is; that of a correction stays at zero."""
+"""Regularisation as a share of the information of all records: towards the present values, or 0 for a correction."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HeldOut:
-    """RMS error over floor of every record that counts, when its group took no part in the fit.
+    """RMS error over floor of every used record, with its group left out of the fit.
 
     Parameters
     ----------
     by_rate : (r,) ndarray
-        With the groups of similar rate left out.
+        Errors with the groups of similar rate left out.
     by_amplitude : (k,) ndarray
-        With the groups of similar amplitude left out; without the records of the largest amplitudes, since they are
-        outside of the envelope of the others, where no correction is used.
+        Errors with the groups of similar amplitude left out; without the records of the largest amplitudes, because a
+        correction is not used outside the range of the others.
     """
 
     by_rate: Array
@@ -62,7 +62,7 @@ class HeldOut:
 
 
 def groups_of(values: Sequence[float]) -> Array:
-    """Number of the group of each value (r,), from the smallest values on; similar values stay together.
+    """Number of the group of each value (r,), in ascending order of the values; similar values stay together.
 
     >>> groups_of([1.0, 100.0, 1.1, 10.0, 9.0, 110.0]).tolist()
     [0, 2, 0, 1, 1, 2]
@@ -81,21 +81,21 @@ def groups_of(values: Sequence[float]) -> Array:
 
 
 def held_out(model: Model, training_data: TrainingData, correction: str = "") -> HeldOut | None:
-    """Errors of a fitted model with whole groups left out, from inner products alone.
+    """Errors of a fitted model with whole groups left out, computed from inner products.
 
     Parameters
     ----------
     model : Model
-        Fitted to all records; with the correction, where there is one.
+        Model fitted to all records, with the correction if there is one.
     training_data : TrainingData
         Records and floors.
     correction : str
-        Identifier of the correction, whose numbers go to zero where the other groups know nothing of them.
+        Identifier of the correction, whose parameters go to zero if the other groups do not determine them.
 
     Returns
     -------
     HeldOut or None
-        None where all records are of one rate, or all of one amplitude.
+        None if all records have the same rate or the same amplitude.
     """
     counted = [i for i, floor in enumerate(training_data.floors) if np.isfinite(floor)]
     records = [training_data.records[i] for i in counted]
@@ -115,7 +115,7 @@ def held_out(model: Model, training_data: TrainingData, correction: str = "") ->
     low = room(ends[0], theta, columns, -np.inf)
     high = room(ends[1], theta, columns, np.inf)
     own = np.array([n.startswith(f"{correction}.") for n in names], dtype=bool)
-    home = columns.T @ np.where(own, -theta, 0.0)  # the step that takes the correction away
+    home = columns.T @ np.where(own, -theta, 0.0)  # the step that removes the correction
     stiffness = STIFFNESS * np.maximum(np.diag(hessians.sum(axis=0)), np.finfo(float).tiny)
 
     def without_groups(groups: Array) -> Array:

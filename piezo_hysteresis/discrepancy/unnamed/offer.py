@@ -37,23 +37,23 @@ from .held_out import HeldOut, held_out
 Array = NDArray[np.float64]
 
 HEIGHTS = (15, 47)
-"""Numbers of heights of the position maps that are tried: smooth, and with a period of a tenth of the travel."""
+"""Numbers of grid points of the position maps that are tried: smooth, and with a period of a tenth of the travel."""
 PLAYS = 13
 """Number of plays, whose half widths grow by √2."""
 REMOVES, WORSE = 0.5, 1.05
-"""Share of the gap on the records set aside that a correction removes at least, and error over that without it that no
-such record exceeds."""
+"""Smallest share of the gap on the test records that a correction must remove, and largest ratio of the error with it
+to the error without it in a test record."""
 FEW = 10
-"""Linearisations of a trial: a correction is small, and its numbers enter linearly."""
+"""Number of linearisations of a trial; few, because a correction is small and linear in its parameters."""
 
 
 def offered(model: Model, setup: BaselineSetup, null: float) -> Correction | None:
-    """The best correction of a fitted model, with the outcome of its tests.
+    """The best correction of a fitted model, with the results of its tests.
 
     Parameters
     ----------
     model : Model
-        Fitted; what it leaves has no name.
+        Fitted model, whose residual has no name.
     setup : BaselineSetup
         Records and floors.
     null : float
@@ -62,7 +62,7 @@ def offered(model: Model, setup: BaselineSetup, null: float) -> Correction | Non
     Returns
     -------
     Correction or None
-        None where the records have no second rate or amplitude, where none was set aside, or where no form gains.
+        None if the records have only one rate or amplitude, if there is no test record, or if no form has a gain.
     """
     before = held_out(model, setup.training_data)
     if before is None or not setup.test_records:
@@ -75,7 +75,7 @@ def offered(model: Model, setup: BaselineSetup, null: float) -> Correction | Non
 
 
 def forms(model: Model, training_data: TrainingData) -> Iterator[UnnamedCorrection]:
-    """Every form that is tried, switched off: small, passive, and with few numbers for what it spans."""
+    """Every form that is tried, switched off. All are small, passive, and have few parameters."""
     zero = model.with_effect(Offset()) if Offset.name in model else model
     positions = [y / model.displacement_scale for y in zero.free_run(training_data.records)]
     low, high = min(float(x.min()) for x in positions), max(float(x.max()) for x in positions)
@@ -89,16 +89,16 @@ def forms(model: Model, training_data: TrainingData) -> Iterator[UnnamedCorrecti
 
 
 def tried(model: Model, form: UnnamedCorrection, before: HeldOut, training_data: TrainingData) -> Correction | None:
-    """A form fitted jointly with the model, and what it gains at rates and amplitudes left out; None where it fails.
+    """A form fitted jointly with the model, and its gain at rates and amplitudes left out; None if the fit fails.
 
     Parameters
     ----------
     model : Model
-        Fitted without it.
+        Model fitted without the form.
     form : UnnamedCorrection
-        Switched off.
+        The form, switched off.
     before : HeldOut
-        Errors of the model without it.
+        Errors of the model without the form.
     training_data : TrainingData
         Records and floors.
     """
@@ -113,8 +113,8 @@ def tried(model: Model, form: UnnamedCorrection, before: HeldOut, training_data:
     effect = fit.model[form.name]
     assert isinstance(effect, UnnamedCorrection)
     refusal = (
-        f"a function of the {form.depends_on} gains only {min(by_rate, by_amplitude):.2f} in mean ln R² at "
-        f"{' and '.join(axes)} that were not fitted, {LEAST_GAIN:g} is needed"
+        f"a function of the {form.depends_on} lowers mean ln R² by only {min(by_rate, by_amplitude):.2f} at "
+        f"{' and '.join(axes)} that were not fitted, and {LEAST_GAIN:g} is needed"
         if axes
         else ""
     )
@@ -122,7 +122,7 @@ def tried(model: Model, form: UnnamedCorrection, before: HeldOut, training_data:
 
 
 def judged(correction: Correction, model: Model, setup: BaselineSetup, null: float) -> Correction:
-    """The correction after the last fit to all samples, judged on the records set aside."""
+    """The correction after the last fit to all samples, judged on the test records."""
     training_data = replace(setup.training_data, records=setup.whole)
     try:
         fit = joint(model.with_effect(correction.effect), training_data, LAST, PRECISE)

@@ -121,7 +121,7 @@ def test_a_deviation_of_the_position_is_offered_and_its_shape_told(found: Correc
     assert found.removed >= 0.5 and found.worst <= 1.05
     shape = found.effect.shape(SCALE)
     assert shape.x[np.argmax(shape.y)] == pytest.approx(0.2 * SCALE, abs=0.04 * SCALE)
-    assert "says nothing of the cause" in found.sentence()
+    assert "does not state the cause" in found.sentence()
     assert found.answer()["depends_on"] == "position"
 
 
