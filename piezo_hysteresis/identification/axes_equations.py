@@ -112,7 +112,7 @@ def impulse_responses(regressions: Iterable[Regression], length: int) -> tuple[A
         matrix[lag + 1, :, 1:] = matrix[lag, :, :-1] + ends
     flat, target = matrix.reshape(length * terms, -1), right.reshape(length * terms, outputs)
     mean, size, level = np.array(means).reshape(len(means), -1), np.array(sizes), np.array(levels)
-    flat -= (mean.T * size) @ mean  # the zero of every record is projected out
+    flat -= (mean.T * size) @ mean  # eliminates the zero of every record
     target -= (mean.T * size) @ level
     flat[np.diag_indices(len(flat))] *= 1.0 + RIDGE
     try:

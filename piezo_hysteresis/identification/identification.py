@@ -41,7 +41,7 @@ CORRELATED = 0.95
 
 
 def undetermined(fit: Fit) -> tuple[str, ...]:
-    """Parameters that a fit left at a bound, except those that are off there, such as a play without weight."""
+    """Parameters at a bound after a fit, except those that are off there, such as a play without weight."""
     return tuple(n for n in fit.at_bounds if fit.model.row(n).off != fit.values[n])
 
 
@@ -87,7 +87,7 @@ def phase_errors(model: Model, experiment: Experiment, roles: Roles) -> tuple[Ph
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Identification:
-    """Outcome of `identify`.
+    """Result of `identify`.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class Identification:
 
     def _repr_html_(self) -> str:
         rows = (
-            (p.phase, f"{p.percent:.3f}", f"{1e9 * p.rms:.1f}", "fitted" if p.is_fitted else "held out")
+            (p.phase, f"{p.percent:.3f}", f"{1e9 * p.rms:.1f}", "fitted" if p.is_fitted else "not fitted")
             for p in self.phases
         )
         return html_table(repr(self), ("phase", "% of range", "nm", "data"), rows)
@@ -180,9 +180,9 @@ class Identification:
         lines.append(f"G: {orders}, dc gain {arx.dc_gain:.5g} (fixed), lag {lag * 1e6:.4g} µs")
         for name, value in self.fit.values.items():
             if not name.startswith(f"{Arx.name}.") or name == f"{Arx.name}.delay":
-                lines.append(f"{name:28s} {value:12.6g} ± {1.96 * self.fit.standard_errors[name]:.2g} (95 %)")
+                lines.append(f"{name:28s} {value:12.4g} ± {1.96 * self.fit.standard_errors[name]:.2g} (95 %)")
         for phase in self.phases:
-            message = "" if phase.is_fitted else "  held out"
+            message = "" if phase.is_fitted else "  not fitted"
             lines.append(f"{phase.phase:28s} {phase.percent:9.4f} % of range {phase.rms * 1e9:10.4g} nm{message}")
         lines += [str(c) for c in self.comparisons]
         lines += [f"{a} and {b} correlate by {c:.3f}" for a, b, c in self.correlated]

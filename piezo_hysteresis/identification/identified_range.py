@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Voltages, frequencies and rates that a model was identified on, in its provenance, and what lies outside of them."""
+"""Voltages, frequencies and rates of the data of a model, kept in its provenance, and drives outside this range."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ LOWEST, HIGHEST = "voltage_min", "voltage_max"
 SLOWEST, FASTEST = "frequency_min", "frequency_max"
 """Keys of the provenance: frequencies between which 90 % of the power of dv/dt lies [Hz]."""
 STEEPEST = "slew_rate_max"
-"""Key of the provenance: rate that 1 % of the samples that move exceed [V/s]."""
+"""Key of the provenance: rate that is exceeded in 1 % of the moving samples [V/s]."""
 KEYS = (LOWEST, HIGHEST, SLOWEST, FASTEST, STEEPEST)
 """All of them."""
 BEYOND, FASTER, SLOWER = 0.02, 1.5, 3.0
-"""Share of the range of the voltage, and factors of frequency and rate, from which a drive is outside.
+"""Share of the voltage range, and factors of frequency and rate, from which a drive is outside.
 
-What a lag or a mode does grows with the frequency; creep with its logarithm.
+The influence of a lag or a mode grows with the frequency, that of creep with its logarithm.
 """
 STEEP = 0.99
-"""Share of the samples that move which are not steeper than the rate of a record."""
+"""Share of the moving samples whose rate is at most the rate of a record."""
 
 
 def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapping[str, str]:
@@ -49,9 +49,9 @@ def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapp
     Parameters
     ----------
     records : sequence of Record
-        In order.
+        Records in order.
     fitted : collection of int
-        Indices of those that were fitted.
+        Indices of the fitted records.
     """
     chosen = [records[i] for i in fitted]
     voltages = np.concatenate([np.append(r.voltage, r.settled_voltage) for r in chosen])
@@ -67,23 +67,23 @@ def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapp
 
 
 def outside(model: Model, experiment: Experiment) -> tuple[Notice, ...]:
-    """Notices of the records that drive the stage farther, faster or slower than the model was identified.
+    """Notices about records whose drive is larger, faster or slower than the data of the identification.
 
     Parameters
     ----------
     model : Model
-        With its range in its provenance; without it nothing is noticed.
+        Model with its range in the provenance; without a range there are no notices.
     experiment : Experiment
-        What it is compared with.
+        Experiment that is compared with the model.
     """
     return tuple(notice for record in experiment for notice in outside_of(model, record))
 
 
 def outside_of(model: Model, record: Record) -> Iterator[Notice]:
-    """`outside` of one record, or of a window of samples; says where a correction without a name does not hold."""
+    """`outside` of one record, or of a window of samples, including where a correction without a name is not valid."""
     is_corrected = any(isinstance(e, UnnamedCorrection) for e in model.effects)
     for notice in _outside_of(model, record):
-        more = f"{notice.message}; its correction without a name does not hold there"
+        more = f"{notice.message}; its correction without a name is not valid there"
         yield replace(notice, message=more) if is_corrected else notice
 
 
@@ -102,7 +102,7 @@ def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
         said = f"the drive reaches {content.bandwidth:.3g} Hz, the model was identified up to {fastest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
     if SLOWER * content.slowest < slowest and content.bandwidth > 0.0:
-        said = f"the drive is as slow as {content.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz on"
+        said = f"the drive is as slow as {content.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
     rate = _slew_rate(record)
     if rate > FASTER * steepest > 0.0:

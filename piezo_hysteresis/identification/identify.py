@@ -54,16 +54,16 @@ from .structure.structure_choice import StructureChoice, choose_structure
 ADEQUATE = 3e-4
 """Smallest noise floor that is used, as a share of the range."""
 AT_THE_FLOOR = 1.5
-"""Mean square of residual over floor below which a fit counts as converged, whatever its last step was."""
+"""Mean square of residual over floor below which a fit counts as converged, independent of its last step."""
 FEWEST_SAMPLES = 32
 """Number of samples of the shortest record that can show a loop."""
 HIGHEST_ORDER = 10
 """Highest model order of the comparison."""
 LEADING_STEP = (
-    "the step comes with the first sample, so that no onset is read from it; the joint fit takes delay, ringing and "
-    "creep from it"
+    "the step is at the first sample, so the delay cannot be read from its onset; the joint fit determines delay, "
+    "ringing and creep from it"
 )
-"""Message where the only step is the one with which a record begins."""
+"""Message if the only step is at the beginning of a record."""
 
 
 @on_one_core
@@ -84,7 +84,7 @@ def identify(
     Parameters
     ----------
     experiment : Experiment
-        Records of any kind and sample period; records that continue carry the state of the stage.
+        Records of any kind and sample period; a record that continues starts with the state of the one before.
     voltage_scale : float, optional
         v = u / voltage_scale [V]; default the largest absolute voltage.
     displacement_scale : float, optional
@@ -111,7 +111,7 @@ def identify(
     Raises
     ------
     IdentificationError
-        If nothing in the experiment moves, or a fit cannot be started.
+        If the drive does not move in any record, or a fit cannot be started.
     RecordError
         If `held_out` names a phase that the experiment does not have.
 
@@ -210,7 +210,7 @@ def identify(
         notices.append(
             Notice(
                 "nothing_held_out",
-                "all records were fitted, so that the errors are not prediction errors; hold out a phase to get them",
+                "all records were fitted, so the errors are not prediction errors; leave out a phase with --held-out",
             )
         )
     found = Identification(

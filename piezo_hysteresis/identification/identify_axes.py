@@ -74,15 +74,15 @@ def identify_axes(
     passes: int = PASSES,
     progress: Callable[[str], None] | None = None,
 ) -> AxesModel:
-    """Fit the taps of one pass after the other by linear least squares on the prediction of the pass before.
+    """Fit the taps in several passes, each by linear least squares with the prediction of the pass before.
 
     Parameters
     ----------
     records : sequence of Record
-        With ``voltage_2``, ``displacement_2``, … in their channels, at one sample period. A record begins at rest at
-        0 V, unless it is `truncated` or `continues`; then its beginning only brings the model into its state.
+        Records with channels ``voltage_2``, ``displacement_2``, …, all at one sample period. A record begins at rest at
+        0 V, unless it is `truncated` or `continues`; then its beginning only determines the state of the model.
     length : int
-        Taps of every response.
+        Number of taps of every response.
     radii : sequence of float
         Half widths of the plays in units of the rms elongation.
     passes : int
@@ -113,7 +113,7 @@ def identify_axes(
         records[0].sample_period, reference, MEMORY,
     )  # fmt: skip
     spread = [max(float(y.std()), np.finfo(float).tiny) for y in displacements]
-    weights = [(min(spread) / s) ** 2 for s in spread]  # a record counts by its relative error
+    weights = [(min(spread) / s) ** 2 for s in spread]  # records are weighted by their relative error
     scales = np.asarray(radii, dtype=np.float64)
     for number in range(passes):
         if progress is not None:
@@ -140,7 +140,7 @@ def identify_axes(
 
 
 def axes_errors(model: AxesModel, records: Sequence[Record]) -> list[AxisError]:
-    """Free-run error of every displacement of every record; without the settling, if a record begins in mid-run.
+    """Free-run error of every displacement of every record; without the settling, if a record does not begin at rest.
 
     Raises
     ------

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from functools import cache, wraps
 from typing import ParamSpec, TypeVar
 
-import scipy.linalg  # noqa: F401 - brings a BLAS of its own beside that of numpy, which must be there to be limited
+import scipy.linalg  # noqa: F401 - loads a second BLAS, which must be loaded before it can be limited
 from threadpoolctl import ThreadpoolController
 
 P = ParamSpec("P")

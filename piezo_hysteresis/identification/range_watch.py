@@ -26,22 +26,22 @@ from ..record import Notice, Record
 from .identified_range import SLOWEST, outside_of
 
 SHORTEST = 1.0
-"""Least time that is looked at [s]."""
+"""Shortest time window [s]."""
 CYCLES = 3.0
-"""Cycles of the slowest identified drive that are looked at, so that a slower one is seen."""
+"""Length of the window in cycles of the slowest identified drive, so that a slower drive is detected."""
 MOST_SAMPLES = 65536
-"""Most samples that are looked at: a few milliseconds of computing."""
+"""Largest number of samples in the window; they need a few milliseconds of processor time."""
 
 
 class RangeWatch:
-    """The newest drive of a stream, and what of it the model was not identified on.
+    """The newest drive of a stream, and the parts outside the range of the identification.
 
     Parameters
     ----------
     model : Model
-        With its identified range in its provenance; without it nothing is found.
+        Model with its identified range in the provenance; without a range there are no findings.
     sample_period : float
-        Of the stream [s].
+        Sample period of the stream [s].
 
     Examples
     --------
@@ -63,16 +63,16 @@ class RangeWatch:
         self._count = 0
 
     def add(self, voltage: NDArray[np.float64]) -> None:
-        """Take in the next samples [V], shape (n,)."""
+        """Add the next samples [V], shape (n,)."""
         self._blocks.append(voltage[-self._size :].copy())
         self._count += self._blocks[-1].size
         while self._count - self._blocks[0].size >= self._size:
             self._count -= self._blocks.popleft().size
 
     def findings(self) -> tuple[Notice, ...]:
-        """What the newest samples do that the model was not identified on.
+        """Notices about the newest samples outside the identified range.
 
-        A frequency is judged once the window is full, since a part of a slow drive has no frequency of its own.
+        Frequencies are judged when the window is full, because a part of a slow drive does not show its frequency.
         """
         if self._count < 2:
             return ()

@@ -114,7 +114,7 @@ def test_the_diagnostic_gives_that_noise_bleaches_the_loop(complete):
 
 def test_the_result_can_be_read(complete):
     text = str(complete)
-    for word in ("delay 3 samples", "bouc_wen.gamma", "±", "held out", "% of range"):
+    for word in ("delay 3 samples", "bouc_wen.gamma", "±", "not fitted", "% of range"):
         assert word in text
 
 

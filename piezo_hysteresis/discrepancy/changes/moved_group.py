@@ -29,7 +29,7 @@ from .signatures import shaped_model
 
 Array = NDArray[np.float64]
 
-FULL = "identify the stage again"
+FULL = "a full identification is needed"
 """Advice if the parameters of the groups are not sufficient."""
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`bounded_step`: the minimum of a small quadratic inside a box, for the steps of a fit."""
+"""`bounded_step`: the minimum of a small quadratic function inside bounds, for the steps of a fit."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SMALLEST = 1e-14
-"""Relative eigenvalue below which a direction is left where it is, once a bound is met."""
+"""Relative eigenvalue below which a direction is not changed after a bound was reached."""
 
 
 def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Array:
@@ -36,12 +36,12 @@ def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Ar
     slope : (q,) ndarray
         s.
     lower, upper : (q,) ndarray
-        Bounds, lower < upper; infinite where there is none.
+        Bounds, lower < upper; infinite for none.
 
     Returns
     -------
     (q,) ndarray
-        x; exact also where many bounds are met, as for weights that may not be negative.
+        x; exact also with many active bounds, as for non-negative weights.
     """
     # unit diagonal: columns differ by many orders of magnitude
     scale = 1.0 / np.sqrt(np.diag(hessian))
@@ -60,7 +60,7 @@ def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Ar
 
 
 def room(limits: Array, theta: Array, directions: Array, open_end: float) -> Array:
-    """How far every direction may go; without end where it moves several numbers."""
+    """Largest step along every direction; `open_end` if it changes several numbers."""
     far = np.full(directions.shape[1], open_end)
     for j, column in enumerate(directions.T):
         (moved,) = np.nonzero(column)

@@ -28,7 +28,7 @@ from .normal_equations import Gram, Nuisance, residuals
 Array = NDArray[np.float64]
 
 UNKNOWN = 1e-10
-"""Relative size below which a direction of the numbers counts as undetermined and adds no variance."""
+"""Relative size below which a direction of the parameters counts as undetermined and adds no variance."""
 
 
 def covariance(
@@ -44,22 +44,22 @@ def covariance(
     Parameters
     ----------
     model : Model
-        Fitted.
+        Fitted model.
     records : sequence of Record
-        Those of the fit.
+        Fitted records.
     nuisance : Nuisance or None
-        Free per record.
+        Disturbances that are free in every record.
     current : sequence of Gram
-        Inner products at the fitted numbers.
+        Inner products at the fitted parameters.
     floors : (r,) ndarray
         Floor of every record [m].
     directions : (q, p) ndarray
-        In which the q numbers may move.
+        Directions in which the q parameters may change.
 
     Notes
     -----
-    In the eigenvectors of the normal equations, brought to unit diagonal: nothing cancels, and no variance is negative.
-    A number of no influence has variance 0.
+    Computed in the eigenvectors of the normal equations with unit diagonal, to avoid cancellation and negative
+    variances. A parameter without influence has variance 0.
     """
     weights = [1.0 / (g.size * f * f) for g, f in zip(current, floors, strict=True)]
     inner = [directions.T @ g.matrix[:-1, :-1] @ directions for g in current]
@@ -72,7 +72,7 @@ def covariance(
 
 
 def sandwich(bread: Array, meat: Array, directions: Array) -> Array:
-    """Covariance (q, q) of the numbers: ``D B⁻¹ M B⁻¹ Dᵀ``.
+    """Covariance (q, q) of the parameters: ``D B⁻¹ M B⁻¹ Dᵀ``.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def sandwich(bread: Array, meat: Array, directions: Array) -> Array:
     meat : (p, p) ndarray
         Covariance M of their right-hand side.
     directions : (q, p) ndarray
-        In which the q numbers may move, D.
+        Directions D in which the q parameters may change.
     """
     diagonal = np.diag(bread)
     scale = np.divide(
@@ -96,10 +96,10 @@ def sandwich(bread: Array, meat: Array, directions: Array) -> Array:
 
 
 def colour(residual: Array, blocks: int = 64) -> float:
-    """How much more the slow part of a residual weighs than that of white noise of the same variance, at least 1.
+    """Ratio of the slow part of a residual to that of white noise of the same variance, at least 1.
 
-    Ratio of the variance of block means to its white value; up to 1.7 (three standard deviations for 64 blocks) counts
-    as white.
+    It is the variance of block means over its value for white noise. Values up to 1.7 (three standard deviations for 64
+    blocks) count as white.
     """
     length = residual.size // blocks
     if length < 2:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`fit`: all free parameters of a model jointly, in free run, by damped Gauss-Newton with analytic sensitivities."""
+"""`fit`: joint fit of all free parameters in free run, by damped Gauss-Newton steps with analytic sensitivities."""
 
 from __future__ import annotations
 
@@ -35,35 +35,35 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 TRUSTED = 1.0
-"""Damping up to which a small decrease is a sign of the end."""
+"""Largest damping at which a small decrease of the cost means convergence."""
 MAX_DAMPING = 1e10
-"""Damping at which a fit gives up."""
+"""Damping at which a fit ends without convergence."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Outcome of a joint fit.
+    """Result of a joint fit.
 
     Attributes
     ----------
     model : Model
-        With the fitted values.
+        Model with the fitted values.
     names : tuple of str
-        Free numbers.
+        Names of the free parameters.
     covariance : (q, q) ndarray
-        Of the free numbers, from residual variance and colour of every record.
+        Covariance of the free parameters, from residual variance and colour of every record.
     cost : float
         Mean over the records of (RMS residual / floor)².
     rms : tuple of float
         RMS residual of every record [m].
     nuisances : tuple of ndarray
-        Per-record amplitudes [m].
+        Amplitudes of the disturbances of every record [m].
     at_bounds : tuple of str
-        Numbers that stopped at a bound of their table.
+        Parameters that stopped at a bound of the parameter table.
     converged : bool
-        False where the iteration limit came first.
+        False if the iteration limit was reached first.
     iterations : int
-        Linearisations used.
+        Number of linearisations.
     """
 
     model: Model
@@ -78,39 +78,39 @@ class Fit:
 
     @property
     def stated_model(self) -> Model:
-        """`model` with the covariance of its numbers, where there are any and it is finite."""
+        """`model` with the covariance of its parameters, if there are any and it is finite."""
         if not self.names or not np.isfinite(self.covariance).all():
             return self.model
         return replace(self.model, covariance=ParameterCovariance.of(self.names, self.covariance))
 
     @property
     def values(self) -> dict[str, float]:
-        """Fitted numbers by name."""
+        """Fitted parameters by name."""
         all_values = self.model.values()
         return {n: all_values[n] for n in self.names}
 
     @property
     def standard_errors(self) -> dict[str, float]:
-        """Standard error of every fitted number."""
+        """Standard error of every fitted parameter."""
         return dict(zip(self.names, np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)).tolist(), strict=True))
 
     def interval(self, name: str, sigmas: float = 1.96) -> tuple[float, float]:
-        """Interval of a fitted number, 95 % by default."""
+        """Interval of a fitted parameter, 95 % by default."""
         value, error = self.values[name], self.standard_errors[name]
         return value - sigmas * error, value + sigmas * error
 
     def correlation(self, first: str, second: str) -> float:
-        """Correlation coefficient of two fitted numbers."""
+        """Correlation coefficient of two fitted parameters."""
         i, j = self.names.index(first), self.names.index(second)
         scale = np.sqrt(self.covariance[i, i] * self.covariance[j, j])
         return float(self.covariance[i, j] / scale) if scale > 0.0 else 0.0
 
 
 def gauge(model: Model, names: Sequence[str]) -> Array:
-    """Directions (q, r) in which the free numbers may move with G(1) held.
+    """Directions (q, r) in which the free parameters may change at constant G(1).
 
-    Scaling w by c scales the gains of the hysteresis by c and b by 1/c: one direction is no information. With all of
-    `b` free, b1 follows from G(1) = B(1)/A(1).
+    If w is scaled by c, the gains of the hysteresis scale by c and b by 1/c, so one direction is not determined. If all
+    of `b` is free, b1 follows from G(1) = B(1)/A(1).
     """
     directions = np.eye(len(names))
     if Arx.name not in model or not model.has_hysteresis:
@@ -127,7 +127,7 @@ def gauge(model: Model, names: Sequence[str]) -> Array:
 
 
 def weighted(grams_: Sequence[Gram], floors: Array) -> Array:
-    """Mean over the records of Gram/(size·floor²): every record counts the same."""
+    """Mean over the records of Gram/(size·floor²): every record has the same weight."""
     total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(grams_, floors, strict=True))
     return total / len(grams_)
 
@@ -144,36 +144,36 @@ def fit(
     damping: float = 1e-3,
     progress: Progress | None = None,
 ) -> Fit:
-    """Fit the numbers `free` of `model` to the free-run displacement of `records`.
+    """Fit the parameters `free` of `model` to the free-run displacement of `records`.
 
-    Minimises the mean over the records of (RMS residual / floor)², so that neither a long nor a noisy record decides.
-    Bounds of the parameter table and β ≥ |γ| are kept; G(1) is held where all of `arx.b` is free.
+    Minimises the mean over the records of (RMS residual / floor)², so that neither a long nor a noisy record dominates.
+    The bounds of the parameter table and β ≥ |γ| are kept. G(1) is constant if all of `arx.b` is free.
 
     Parameters
     ----------
     model : Model
-        Start values.
+        Model with start values.
     records : sequence of Record
-        In experiment order.
+        Records in experiment order.
     free : sequence of str
-        Numbers to fit, e.g. ``"bouc_wen.beta"``, ``"arx.a[0]"``.
+        Parameters to fit, e.g. ``"bouc_wen.beta"``, ``"arx.a[0]"``.
     floors : sequence of float, optional
         Floor of the residual of every record [m]; default 1 for all.
     nuisance : Nuisance, optional
-        Free per record.
+        Disturbances that are free in every record.
     max_iterations : int
-        Linearisations at most.
+        Largest number of linearisations.
     tolerance : float
-        Relative decrease of the cost at which to stop.
+        Relative decrease of the cost at convergence.
     damping : float
-        Of the first step, as a share of the diagonal; a start that is near needs little.
+        Damping of the first step, as a share of the diagonal; a start near the solution needs little.
     progress : callable, optional
-        Called with a word and the fraction done.
+        Called with a message and the fraction done.
 
     Raises
     ------
     IdentificationError
-        If nothing is free, or the start already diverges.
+        If no parameter is free, or if the start values diverge.
     """
     free = tuple(free)
     if not free or not records:
@@ -196,7 +196,7 @@ def fit(
     while iterations < max_iterations and not converged:
         hessian = directions.T @ total[:-1, :-1] @ directions
         slope = directions.T @ total[:-1, -1]
-        # a number without influence: rounding may leave it below zero
+        # for a parameter without influence, rounding may give a negative value
         idle = np.diag(hessian) <= np.finfo(float).tiny
         hessian[idle, :] = hessian[:, idle] = 0.0
         diagonal = np.where(idle, 1.0, np.diag(hessian))
@@ -216,13 +216,13 @@ def fit(
         decrease = 1.0 - cost / total[-1, -1]
         try:
             current = grams(better, records, free, nuisance)
-        except DivergenceError:  # a bounded output of unbounded slopes is the edge of stability
+        except DivergenceError:  # at the limit of stability the output is bounded but its derivatives are not
             break
         model, theta = better, trial
         damping = max(damping / 10.0, 1e-12)
         total = weighted(current, sizes)
         iterations += 1
-        converged = decrease < tolerance and damping < TRUSTED  # a step that was held back shows nothing
+        converged = decrease < tolerance and damping < TRUSTED  # a strongly damped step does not show convergence
         if progress is not None:
             progress("joint fit", iterations / max_iterations)
     return Fit(
@@ -239,7 +239,7 @@ def fit(
 
 
 def _bounded(names: Sequence[str], theta: Array) -> Array:
-    """|γ| ≤ β: an unbounded Bouc-Wen is no piezo (Ismail et al. 2009)."""
+    """Enforce |γ| ≤ β, because an unbounded Bouc-Wen loop does not describe a piezo (Ismail et al. 2009)."""
     theta = theta.copy()
     for i, name in enumerate(names):
         owner, _, parameter = name.partition(".")

@@ -32,9 +32,9 @@ from .fit import Fit, Progress, fit
 from .normal_equations import Nuisance, residuals
 
 SLOWEST_POLE = 0.1
-"""Longest time constant of G, as share of the longest record: slower ones are drift in disguise."""
+"""Longest time constant of G, as a share of the longest record; slower poles describe drift."""
 NEAR = 1e-7
-"""Damping of a fit that starts from a linear one: more of it only slows the directions that hardly matter."""
+"""Damping of a fit that starts from a linear one; more damping only slows down weak directions."""
 
 
 def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Fit:
@@ -43,7 +43,7 @@ def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fi
     Parameters
     ----------
     model : Model
-        With a hysteresis that has been fitted; its dynamics are replaced.
+        Model with fitted hysteresis; its dynamics are replaced.
     records : sequence of Record
         The experiment, in order.
     floors : sequence of float
@@ -77,12 +77,12 @@ def fit_joint(
     fitted: Collection[int],
     progress: Progress | None = None,
 ) -> Fit:
-    """Joint fit of hysteresis and ARX at a fixed delay, a free offset per record, G(1) held.
+    """Joint fit of hysteresis and ARX at fixed delay and constant G(1), with a free offset in every record.
 
     Parameters
     ----------
     model : Model
-        Start values.
+        Model with start values.
     records : sequence of Record
         The experiment, in order.
     floors : sequence of float
@@ -108,12 +108,12 @@ def fit_dynamics(
     orders: tuple[int, int],
     progress: Progress | None = None,
 ) -> tuple[Fit, Dynamics, tuple[Notice, ...]]:
-    """Start from ARX behind the hysteresis, then fit jointly; lower the order until the outcome is sound.
+    """Start with an ARX model from w, then fit jointly; reduce the order until the data determine the result.
 
     Parameters
     ----------
     model : Model
-        With its hysteresis fitted.
+        Model with fitted hysteresis.
     records : sequence of Record
         The experiment, in order.
     floors : sequence of float
@@ -121,7 +121,7 @@ def fit_dynamics(
     fitted, broadband : collection of int
         Indices of the records of the joint fit, and of those for its start.
     delay : int
-        d, samples.
+        Delay d [samples].
     orders : (int, int)
         Highest na and nb.
     progress : callable, optional
@@ -130,11 +130,11 @@ def fit_dynamics(
     Returns
     -------
     joint : Fit
-        The first sound one, or else the closest.
+        The first fit that the data determine, otherwise the best one.
     dynamics : Dynamics
-        ARX from w that it started from.
+        ARX model from w at the start.
     notices : tuple of Notice
-        ``order_reduced`` where the orders asked for are not supported by the data.
+        ``order_reduced``, if the data do not support the requested orders.
     """
     longest = max(records[i].duration for i in fitted)
     tried: list[tuple[Fit, Dynamics]] = []
@@ -175,7 +175,7 @@ def _start(
     delay: int,
     orders: tuple[int, int],
 ) -> tuple[Model, Dynamics]:
-    """Start of the joint fit, the better of ARX behind the hysteresis and one pole; and the ARX."""
+    """Start of the joint fit (the better of the ARX model from w and one pole), and the ARX model."""
     dynamics = dynamics_behind(model, records, broadband, delay, orders)
     candidates = [model.with_effect(follower(model, delay, orders))]
     try:

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Inner products of residual, sensitivities and nuisances of every record: all that fitting and score tests need.
+"""Inner products of residual, sensitivities and disturbances of every record, for fits and score tests.
 
-The matrices are small, so records of any length are summed up block by block.
+The matrices are small; records of any length are summed block by block.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ from ...record import Record
 Array = NDArray[np.float64]
 
 RUNAWAY = 1e100
-"""Inner products beyond this are those of a simulation that diverges."""
+"""Inner products above this value mean that the simulation diverges."""
 
 
 @dataclass(frozen=True, slots=True)
 class Nuisance:
-    """Disturbances that are free and linear in every record, and are eliminated exactly.
+    """Linear disturbances that are free in every record and are eliminated exactly.
 
     Parameters
     ----------
     offset : bool
-        A sensor zero of its own per record.
+        Whether the sensor zero is free in every record.
     hum_frequency : float, optional
-        Mains frequency [Hz] whose amplitude and phase are free per record.
+        Mains frequency [Hz]; amplitude and phase of the hum are free in every record.
     harmonics : int
-        Harmonics of the hum.
+        Number of harmonics of the hum.
     """
 
     offset: bool = False
@@ -63,7 +63,7 @@ class Nuisance:
             waves = zip(*harmonics(self.hum_frequency, self.harmonics, t), strict=True)
             for order, (cosine, sine) in enumerate(waves, 1):
                 line = order * self.hum_frequency * record.sample_period
-                # a line that the sample period folds onto dc is averaged away, and would free the offset
+                # a line that aliases to dc averages to zero, and would free the offset
                 if abs(line - round(line)) * record.size > 1.0:
                     rows += [cosine, sine]
         return np.array(rows).reshape(len(rows), size)
@@ -71,16 +71,16 @@ class Nuisance:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Gram:
-    """Inner products of one record after elimination of its nuisances.
+    """Inner products of one record after elimination of its disturbances.
 
     Parameters
     ----------
     size : int
         Number of samples.
     matrix : (q + k + 1, q + k + 1) ndarray
-        Of the q sensitivities in the order asked for, of k extra rows, and of the residual, which comes last.
+        Inner products of the q sensitivities in the requested order, of k extra rows, and of the residual (last).
     nuisance : (k,) ndarray
-        Amplitudes of the nuisances at the present parameters.
+        Amplitudes of the disturbances at the present parameters.
     """
 
     size: int
@@ -105,20 +105,20 @@ def grams(
     Parameters
     ----------
     model : Model
-        Simulated free-run.
+        Model that is simulated in free run.
     records : sequence of Record
-        In experiment order, so that those that continue do.
+        Records in experiment order, so that the state continues.
     wanted : sequence of str
-        Numbers of the model whose sensitivities enter, e.g. ``"creep.gamma"``.
+        Parameters whose sensitivities are computed, e.g. ``"creep.gamma"``.
     nuisance : Nuisance, optional
-        Eliminated per record.
+        Disturbances that are eliminated in every record.
     extra : sequence of (k, n) ndarray, optional
         Further rows of every record, e.g. finite changes of the simulation.
 
     Raises
     ------
     DivergenceError
-        If the output or a sensitivity leaves every range.
+        If the output or a sensitivity diverges.
     """
     nuisance = nuisance or Nuisance()
     q = len(wanted) + (len(extra[0]) if extra else 0)
@@ -148,7 +148,7 @@ def grams(
 
 
 def residuals(model: Model, records: Sequence[Record], nuisance: Nuisance | None = None) -> list[Array]:
-    """Measured minus free-run displacement of every record [m], nuisances removed."""
+    """Measured minus free-run displacement of every record [m], without the disturbances."""
     nuisance = nuisance or Nuisance()
     result = []
     for record, y in zip(records, model.free_run(records), strict=True):

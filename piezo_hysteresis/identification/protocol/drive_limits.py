@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`DriveLimits`: what may be sent to a stage, and the safe way there and back."""
+"""`DriveLimits`: limits of the drive, and ramps between the safe voltage and a waveform."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Samples = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class DriveLimits:
-    """Clock and limits of the drive; every waveform is made inside them.
+    """Sample period and limits of the drive; every waveform is made inside them.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class DriveLimits:
     max_slew_rate : float
         Steepest change between two samples [V/s].
     ramp_rate : float
-        Rate of the ways between the safe voltage and a waveform [V/s].
+        Rate of the ramps between the safe voltage and a waveform [V/s].
     rest : float
         Rest at the safe voltage before and after a waveform [s].
 
@@ -104,7 +104,7 @@ class DriveLimits:
         Raises
         ------
         IdentificationError
-            Naming the waveform, what was got and what was expected.
+            If it does; the message names the waveform.
         """
         low, high = float(voltage.min()), float(voltage.max())
         if low < self.voltage_min or high > self.voltage_max:
@@ -123,7 +123,7 @@ class DriveLimits:
             )
 
     def path(self, corners: Samples, rate: float) -> Samples:
-        """Straight lines through `corners` at one rate; no steeper than the slew limit, every corner met exactly.
+        """Straight lines through `corners` at one rate, at most the slew limit; every corner is reached exactly.
 
         Parameters
         ----------
@@ -145,11 +145,11 @@ class DriveLimits:
             line = begin + (end - begin) * (np.arange(1, count + 1) / max(count, 1))
             line[-1:] = end
             parts.append(line)
-        # Rounding alone may leave the corners by one bit.
+        # rounding may change the corners by one bit
         return np.clip(np.concatenate(parts), corners.min(), corners.max())
 
     def within_slew(self, voltage: Samples) -> Samples:
-        """Shrink a waveform about its first voltage until no step is steeper than the slew limit."""
+        """Scale a waveform about its first voltage so that no step exceeds the slew limit."""
         steepest = float(np.max(np.abs(np.diff(voltage)), initial=0.0)) / self.sample_period
         if steepest <= self.max_slew_rate:
             return voltage
@@ -157,7 +157,7 @@ class DriveLimits:
         return np.clip(shrunk, voltage.min(), voltage.max())
 
     def from_safe_to_safe(self, voltage: Samples) -> Samples:
-        """Add rest and ramp before and behind, so that a waveform starts and ends at the safe voltage.
+        """Add rest and ramp before and after, so that a waveform starts and ends at the safe voltage.
 
         Parameters
         ----------

@@ -15,8 +15,8 @@
 """Excitation waveforms in volts, inside the drive limits by construction.
 
 Levels and amplitudes are fractions of the voltage range, so that a waveform fits every stage; on the range 0 to
-10 V of the paper a fraction of 0.35 is 3.5 V. A waveform is only its body: `DriveLimits.from_safe_to_safe` adds the
-way there and back.
+10 V of the paper a fraction of 0.35 is 3.5 V. These functions make the waveform without ramps;
+`DriveLimits.from_safe_to_safe` adds the ramps from and to the safe voltage.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def steps(limits: DriveLimits, levels: Sequence[float], duration: float, slew_ra
     duration : float
         Hold after every edge [s].
     slew_rate : float
-        Slope of the edges [V/s]; the default is one sample, or the slew limit where that is slower.
+        Slope of the edges [V/s]; default: one sample, or the slew limit if it is slower.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def chirp(limits: DriveLimits, band: tuple[float, float], duration: float, centr
 
 
 def _random_phase(limits: DriveLimits, lines: np.ndarray, period: int, seed: int) -> Samples:
-    """One period of unit-rms cosines of equal size at the FFT `lines`, phases random."""
+    """One period of a sum of equal cosines at the FFT `lines` with random phases and unit RMS."""
     spectrum = np.zeros(period // 2 + 1, dtype=np.complex128)
     spectrum[lines] = np.exp(2j * np.pi * np.random.default_rng(seed).random(lines.size))
     wave = np.fft.irfft(spectrum, period)
@@ -118,7 +118,7 @@ def _random_phase(limits: DriveLimits, lines: np.ndarray, period: int, seed: int
 def noise(limits: DriveLimits, rms: float, bandwidth: float, duration: float, centre: float, seed: int) -> Samples:
     """Band-limited white noise about `centre` (paper, Sec. 3.3), faded in and out over 2 % of its length.
 
-    The noise has a flat spectrum up to `bandwidth` and random phases; peaks that would leave the range shrink it whole.
+    The noise has a flat spectrum up to `bandwidth` and random phases. If peaks exceed the range, it is scaled down.
 
     Parameters
     ----------
@@ -159,9 +159,9 @@ def _fit(wave: Samples, centre: float) -> Samples:
 def multisine(
     limits: DriveLimits, fundamental: float, highest: float, amplitude: float, periods: int, centre: float, seed: int
 ) -> Samples:
-    """Odd multisine: odd harmonics up to `highest` with equal size and random phases, periodic.
+    """Periodic odd multisine: odd harmonics up to `highest` with equal amplitude and random phases.
 
-    Even-order distortion then falls on the lines in between, where nothing was put in.
+    Even-order distortion then appears at the even lines, which are not excited.
 
     Parameters
     ----------
@@ -172,11 +172,11 @@ def multisine(
     amplitude : float
         Peak as fraction of the range.
     periods : int
-        Number of periods; the first holds the transient.
+        Number of periods; the first contains the transient.
     centre : float
         Mean as fraction of the range.
     seed : int
-        Seed of the phases: another seed is another realisation.
+        Seed of the phases.
 
     Returns
     -------
@@ -186,25 +186,25 @@ def multisine(
     period = limits.samples(1.0 / fundamental)
     lines = np.arange(1, min(int(highest / fundamental), period // 2 - 1) + 1, 2)
     wave = _random_phase(limits, lines, period, seed)
-    # Starting where the wave crosses its mean keeps the entry free of a jump.
+    # a start at a zero crossing avoids a jump
     wave = np.roll(wave, -int(np.argmin(np.abs(wave))))
     wave *= amplitude / np.max(np.abs(wave))
     return limits.volts(centre + _fit(np.tile(wave, periods), centre))
 
 
 def nested_loops(outer: float, levels: int, centre: float = 0.5) -> tuple[float, ...]:
-    """Corners of loops inside one another and out again: 0, +outer, −…, inner, …, +outer, 0 about `centre`."""
+    """Corners of nested loops, inwards and outwards again: 0, +outer, −…, inner, …, +outer, 0 about `centre`."""
     inward = [centre + (-1) ** k * outer * (1.0 - k / levels) for k in range(levels)]
     return (0.0, *inward, *reversed(inward), 0.0)
 
 
 def decaying_loops(outer: float, ratio: float, count: int, centre: float = 0.5) -> tuple[float, ...]:
-    """Corners of loops about `centre` that shrink by `ratio` each half turn and end there."""
+    """Corners of loops about `centre` whose amplitude decreases by `ratio` each half turn; they end at `centre`."""
     return (*(centre + outer * (-ratio) ** k for k in range(count)), centre)
 
 
 def mixture(limits: DriveLimits, duration: float, seed: int) -> Samples:
-    """Random turning points at random speeds under two random sines and a little noise: data no fit has seen.
+    """Random turning points at random speeds, two random sines and weak noise, for validation.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def mixture(limits: DriveLimits, duration: float, seed: int) -> Samples:
     duration : float
         Length [s].
     seed : int
-        Seed of everything random in it.
+        Seed of the random numbers.
 
     Returns
     -------

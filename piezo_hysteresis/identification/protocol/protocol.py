@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ProtocolPhase` and `Protocol`: what will be played to a stage, in which order, and how it will be stored."""
+"""`ProtocolPhase` and `Protocol`: the waveforms that are played to a stage, their order, and how they are stored."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SINES = (1.0, 50.0, 100.0, 200.0, 300.0, 400.0)
 """Frequencies of the paper, Table 1 [Hz]."""
 
 CORNERED = 1e-4
-"""Slowest stored period [s] of loops with sharp turning points, which averaging over a block flattens."""
+"""Longest stored sample period [s] of loops with sharp turning points, because averaging flattens them."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -46,7 +46,7 @@ class ProtocolPhase:
     sample_period : float
         Period at which the drive is played [s].
     stored_every : int
-        Samples averaged into one when the phase is stored (`Record.decimate`); 1 where the dynamics are wanted.
+        Number of samples averaged into one when the phase is stored (`Record.decimate`); 1 to keep the dynamics.
     """
 
     name: str
@@ -72,20 +72,20 @@ class ProtocolPhase:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a protocol will do to the stage, known before anything moves.
+    """Summary of a protocol, available before the stage moves.
 
     Parameters
     ----------
     phases : int
         Number of phases.
     duration : float
-        Plant time [s].
+        Stage time [s].
     voltage_min, voltage_max : float
         Range of the drive [V].
     largest_slew : float
         Steepest change between two samples [V/s].
     stored_samples : int
-        Samples the experiment will hold.
+        Number of samples of the experiment.
     """
 
     phases: int
@@ -119,7 +119,7 @@ class Protocol:
     def __post_init__(self) -> None:
         object.__setattr__(self, "phases", tuple(self.phases))
         if not self.phases:
-            raise IdentificationError(f"protocol '{self.name}' holds no phase; expected at least one")
+            raise IdentificationError(f"protocol '{self.name}': got no phase, expected at least one")
         for phase in self.phases:
             self.limits.check(phase.voltage, f"phase '{phase.name}'")
 
@@ -149,7 +149,7 @@ class _Plan:
         self.limits, self.seed, self.phases = limits, seed, list[ProtocolPhase]()
 
     def add(self, name: str, body: Samples, stored_period: float = 0.0) -> None:
-        """Append a phase, stored at most as slowly as `stored_period` [s]."""
+        """Append a phase with a stored sample period of at most `stored_period` [s]."""
         every = max(1, int(stored_period / self.limits.sample_period + 1e-9))
         self.phases.append(ProtocolPhase(name, self.limits.from_safe_to_safe(body), self.limits.sample_period, every))
 
@@ -158,12 +158,12 @@ class _Plan:
         return self.seed
 
     def conditioning(self) -> None:
-        """Two full strokes and shrinking loops: what the stage did before no longer matters."""
+        """Two full strokes and decaying loops, which remove the influence of the past motion."""
         corners = (0.0, 1.0, 0.0, *excitation.decaying_loops(0.5, 0.7, 12))
         self.add(CONDITIONING, excitation.ramps(self.limits, corners, self.limits.ramp_rate), CORNERED)
 
     def step(self, edges: int, duration: float) -> None:
-        """Edges of 0.3 of the range at several levels: high enough to see the onset, low enough to be gentle."""
+        """Edges of 0.3 of the range at several levels: large enough to see the onset, small enough for the stage."""
         levels = tuple((0.2, 0.5, 0.8, 0.5)[k % 4] for k in range(edges + 1))
         self.add("step", excitation.steps(self.limits, levels, duration))
 
@@ -203,7 +203,7 @@ def paper(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
     limits : DriveLimits, optional
         Clock and limits; the default is the range 0 to 10 V at 20 µs.
     seed : int
-        Seed of everything random.
+        Seed of the random waveforms.
     """
     plan = _Plan(limits or DriveLimits(), seed)
     plan.step(edges=32, duration=0.01)
@@ -215,7 +215,7 @@ def paper(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
 
 
 def short(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
-    """All that an identification needs in about 25 s of plant time; parameters as in `paper`."""
+    """All phases that an identification needs, about 25 s of stage time; parameters as in `paper`."""
     plan = _Plan(limits or DriveLimits(), seed)
     limits = plan.limits
     plan.conditioning()
@@ -233,7 +233,7 @@ def short(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
 
 
 def rich(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
-    """The long protocol that shows every effect of the catalogue, about 175 s; parameters as in `paper`."""
+    """Long protocol that shows every effect of the catalogue, about 175 s; parameters as in `paper`."""
     plan = _Plan(limits or DriveLimits(), seed)
     limits = plan.limits
     slow, slowest = 1e-3, 1e-2

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The way into the first full loop of a record that begins in an unknown state.
+"""The conditioning part of a record that begins in an unknown state, up to its first full loop.
 
-Hysteresis forgets what came before once the drive has been at both ends of its range: the samples up to there carry
-the state and are not fitted, those behind it are as good as any.
+After the drive has been at both ends of its range, the hysteresis does not depend on the past. The samples up to there
+determine the state and are not fitted; all later samples are.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ import numpy as np
 from ...record import CONDITIONING, Experiment, Notice, Record
 
 AT_THE_END = 0.02
-"""Distance from an end of the range of the drive, as share of the range, that counts as having been there."""
+"""Largest distance from an end of the drive range that counts as reaching it, as a share of the range."""
 LONGEST = 0.5
-"""Share of a record that may be given up for it."""
+"""Largest share of a record that is used for conditioning."""
 
 
 def conditioning_length(record: Record) -> int:
-    """Samples until the drive has been at both ends of its range; 0 where too few would be left.
+    """Number of samples until the drive has been at both ends of its range; 0 if too few would remain.
 
     Examples
     --------
@@ -50,21 +50,21 @@ def conditioning_length(record: Record) -> int:
 
 
 def covers(lead: Record, record: Record) -> bool:
-    """True where the drive of `lead` has been at both ends of the range of the drive of `record`."""
+    """True if the drive of `lead` has been at both ends of the drive range of `record`."""
     near = AT_THE_END * float(np.ptp(record.voltage))
     low, high = float(lead.voltage.min()), float(lead.voltage.max())
     return low <= float(record.voltage.min()) + near and high >= float(record.voltage.max()) - near
 
 
 def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice, ...]]:
-    """Every truncated record cut in two: a conditioning phase up to the first full loop, and the rest, which continues.
+    """Cut every truncated record in two: a conditioning phase up to the first full loop, and the continuing rest.
 
     Returns
     -------
     experiment : Experiment
         The same samples.
     notices : tuple of Notice
-        ``conditioning_length`` where a record was cut.
+        ``conditioning_length`` for every record that was cut.
     """
     records: list[Record] = []
     notices: list[Notice] = []

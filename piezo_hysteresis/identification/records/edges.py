@@ -51,16 +51,16 @@ def find_edges(voltage: Samples, before: int, after: int, tolerance: float = 0.0
     voltage : (n,) array
         Drive [V].
     before, after : int
-        Fewest quiet samples wanted on either side.
+        Smallest number of quiet samples before and after.
     tolerance : float
         Changes below this fraction of the range count as quiet.
     longest : int
-        Most samples an edge may take.
+        Largest number of samples of an edge.
 
     Returns
     -------
     list of Edge
-        In order of time.
+        Edges in order of time.
     """
     span = float(np.ptp(voltage))
     if span == 0.0:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ExcitationContent`: what a record can teach, judged from its drive: loops, dynamics, noise."""
+"""`ExcitationContent`: what a record can show, judged from its drive: loops, dynamics, noise."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from numpy.typing import NDArray
 from ...record import Record, Samples
 
 SLOW = 30.0
-"""Drives below this [Hz] show the dynamics of a stage as a lag only."""
+"""Frequency below which a drive shows the dynamics of a stage only as a lag [Hz]."""
 MANY_LINES = 48
-"""Spectral lines that a drive must hold to determine orders of dynamics."""
+"""Smallest number of spectral lines of a drive that determines the order of the dynamics."""
 MANY_MOMENTS = 12.0
-"""Samples over which its changes must be spread: one step is not enough."""
+"""Smallest effective number of samples in which it changes; one step is not enough."""
 MARKED = 0.95
-"""Share of the power of dv/dt by which bandwidth and lines are counted."""
+"""Share of the power of dv/dt that defines bandwidth and number of lines."""
 UNMEASURED = 5e-4
-"""Share of the range below which the highest frequencies of a drive are noise of its recorder, no excitation."""
+"""Share of the range below which the highest frequencies of a drive are noise of the recorder and not excitation."""
 GAUSSIAN = 1.4826
 """Standard deviation over median absolute value."""
 
@@ -46,16 +46,16 @@ class ExcitationContent:
     Parameters
     ----------
     span : float
-        Range of the drive, the settled voltage before it included [V].
+        Range of the drive, including the settled voltage before it [V].
     bandwidth : float
         Frequency below which 95 % of the power of dv/dt lies [Hz].
     slowest : float
-        Frequency above which 95 % of it lies [Hz], at least that of half a cycle in the record.
+        Frequency above which 95 % of this power lies [Hz], at least that of half a cycle in the record.
     lines : int
-        Number of spectral lines that hold 95 % of it.
+        Number of spectral lines with 95 % of this power.
     moments : float
-        Over how many samples its changes are spread, (Σ x²)²/Σ x⁴ of dv or d²v, whichever is less: a jump in a slow
-        drive holds little of dv, but all of d²v.
+        Effective number of samples in which the drive changes, the smaller of (Σ x²)²/Σ x⁴ for dv and d²v: a jump in a
+        slow drive has little of the power of dv, but all of the power of d²v.
     noise : float
         Standard deviation of the sensor noise [m].
     """
@@ -69,12 +69,12 @@ class ExcitationContent:
 
     @property
     def is_broadband(self) -> bool:
-        """True where the drive determines linear dynamics."""
+        """True if the drive determines linear dynamics."""
         return self.bandwidth > SLOW and self.lines >= MANY_LINES and self.moments >= MANY_MOMENTS
 
     @property
     def is_slow(self) -> bool:
-        """True where the stage follows the drive but for a lag."""
+        """True if the stage follows the drive with only a lag."""
         return self.bandwidth <= SLOW
 
 
@@ -97,7 +97,7 @@ def excitation_content(record: Record) -> ExcitationContent:
 
 
 def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:
-    """Spectrum of dv, without the highest frequencies in which v moves no more than its recorder's noise would."""
+    """Spectrum of dv, without the highest frequencies where v does not exceed the noise of its recorder."""
     if not speed.size:
         return np.zeros(1, np.complex128)
     spectrum = np.fft.rfft(speed)
@@ -109,7 +109,7 @@ def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:
 
 
 def _spread(values: Samples) -> float:
-    """Over how many samples the power of a signal is spread."""
+    """Effective number of samples that contain the power of a signal."""
     squares = values * values
     fourth = float(squares @ squares)
     return float(squares.sum()) ** 2 / fourth if fourth > 0.0 else 0.0
@@ -118,14 +118,14 @@ def _spread(values: Samples) -> float:
 def noise_of(record: Record, fewest: int = 64) -> float:
     """Standard deviation of the sensor noise [m].
 
-    From the longest rest of the record, a parabola removed; without a rest of `fewest` samples from third differences,
-    which a smooth motion leaves near zero.
+    From the longest rest of the record after subtraction of a parabola. Without a rest of `fewest` samples, from third
+    differences, which are near zero for a smooth motion.
     """
     y = record.displacement
     moves = np.flatnonzero(np.concatenate(([True], np.diff(record.voltage) != 0.0, [True])))
     longest = int(np.argmax(np.diff(moves))) if moves.size > 1 else 0
     start, stop = (int(moves[longest]), int(moves[longest + 1])) if moves.size > 1 else (0, y.size)
-    # The stage rings after the drive stops: the later half is the rest.
+    # the stage rings after the drive stops, so only the later half is used
     start += (stop - start) // 2 if start > 0 else 0
     if stop - start >= fewest:
         t = np.linspace(-1.0, 1.0, stop - start)
@@ -137,9 +137,9 @@ def noise_of(record: Record, fewest: int = 64) -> float:
 
 
 def noise_on_motion(values: Samples, order: int) -> float:
-    """Standard deviation of the noise on a smooth motion, from differences of the order given: robust, and white.
+    """Standard deviation of white noise on a smooth motion, from differences of the given order.
 
-    The differences have the squares of the binomial coefficients for power, in all C(2 order, order).
+    The differences have the power C(2 order, order), the sum of the squared binomial coefficients.
 
     Examples
     --------
@@ -152,9 +152,9 @@ def noise_on_motion(values: Samples, order: int) -> float:
 
 
 def sensor_noise(records: Sequence[Record]) -> list[float]:
-    """Standard deviation of the sensor noise of every record [m], the least that any record at its period shows.
+    """Standard deviation of the sensor noise of every record [m]: the smallest one of records at its sample period.
 
-    One sensor took them all: what a record shows beyond the quietest is motion, such as the ringing behind a step.
+    All records have the same sensor, so a larger value in one record is motion, such as ringing after a step.
     """
     own = [min(noise_of(r), noise_on_motion(r.displacement, 3)) if r.size >= 8 else noise_of(r) for r in records]
     least: list[float] = []
@@ -166,7 +166,7 @@ def sensor_noise(records: Sequence[Record]) -> list[float]:
 
 
 def excited_part(record: Record, window: int = 64) -> Record:
-    """The part of a broadband record between its ramps: where the drive is curved throughout, not straight."""
+    """The part of a broadband record between its ramps, where the drive is curved everywhere."""
     curvature = np.abs(np.diff(record.voltage, 2))
     if curvature.size <= window or curvature.max() == 0.0:
         return record

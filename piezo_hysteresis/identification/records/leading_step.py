@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The jump with which a record begins: a step experiment within a slow one, that shows delay and lag.
+"""The jump at the beginning of a record: a step experiment in a slow record, which shows delay and lag.
 
-At one frequency a lag and a narrow play turn the loop alike. Only the first moments behind a jump distinguish them, and
-they are few: as a block of their own they keep the weight that they deserve.
+At a single frequency a lag and a narrow play have the same influence on the loop. Only the first samples after a jump
+distinguish them. They are few, and therefore form a separate block with its own weight.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ Blocks = tuple[Sequence[Record], Sequence[float], Collection[int]]
 """Records in order, the floor of each [m], and the indices of those to fit."""
 
 SUDDEN = 10.0
-"""A jump is so many times steeper than the drive usually is."""
+"""Smallest ratio of the slope of a jump to the usual slope of the drive."""
 LARGE = 0.05
-"""Share of the range of the drive that it spans."""
+"""Smallest height of a jump, as a share of the drive range."""
 FEWEST = 8
 """Smallest number of samples after the step."""
 WEIGHT = 1 / 16
-"""Weight of a jump beside that of the record it begins."""
+"""Weight of a jump relative to that of its record."""
 
 
 def step_length(record: Record) -> int:
-    """Samples from the jump at the begin of a record until the drive has gone as far again; 0 without a jump.
+    """Samples from the jump at the beginning of a record until the drive has moved as far again; 0 without a jump.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def step_length(record: Record) -> int:
 
 
 def begins_with_a_jump(record: Record) -> bool:
-    """True where the first voltage is far from the settled one, against the usual speed of the drive and its range."""
+    """True if the first voltage is far from the settled one, compared with the speed and the range of the drive."""
     jump = abs(float(record.voltage[0]) - record.settled_voltage)
     speed = np.abs(np.diff(record.voltage))
     reach = float(np.ptp(np.append(record.voltage, record.settled_voltage)))
@@ -66,14 +66,14 @@ def begins_with_a_jump(record: Record) -> bool:
 
 
 def steps_apart(records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Blocks:
-    """Records, floors and indices to fit, the jump of every fitted record a block of its own.
+    """Records, floors and indices to fit, with the jump of every fitted record as a separate block.
 
     Parameters
     ----------
     records : sequence of Record
         The experiment, in order.
     floors : sequence of float
-        Floor of every record [m]; that of a jump grows, so that it weighs `WEIGHT` of its record.
+        Floor of every record [m]; that of a jump is increased, so that its relative weight is `WEIGHT`.
     fitted : collection of int
         Indices of the records to fit.
     """

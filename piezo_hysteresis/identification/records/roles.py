@@ -93,7 +93,7 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
     triangles = [i for i in slow if i in straight]
     moving = [i for i in fitted if contents[i].span >= LARGE * largest > 0.0]
     fastest = experiment.fastest_period
-    # a triangle turns a few times, and is straight between
+    # a triangle has few turning points and straight lines between them
     rich = [i for i in fitted if contents[i].is_broadband and i not in straight]
     broadband = [i for i in rich if experiment[i].sample_period < 1.001 * fastest]
     return Roles(contents, fitted, out, tuple(triangles or slow or moving), tuple(broadband))

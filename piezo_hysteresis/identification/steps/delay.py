@@ -65,7 +65,7 @@ class Delay:
     response : StepResponse
         Averaged step response at the finest sample period.
     notices : tuple of Notice
-        What limits the answer: ``delay_ambiguous``, ``delay_inconsistent``, ``delay_unresolved``.
+        Limits of the estimate: ``delay_ambiguous``, ``delay_inconsistent``, ``delay_unresolved``.
     """
 
     samples: int
@@ -176,7 +176,7 @@ def identify_delay(records: Iterable[Record], factors: tuple[int, ...] = (1, 2, 
     messages = {
         "delay_ambiguous": f"the response begins at sample {samples} or {int(first)}; noise hides the first response",
         "delay_unresolved": (
-            f"the response begins within one sample period of {finest:.3g} s, so that only an "
+            f"the response begins within one sample period of {finest:.3g} s, so only an "
             "upper bound of the delay is known"
         ),
     }

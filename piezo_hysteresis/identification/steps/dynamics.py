@@ -14,9 +14,8 @@
 
 """Step 2: linear dynamics, an ARX model by least squares (paper, Sec. 3.3).
 
-The equation error that least squares makes small is not the output error: noise of the sensor on y enters the
-regressors and biases A(z). Steiglitz-McBride iterations (prefiltering with 1/A of the step before) remove that bias
-where the noise is white.
+Least squares minimises the equation error and not the output error: sensor noise on y enters the regressors and biases
+A(z). Steiglitz-McBride iterations (prefiltering with 1/A of the step before) remove this bias if the noise is white.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ PATIENCE, GAINS = 3, 0.99
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Dynamics:
-    """G(z) = B(z)/A(z)·z^(−d), Eq. (4) and (5), and how well it describes its data.
+    """G(z) = B(z)/A(z)·z^(−d), Eq. (4) and (5), with its errors on the fitted data.
 
     Parameters
     ----------
@@ -57,7 +56,7 @@ class Dynamics:
     one_step_error : float
         RMS of y minus its prediction from the measured y up to one sample before; ARX minimises it [unit of y].
     free_run_error : float
-        RMS of y minus the simulation from the input alone; models are compared by it [unit of y].
+        RMS of y minus the simulation from the input alone, for the comparison of models [unit of y].
     notices : tuple of Notice
         ``unstable_reflected``, if poles were mirrored into the unit circle.
     """
@@ -101,7 +100,7 @@ def solve(r: NDArray[np.float64], columns: slice | NDArray[np.intp] = _ALL) -> t
 
 
 def reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
-    """Mirror poles outside the unit circle into it and scale B so that |B/A| stays; the number mirrored."""
+    """Mirror poles outside the unit circle into it, with the same |B/A|; returns a, b and the number mirrored."""
     poles = np.roots(np.concatenate(([1.0], a)))
     outside = np.abs(poles) > LARGEST_POLE
     if not outside.any():
@@ -109,7 +108,7 @@ def reflected(a: Samples, b: Samples) -> tuple[Samples, Samples, int]:
     radius = np.abs(poles[outside])
     poles[outside] *= np.minimum(1.0 / radius, LARGEST_POLE) / radius
     a = np.real(np.poly(poles))[1:]
-    # poles that crowd near 1 come out of rounded coefficients elsewhere, and may be outside again: all are drawn in
+    # rounding of the coefficients moves poles that crowd near 1, possibly outside again: all are moved inwards
     while (largest := float(np.abs(np.roots(np.concatenate(([1.0], a)))).max())) >= 1.0:
         a = a * (DRAWN_IN / largest) ** np.arange(1, a.size + 1)
     return a, b / np.prod(np.maximum(radius, 1.0)), int(outside.sum())
@@ -160,8 +159,8 @@ def identify_arx(
     Raises
     ------
     IdentificationError
-        If a record is shorter than the orders, the input does not move, the orders make no sense, or the output does
-        not follow the input.
+        If a record is shorter than the orders, the input does not move, the orders are invalid, or the output does not
+        follow the input.
 
     Notes
     -----
@@ -190,7 +189,7 @@ def identify_arx(
             ),
         )
         arx = settling(a, b, delay)
-        if arx is None:  # the iterations run away
+        if arx is None:  # the iterations diverge
             if not candidates:
                 raise IdentificationError("ARX: got no dynamics that settle, expected an output that follows the input")
             break
@@ -203,7 +202,7 @@ def identify_arx(
 
 
 def delay_of(signals: Signals, longest: int = 16, order: int = 8, sure: float = 5.0) -> int:
-    """Delay in samples where no step shows it: the first coefficient of a long B(z) that is not zero.
+    """Delay [samples] without a step phase: the first coefficient of a long B(z) that is not zero.
 
     Parameters
     ----------
@@ -214,7 +213,7 @@ def delay_of(signals: Signals, longest: int = 16, order: int = 8, sure: float = 
     order : int
         na, and the number of coefficients of B(z) after the longest delay.
     sure : float
-        Standard errors beyond which a coefficient counts.
+        Smallest significant coefficient, in standard errors.
     """
     regressors = triangle(signals, (order, longest + order), 1)
     theta, left = solve(regressors)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Empirical frequency response with its uncertainty, beside the ARX model (paper, Fig. 5)."""
+"""Empirical frequency response with its uncertainty, for comparison with the ARX model (paper, Fig. 5)."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ def welch(signals: Iterable[tuple[Samples, Samples]], sample_period: float, segm
     Returns
     -------
     FrequencyResponse
-        Without the dc line.
+        Response without the dc line.
 
     Raises
     ------
     IdentificationError
-        If the data hold fewer than two segments.
+        If the data contain fewer than two segments.
 
     Notes
     -----
@@ -107,9 +107,9 @@ def welch(signals: Iterable[tuple[Samples, Samples]], sample_period: float, segm
 
 
 def swept(signals: Iterable[tuple[Samples, Samples]], sample_period: float, neighbours: int = 16) -> FrequencyResponse:
-    """Response from sweeps, by averaging over neighbouring lines of the spectrum of each as a whole.
+    """Response from sweeps, by averaging over neighbouring lines of the spectrum of each whole sweep.
 
-    A segment of a sweep holds a part of its frequencies only; segments cannot be averaged.
+    Segments cannot be averaged, because a segment of a sweep contains only a part of the frequencies.
 
     Parameters
     ----------
@@ -118,12 +118,12 @@ def swept(signals: Iterable[tuple[Samples, Samples]], sample_period: float, neig
     sample_period : float
         Sample period [s].
     neighbours : int
-        Lines averaged into one.
+        Number of lines averaged into one.
 
     Returns
     -------
     FrequencyResponse
-        Where the sweeps have at least a thousandth of their highest power.
+        Response at frequencies with at least a thousandth of the highest power.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def swept(signals: Iterable[tuple[Samples, Samples]], sample_period: float, neig
 
 
 def periodic(u: Samples, y: Samples, sample_period: float, period: int, skip: int = 1) -> FrequencyResponse:
-    """Response from periodic data (multisine, sine) at the excited lines, averaged over the periods: no leakage.
+    """Response from periodic data (multisine, sine) at the excited lines, averaged over periods, without leakage.
 
     Parameters
     ----------
@@ -161,12 +161,12 @@ def periodic(u: Samples, y: Samples, sample_period: float, period: int, skip: in
     period : int
         Samples per period.
     skip : int
-        Periods left out at the beginning, where the transient decays.
+        Number of periods left out at the beginning, because of the transient.
 
     Returns
     -------
     FrequencyResponse
-        At the excited lines only.
+        Response at the excited lines.
 
     Raises
     ------

@@ -68,11 +68,11 @@ def fit_hysteresis(model: Model, records: Sequence[Record], loops: Collection[in
     Parameters
     ----------
     model : Model
-        Scales, dynamics, and the form of the hysteresis; its values do not matter.
+        Scales, dynamics, and the form of the hysteresis; its values are not used.
     records : sequence of Record
         The experiment, in order.
     loops : collection of int
-        Indices of the slow records to fit; those they continue carry the state.
+        Indices of the slow records to fit; the records that they continue determine the state.
 
     Returns
     -------

@@ -130,7 +130,7 @@ def choose_memory(
 def left_out(blocks: Sequence[Record], floors: Sequence[float], fitted_to: Callable[[list[int]], Model]) -> Array:
     """RMS residual over floor of every block with a finite floor, from a fit without it and its neighbours.
 
-    The zero of every block is free: a drift says nothing about the hysteresis.
+    The zero of every block is free, so that drift has no influence.
 
     Parameters
     ----------

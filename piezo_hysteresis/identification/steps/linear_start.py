@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Linear dynamics behind a known hysteresis: the start of the joint fit.
+"""Linear dynamics after a known hysteresis: the start of the joint fit.
 
-ARX from w, the output of the current Bouc-Wen operator, does not see the forgetting of the hysteresis state that
-spoils ARX from v.
+An ARX model from w, the output of the present hysteresis operator, is not biased by the loss of memory of the
+hysteresis state, as an ARX model from v is.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from .dynamics import Dynamics, identify_arx
 from .regressors import Signals
 
 ITERATIONS = 12
-"""Steiglitz-McBride iterations of the start at most: weak, lightly damped modes come last."""
+"""Largest number of Steiglitz-McBride iterations; weak, lightly damped modes converge last."""
 FEW_ITERATIONS = 3
-"""Those tried beside, for what is missing may lead the many astray."""
+"""Smaller number that is tried too, because a missing effect can disturb many iterations."""
 
 
 def hysteresis_signals(model: Model, records: Sequence[Record], wanted: Collection[int]) -> Signals:
@@ -55,12 +55,12 @@ def dynamics_behind(
     orders: tuple[int, int],
     iterations: int = ITERATIONS,
 ) -> Dynamics:
-    """ARX from w of the model's hysteresis, its dc gain set to that of the model's `Arx`.
+    """ARX model from w of the model's hysteresis, with the dc gain of the model's `Arx`.
 
     Parameters
     ----------
     model : Model
-        With a hysteresis that has been fitted.
+        Model with fitted hysteresis.
     records : sequence of Record
         The experiment, in order.
     broadband : collection of int
@@ -70,13 +70,13 @@ def dynamics_behind(
     orders : (int, int)
         na and nb.
     iterations : int
-        Steiglitz-McBride iterations at most.
+        Largest number of Steiglitz-McBride iterations.
     """
     return identify_arx(hysteresis_signals(model, records, broadband), delay, model.sample_period, orders, iterations)
 
 
 def with_dynamics(model: Model, arx: Arx) -> Model:
-    """The model with other dynamics, scaled so that its dc gain, the gauge, stays.
+    """The model with other dynamics, scaled to the same dc gain.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def form_of(model: Model) -> tuple[int, float, tuple[int, int]]:
 
 
 def follower(model: Model, delay: int, orders: tuple[int, int], pole: float = 0.5) -> Arx:
-    """One pole with the dc gain of the model, in the form of higher orders: a start that is never absurd."""
+    """One pole with the dc gain of the model, written with higher orders, as a safe start."""
     na, nb = orders
     pole = pole if na else 0.0
     gain = dynamics_of(model).dc_gain * (1.0 - pole)

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Dynamics as a sum of modes, fitted by output error: what poles that crowd near z = 1 need.
+"""Dynamics as a sum of modes, fitted by output error, for poles that crowd near z = 1.
 
-At 50 kHz the poles of a mode at 500 Hz lie within 0.06 of z = 1. Coefficients of A(z) then depend on one another to
-the last digits, and noise at high frequencies outweighs the modes. A sum of sections of second order has neither
-problem. Its starting values are the poles of dynamics that were found at a lower rate, mapped back by z → z^(1/q).
+At 50 kHz the poles of a mode at 500 Hz lie within 0.06 of z = 1. The coefficients of A(z) are then correlated to the
+last digits, and noise at high frequencies dominates the fit. A sum of second-order sections avoids both problems. Its
+start values are the poles of dynamics identified at a lower rate, mapped back by z → z^(1/q).
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ SHORTEST = 50
 SAMPLES = 60_000
 """Largest number of samples that are fitted."""
 SIMULATIONS, CONVERGED = 20, 1e-3
-"""Simulations of a fit at most, and the relative decrease of the squared error at which it ends."""
+"""Largest number of simulations of a fit, and relative decrease of the squared error at convergence."""
 INDEPENDENT = 1e-13
-"""Least share of the largest eigenvalue from which a direction counts."""
+"""Smallest eigenvalue of a determined direction, relative to the largest one."""
 AWAY = 1e3
-"""Multiple of the output that counts as the residual of sections that run away."""
+"""Residual that is assigned to unstable sections, as a multiple of the output."""
 
 
 def identify_modes(
@@ -70,12 +70,12 @@ def identify_modes(
     Raises
     ------
     IdentificationError
-        On other orders, if no record is long enough or shows a mode, or if poles crowd so much that rounded
-        coefficients do not hold them.
+        If the orders are invalid, if no record is long enough or shows a mode, or if poles crowd so much that rounded
+        coefficients cannot represent them.
 
     Notes
     -----
-    Output error by variable projection, Golub and Pereyra 1973: the numerators follow linearly from the denominators.
+    Output error by variable projection (Golub and Pereyra 1973): the numerators follow linearly from the denominators.
     """
     if orders[0] != orders[1] or orders[0] % 2:
         raise IdentificationError(f"modes: got orders {orders}, expected na = nb, an even number")
@@ -92,12 +92,14 @@ def identify_modes(
     a, b = _polynomials(*_fitted(sections, few))
     arx = settling(a, b, delay)
     if arx is None:
-        raise IdentificationError("modes: got poles that crowd so much that coefficients in double precision miss them")
+        raise IdentificationError(
+            "modes: got poles so close to each other that coefficients in double precision cannot represent them"
+        )
     return in_free_run(Dynamics(arx, sample_period), signals)
 
 
 def _beginnings(signals: Signals, delay: int) -> Signals:
-    """Delayed drive about its start, and output about its mean, of the beginnings of the records, each settled."""
+    """Delayed drive relative to its start, and output without its mean, of the beginnings of the settled records."""
     share = min(1.0, SAMPLES / sum(y.size for _, y in signals))
     cuts = [(u[: int(share * u.size)], y[: int(share * y.size)]) for u, y in signals]
     return [(_delayed(u - u[0], delay), y - y.mean()) for u, y in cuts]
@@ -106,7 +108,7 @@ def _beginnings(signals: Signals, delay: int) -> Signals:
 def _found_at(
     factor: int, signals: Signals, delay: int, sample_period: float, orders: tuple[int, int], iterations: int
 ) -> Array:
-    """Denominators (na/2, 2) of sections, from dynamics found at a lower rate."""
+    """Denominators (na/2, 2) of the sections, from dynamics identified at a lower rate."""
     slow = [
         (scipy.signal.decimate(u - u[0], factor, ftype="fir"), scipy.signal.decimate(y - y[0], factor, ftype="fir"))
         for u, y in signals
@@ -119,13 +121,13 @@ def _found_at(
     modes = poles[poles.imag > 0.0] ** (1.0 / factor)
     if not modes.size:
         raise IdentificationError(f"modes: got none at a rate lower by {factor}, expected a pair of poles")
-    sections = np.zeros((orders[0] // 2, 2))  # what is no mode is no pole: slow ones would imitate creep
+    sections = np.zeros((orders[0] // 2, 2))  # only modes are used, because slow real poles would imitate creep
     sections[: modes.size] = np.column_stack((-2.0 * modes.real, np.abs(modes) ** 2))
     return sections
 
 
 def _projected(sections: Array, signals: Signals) -> tuple[Array, Array, Array]:
-    """The numerators that fit best (k, 2), the residual that they leave, and what every tap answers."""
+    """The best numerators (k, 2), their residual, and the response of every tap."""
     shaped = [[scipy.signal.lfilter([1.0], [1.0, *a], u) for a in sections] for u, _ in signals]
     basis = _about_means([np.array([_delayed(s, k) for s in one for k in (0, 1)]) for one in shaped])
     scale = np.linalg.norm(basis, axis=1)
@@ -147,7 +149,7 @@ def _slopes(sections: Array, numerators: Array, signals: Signals) -> Array:
 
 
 def _about_means(records: Sequence[Array]) -> Array:
-    """Rows of every record about their means, joined."""
+    """Rows of all records without their means, concatenated."""
     return np.concatenate([rows - rows.mean(axis=1, keepdims=True) for rows in records], axis=1)
 
 
@@ -156,10 +158,10 @@ def _delayed(x: Array, samples: int) -> Array:
 
 
 def _fitted(sections: Array, signals: Signals) -> tuple[Array, Array]:
-    """Denominators and numerators of the least output error."""
+    """Denominators and numerators with the smallest output error."""
     output = np.concatenate([y for _, y in signals])
 
-    @lru_cache(maxsize=1)  # slopes are asked for where the residual has just been
+    @lru_cache(maxsize=1)  # derivatives are requested at the parameters of the last residual
     def projected(flat: tuple[float, ...]) -> tuple[Array, Array, Array]:
         return _projected(np.reshape(flat, (-1, 2)), signals)
 

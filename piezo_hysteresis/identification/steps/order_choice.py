@@ -28,7 +28,7 @@ from .regressors import Signals, triangle
 
 @dataclass(frozen=True, slots=True)
 class OrderError:
-    """Errors of one order na = nb: on the data it was fitted to (one step), and free-run on the records held out."""
+    """Errors of one order na = nb: one-step error on the fitted data, free-run error on other data."""
 
     order: int
     one_step_error: float
@@ -36,7 +36,7 @@ class OrderError:
 
 
 def compare_orders(signals: Signals, delay: int, sample_period: float, highest: int = 10) -> tuple[OrderError, ...]:
-    """Error against order na = nb = 1 … `highest`: fitted to the first two thirds of every record, judged on the rest.
+    """Error of the orders na = nb = 1 … `highest`, fitted to the first two thirds of every record, judged on the rest.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ def compare_orders(signals: Signals, delay: int, sample_period: float, highest: 
     sample_period : float
         Sample period [s].
     highest : int
-        Highest order; the regressors of the lower ones are among its own.
+        Highest order; its regressors include those of the lower orders.
 
     Returns
     -------
     tuple of OrderError
-        In rising order.
+        Errors in rising order.
     """
     cuts = [2 * y.size // 3 for _, y in signals]
     early = [(u[:cut], y[:cut]) for (u, y), cut in zip(signals, cuts, strict=True)]

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Least squares of ARX from inner products: the regressors are one signal seen at many delays.
+"""Least squares of ARX from inner products: the regressors are delayed copies of the same signals.
 
-Sum over all samples of x_(i−j) z_(i−k) differs from that of x_(i−j+1) z_(i−k+1) by one product at either end, so a
-row and a column of products give them all. Where that squares too large a condition number, an orthogonal
-factorisation of the regressors themselves takes its place.
+The sum over all samples of x_(i−j) z_(i−k) differs from that of x_(i−j+1) z_(i−k+1) by one product at each end, so all
+inner products follow from one row and one column. If the squared condition number is too large, an orthogonal
+factorisation of the regressors is used instead.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ Signals = Sequence[tuple[Samples, Samples]]
 """Input and output of every record, at one sample period."""
 
 BLOCK = 1 << 13
-"""Rows of the regressor matrix held at a time."""
+"""Number of rows of the regressor matrix in memory."""
 INDEPENDENT = 1e-9
 """Smallest eigenvalue of the correlation matrix from which products determine θ, to 1e-7 or better."""
 
 
 def triangle(signals: Signals, orders: tuple[int, int], delay: int) -> Array:
-    """R, upper triangular, of [−y_(i−1) … −y_(i−na), u_(i−d) … u_(i−d−nb+1), y_i], every record freed of its offset.
+    """R, upper triangular, of [−y_(i−1) … −y_(i−na), u_(i−d) … u_(i−d−nb+1), y_i], without the offset of every record.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def triangle(signals: Signals, orders: tuple[int, int], delay: int) -> Array:
     Returns
     -------
     (na + nb + 1, na + nb + 1) ndarray
-        With RᵀR the inner products of the columns.
+        R; RᵀR contains the inner products of the columns.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def triangle(signals: Signals, orders: tuple[int, int], delay: int) -> Array:
 
 
 def _inner_products(u: Samples, y: Samples, orders: tuple[int, int], delay: int) -> Array:
-    """Of the columns of one record about their means."""
+    """Inner products of the columns of one record, without their means."""
     na, nb = orders
     first = max(na, delay + nb - 1)
     shifted = np.concatenate((np.zeros(delay), u[: u.size - delay] - u.mean()))
@@ -115,7 +115,7 @@ def _factorised(signals: Signals, orders: tuple[int, int], delay: int) -> Array:
     first = max(na, delay + nb - 1)
     r = np.zeros((0, na + nb + 1))
     for u, y in signals:
-        # row i holds y_i, y_(i−1), …: the window reversed
+        # row i contains y_i, y_(i−1), …
         past_y = sliding_window_view(y[first - na :], na + 1)[:, ::-1]
         past_u = sliding_window_view(u[first - delay - nb + 1 : u.size - delay], nb)[:, ::-1]
         means = np.concatenate((past_y.mean(axis=0), past_u.mean(axis=0)))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is left of the dynamics where nothing excites them: the lag of the stage, and how sure it is."""
+"""The lag of the stage and its uncertainty, which is all that slow drives show of the dynamics."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from ..records.excitation_content import ExcitationContent
 from .linear_start import dynamics_of
 
 ONE_FREQUENCY = 4
-"""Drives of at most so many spectral lines hold one frequency."""
+"""Largest number of spectral lines of a drive with one frequency."""
 
 
 def lag(fit: Fit) -> tuple[float, float]:
@@ -47,24 +47,24 @@ def lag(fit: Fit) -> tuple[float, float]:
 
 
 def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_counted: bool = False) -> tuple[Notice, ...]:
-    """Notices ``lag_only``, and ``one_frequency`` where lag and hysteresis cannot be distinguished.
+    """Notices ``lag_only``, and ``one_frequency`` if lag and hysteresis cannot be distinguished.
 
     Parameters
     ----------
     fit : Fit
         The joint fit.
-    contents : sequence of Content
-        Of the records that were fitted.
+    contents : sequence of ExcitationContent
+        Excitation of the fitted records.
     rivals_counted : bool
-        Whether the covariance of the fit holds what other plays and rates of creep would make of the lag.
+        Whether the covariance of the fit includes the influence of other plays and rates of creep on the lag.
     """
     value, error = lag(fit)
     highest = max(c.bandwidth for c in contents)
     notices = [
         Notice(
             "lag_only",
-            f"no record is broadband and the drive ends at {highest:.3g} Hz, so that of the "
-            "dynamics only a lag is reported, "
+            f"no record is broadband and the drive ends at {highest:.3g} Hz, so only a lag is "
+            "reported for the dynamics, "
             f"{1e3 * value:.4g} ms ± {1.96e3 * error:.2g} ms (95 %); record noise, a chirp or "
             "steps to identify the dynamics",
         )
@@ -73,7 +73,7 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_count
     if max(c.lines for c in moving) <= ONE_FREQUENCY and max(c.bandwidth for c in moving) <= 1.5 * min(
         c.bandwidth for c in moving
     ):
-        message = "the drive has one frequency only, where a lag and a narrow backlash look alike; "
-        known = "the interval of the lag holds both" if rivals_counted else "the lag is less certain than its interval"
+        message = "the drive has only one frequency, at which a lag and a narrow backlash look alike; "
+        known = "the lag's interval includes both" if rivals_counted else "the lag is less certain than its interval"
         notices.append(Notice("one_frequency", message + known))
     return tuple(notices)

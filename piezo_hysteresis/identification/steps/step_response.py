@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`StepResponse`: what follows a jump of the drive, averaged over all of them, and how sure it is."""
+"""`StepResponse`: the response to a jump of the drive, averaged over all jumps, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ from ...record import Record, Samples
 from ..records.edges import Edge, find_edges
 
 BEFORE = (64, 32, 16)
-"""Most samples before an edge from which the base line is drawn; fewer where the stage still rings."""
+"""Largest number of samples before an edge for the base line; fewer if the stage still rings."""
 LONGEST = 4096
-"""Most samples after an edge among which the onset is sought."""
+"""Largest number of samples after an edge in which the onset is searched."""
 QUIET = 2.0
-"""Scatter before an edge, as a multiple of that before the quietest one, up to which its response is averaged."""
+"""Largest scatter before an edge that is averaged, as a multiple of that before the quietest edge."""
 NEGLIGIBLE = 1e-4
-"""Scatter that matters to none, in swings of the displacement."""
+"""Scatter that is always accepted, relative to the range of the displacement."""
 RARE = 1e-4
-"""Chance at which noise alone has that much more scatter before one edge than before another."""
+"""Probability that noise alone has so much more scatter before one edge than before another."""
 SCATTER = 3.0
-"""Standard deviations by which the end of a base line may leave what its beginning foretells."""
+"""Largest deviation of the end of a base line from the extrapolation of its beginning, in standard deviations."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -49,7 +49,7 @@ class StepResponse:
     sample_period : float
         Sample period [s].
     mean : (n,) array
-        Response per volt of step, sample 0 being the first at the new voltage [m/V].
+        Response per volt of step [m/V]; sample 0 is the first at the new voltage.
     deviation : (n,) array
         Standard deviation of `mean` from the noise before the edges [m/V].
     edges : int
@@ -66,14 +66,14 @@ class StepResponse:
 
 
 def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
-    """Average the response to the edges in the records before which the stage is quiet, weighted by their heights.
+    """Average the response to all edges before which the stage is quiet, weighted by their heights.
 
     Parameters
     ----------
     records : iterable of Record
         Records with steps, all at one sample period.
     every : int
-        Use every so-many-th sample after each edge only, as if the stage had been sampled more slowly.
+        Use only every n-th sample after each edge, as for a longer sample period.
 
     Returns
     -------
@@ -93,14 +93,14 @@ def step_response(records: Iterable[Record], every: int = 1) -> StepResponse:
         )
     resolution = _resolution({id(r): r for r, _ in edges}.values())
     bases = [_BaseLine.before(record, edge, every, BEFORE[0]) for record, edge in edges]
-    # About the mean: the slow ringing of a soft stage is straight over a base line, and no line to go on by.
+    # about the mean: slow ringing of a soft stage looks straight over a base line but does not continue so
     scatters = np.array([base.samples.std(ddof=1) for base in bases])
     swing = max(float(np.ptp(record.displacement)) for record, _ in edges)
     quietest = max(float(scatters.min()), resolution / np.sqrt(12.0), NEGLIGIBLE * swing)
     freedom = min(base.size for base in bases) - 1
     by_chance = float(np.sqrt(scipy.stats.f.isf(RARE, freedom, freedom)))
     edges = [e for e, scatter in zip(edges, scatters, strict=True) if scatter <= max(QUIET, by_chance) * quietest]
-    # A stage that still rings is not straight over a long base line; a short one is noisy.
+    # ringing is not straight over a long base line; a short base line is noisy
     for most in BEFORE:
         response, ringing = _averaged(edges, every, most, resolution)
         if ringing == 1.0:
@@ -132,7 +132,7 @@ class _BaseLine:
 
     @property
     def places(self) -> Samples:
-        """Places of the samples, from their middle."""
+        """Positions of the samples, relative to their middle."""
         return np.arange(float(self.size)) - 0.5 * (self.size - 1)
 
     @property
@@ -146,7 +146,7 @@ class _BaseLine:
         return float(off @ off)
 
     def at(self, ahead: Samples) -> tuple[Samples, Samples]:
-        """The line at so many samples from the first behind it [m], and its variance for white noise of variance 1."""
+        """The line `ahead` samples after its end [m], and its variance for white noise of variance 1."""
         away = ahead + 0.5 * (self.size + 1)
         return self.samples.mean() + self.slope * away, 1.0 / self.size + away**2 / (self.places @ self.places)
 
@@ -154,7 +154,7 @@ class _BaseLine:
 def _averaged(
     edges: Sequence[tuple[Record, Edge]], every: int, most: int, resolution: float
 ) -> tuple[StepResponse, float]:
-    """Mean response from base lines of at most so many samples, and the factor by which ringing spoils it."""
+    """Mean response from base lines of limited length, and the factor by which ringing increases its error."""
     after = min(LONGEST, min(edge.quiet_after for _, edge in edges) // every)
     ahead = np.arange(after)
     weighted, weight, variance = np.zeros(after), 0.0, np.zeros(after)
@@ -171,7 +171,7 @@ def _averaged(
         missed, expected = missed + edge.height * off, expected + edge.height**2 * spread
         variance += edge.height**2 * (1.0 + uncertain)
     noise = max(squares / freedom, resolution**2 / 12.0)
-    # What rings before the edges goes on behind them, alike in all of them: no averaging removes it.
+    # ringing before an edge continues after it, with the same phase at all edges, so averaging does not remove it
     ringing = max(1.0, abs(missed) / max(SCATTER * float(np.sqrt(noise * expected)), 1e-300))
     deviation = ringing * np.sqrt(noise * variance) / weight
     period = every * edges[0][0].sample_period
@@ -179,7 +179,7 @@ def _averaged(
 
 
 def _foretold(base: Samples) -> tuple[float, float]:
-    """By how much a line through the first three quarters of a base line misses the mean of the last one.
+    """Difference between the mean of the last quarter of a base line and a line through the first three quarters.
 
     Returns
     -------

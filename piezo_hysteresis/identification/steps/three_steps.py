@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The three published steps as they are published: delay, ARX from v, MBW from w(i) = y(i + d)/K (paper, Sec. 3).
+"""The three steps as published: delay, ARX from v, MBW from w(i) = y(i + d)/K (paper, Sec. 3).
 
-They do not return the published model from its own data: driven by noise, the hysteresis state forgets, and what ARX
-sees of it enters G. The joint identification starts from here and mends that; both are worth comparing.
+They do not return the published model from data simulated with it: under noise the hysteresis state loses its memory,
+and the ARX model absorbs a part of the hysteresis. The joint identification starts from here and corrects this.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from .regressors import Signals
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ThreeSteps:
-    """Outcome of the published identification.
+    """Result of the published identification.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class ThreeSteps:
     dynamics : Dynamics
         Step 2, ARX from v to the normalised displacement.
     loop : Fit
-        Step 3; its model is the whole chain.
+        Step 3; its model contains all effects.
     """
 
     delay: Delay
@@ -91,15 +91,15 @@ def three_steps(
     Parameters
     ----------
     records : sequence of Record
-        The experiment, in order; the other phases only carry the state of the stage.
+        The experiment, in order; the other phases only determine the state of the stage.
     voltage_scale, displacement_scale : float
         Scales of the model [V], [m].
     orders : (int, int)
         na and nb.
     hysteresis : type of HysteresisOperator
-        Which operator; `PublishedBoucWen` for data that Eq. (7) made.
+        Hysteresis operator; `PublishedBoucWen` for data that were computed by Eq. (7).
     delay : Delay, optional
-        Outcome of step 1, where it is known.
+        Result of step 1, if it is known.
 
     Raises
     ------
@@ -131,14 +131,14 @@ def three_steps(
 def behind_the_gauge(
     frame: Model, published: ThreeSteps | None, records: Sequence[Record], loops: Collection[int]
 ) -> Model:
-    """`frame` with its hysteresis fitted to the loops; where step 3 was, only its gain is another one.
+    """`frame` with its hysteresis fitted to the loops; if step 3 was done, only its gain is changed.
 
     Parameters
     ----------
     frame : Model
-        With the gain and the delay of the gauge.
+        Model with the chosen dc gain and the delay.
     published : ThreeSteps or None
-        What the published steps found.
+        Result of the published steps.
     records : sequence of Record
         The experiment, in order.
     loops : collection of int

@@ -43,11 +43,11 @@ def score_left_out(
     model : Model
         Fitted model; each refit without a fold is one linear step from its parameters.
     records : sequence of Record
-        In order.
+        Records in order.
     floors : sequence of float
         Floor of every record [m].
     fitted : collection of int
-        Indices of the records that count.
+        Indices of the used records.
     adjusts : bool
         Whether the parameters are refitted to the remaining data; False for a model from other data.
     """

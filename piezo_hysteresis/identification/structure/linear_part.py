@@ -72,9 +72,9 @@ def fit_linear_part(
     Parameters
     ----------
     model : Model
-        With a delay as its dynamics.
+        Model with a delay as its dynamics.
     pieces : sequence of RecordPiece
-        In order.
+        Pieces in order.
     floors : sequence of float
         Floor of every record [m].
 
@@ -118,20 +118,20 @@ def _with_mode(
         if _behind_steps(rings, pieces) < RINGING_STAYS * _behind_steps(plain, pieces) and rings.cost < plain.cost:
             found, numbers = rings, rings.model[ExtraResonance.name]
             shown = f"a mode at {numbers['f0']:.4g} Hz with a damping ratio of {numbers['zeta']:.2g}"
-            described = f"the stage rings behind the step: {shown}"
+            described = f"the stage rings after the step: {shown}"
     if found is plain or abs(found.model.values()[SHARE] - 1.0) > WHOLE:
         silent = min(_silent(plain, pieces, floors), key=lambda f: f.cost, default=plain)
         if silent.cost < SILENT_GAINS * found.cost:
             found, numbers = silent, silent.model[ExtraResonance.name]
-            shown = f"as a mode at {numbers['f0']:.4g} Hz with {numbers['r']:.3g} of the displacement makes it do"
-            described = f"the gain rises with the frequency of the drive, {shown}"
+            shown = f"a mode at {numbers['f0']:.4g} Hz with {numbers['r']:.3g} of the displacement explains this"
+            described = f"the gain rises with the frequency of the drive; {shown}"
     return found, [Notice("ringing", described)] if described else []
 
 
 def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> Iterator[PieceFit]:
     """Fits with a mode that no step shows; each adjusts either its frequency, or its share at the highest frequency."""
     if len({p.rate for p in pieces if p.kind is Kind.LOOP}) < 2:
-        return  # at one rate the gain does not rise with anything
+        return  # at one rate, the gain cannot rise with frequency
     loops = [p.record for p in pieces if p.kind is Kind.LOOP]
     fastest = max((excitation_content(r).bandwidth for r in loops), default=0.0)
     top = RESOLVED / min(p.record.sample_period for p in pieces)

@@ -49,7 +49,7 @@ CONVERGED = 1e-4
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PieceFit:
-    """A model fitted to pieces, and the inner products there.
+    """A model fitted to pieces, and the inner products at the fitted parameters.
 
     Parameters
     ----------
@@ -80,29 +80,29 @@ class PieceFit:
 
     @property
     def prior(self) -> Array:
-        """What is known before, in the form of the matrices."""
+        """The prior, in the form of the matrices."""
         return prior_of(self.model, self.names, self.matrices.shape[1] - 1 - len(self.names))
 
     @property
     def total(self) -> Array:
-        """Weighted sum of the matrices, and what is known before."""
+        """Weighted sum of the matrices and the prior."""
         return np.asarray(np.tensordot(self.weights, self.matrices, 1) + self.prior)
 
     @property
     def slow(self) -> Array:
-        """Zeros of the records at their best [m], then the waves of their wander, shape (s,)."""
+        """Fitted zeros of the records [m], then the amplitudes of the waves of their wander, shape (s,)."""
         total, numbers = self.total, len(self.names)
         matrix, cross = total[numbers:-1, numbers:-1], total[numbers:-1, -1]
         return np.asarray(np.linalg.lstsq(matrix, cross, rcond=None)[0])
 
     @property
     def records(self) -> int:
-        """Number of the records that count."""
+        """Number of the used records."""
         return (self.matrices.shape[1] - 1 - len(self.names)) // (1 + WAVES)
 
     @property
     def zeros(self) -> Array:
-        """Zeros of the records at their best [m], shape (r,)."""
+        """Fitted zeros of the records [m], shape (r,)."""
         return self.slow[: self.records]
 
     @property
@@ -127,7 +127,7 @@ class PieceFit:
 def linearised(
     model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float], names: Sequence[str]
 ) -> tuple[Array, Array]:
-    """Matrices and weights of the pieces that count, as in `PieceFit`."""
+    """Matrices and weights of the used pieces, as in `PieceFit`."""
     origins = sorted({p.origin for p in pieces if WEIGHTS[p.kind] > 0.0})
     slow = slow_rows(pieces, origins, model.displacement_scale)
     found = grams(model, [p.record for p in pieces], names, None, slow)
@@ -141,7 +141,7 @@ def linearised(
 
 
 def at_its_cost(model: Model, names: Sequence[str], matrices: Array, weights: Array, iterations: int = 1) -> PieceFit:
-    """A fit as far as it has come; its cost is the weighted mean of R², zeros and wander at their best."""
+    """A fit in its present state; its cost is the weighted mean of R² with fitted zeros and wander."""
     found = PieceFit(model, tuple(names), matrices, weights, np.inf, False, iterations)
     total, numbers = found.total, len(found.names)
     return replace(found, cost=float(total[-1, -1] - total[numbers:-1, -1] @ found.slow))
@@ -160,9 +160,9 @@ def fit_pieces(
     Parameters
     ----------
     model : Model
-        Start.
+        Model with start values.
     pieces : sequence of RecordPiece
-        In order.
+        Pieces in order.
     floors : sequence of float
         Floor of every record [m].
     names : sequence of str

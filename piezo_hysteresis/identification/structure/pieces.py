@@ -137,7 +137,7 @@ def _loops(record: Record, u: Samples, largest: float) -> list[tuple[int, int, i
     times = np.maximum(edges - starts, 1) * record.sample_period
     spans = np.abs(u[edges] - u[starts])
     rates = np.round(PER_DECADE * np.log10(0.5 / times)).astype(int)
-    # one swing more or less does not make another rate
+    # a difference of one swing is not another rate
     rates = np.array([int(np.median(rates[max(0, k - 1) : k + 2])) for k in range(rates.size)])
     sizes = np.minimum((AMPLITUDES * spans / largest).astype(int), AMPLITUDES - 1)
     found: list[tuple[int, int, int]] = []

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is known of a stage before it is recorded: its zero wanders, its creep has about one rate, its plays are smooth.
+"""Prior knowledge of a stage: its zero wanders, its creep has about one rate, the weights of its plays are smooth.
 
-All of it is Gaussian and enters the normal equations of a fit. Without it, whatever moves slowly within one record is
-taken for slow creep, which drives fast creep to zero and is predicted where it does not return; and a play of one half
-width takes the place of a lag. Decision 23 says how the sizes were chosen.
+All priors are Gaussian and enter the normal equations of a fit. Without them, any slow motion within one record would
+be fitted as slow creep, which reduces fast creep to zero and predicts motion that does not occur; and a single play
+would replace a lag. Decision 23 explains the choice of the sizes.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from .pieces import RecordPiece
 Array = NDArray[np.float64]
 
 WANDER = 0.003
-"""Standard deviation of what the zero wanders in `WANDER_TIME`, as a share of the displacement scale."""
+"""Standard deviation of the wander of the zero in `WANDER_TIME`, as a share of the displacement scale."""
 WANDER_TIME = 10.0
 """Time of that wander [s]; its variance grows with the time."""
 WAVES = 6
-"""Waves of the wander of a record (Karhunen-Loève expansion of a random walk)."""
+"""Number of waves for the wander of a record (Karhunen-Loève expansion of a random walk)."""
 ONE_RATE = 0.005
 """Standard deviation of the difference between fast and slow creep [1/decade]."""
 SMOOTH = 0.1
@@ -47,7 +47,7 @@ BEND = 0.2
 LOOP = 0.25
 """Sum of the weights of a usual piezo, relative to the response."""
 INDEPENDENT = 16
-"""Independent parts of the misfit of all records: a longer record does not outweigh what is known before."""
+"""Number of independent parts of the misfit of all records, so that long records do not outweigh the prior."""
 
 
 def slow_rows(pieces: Sequence[RecordPiece], origins: Sequence[int], scale: float) -> list[Array]:
@@ -58,9 +58,9 @@ def slow_rows(pieces: Sequence[RecordPiece], origins: Sequence[int], scale: floa
     Parameters
     ----------
     pieces : sequence of RecordPiece
-        In order.
+        Pieces in order.
     origins : sequence of int
-        Records that count.
+        Indices of the used records.
     scale : float
         Displacement scale of the model [m].
     """
@@ -83,16 +83,16 @@ def slow_rows(pieces: Sequence[RecordPiece], origins: Sequence[int], scale: floa
 
 
 def prior_of(model: Model, names: Sequence[str], slow: int) -> Array:
-    """The normal equations of what is known before, of q numbers, zeros and wander: (q + slow + 1, q + slow + 1).
+    """Normal equations of the prior for q parameters, zeros and wander: (q + slow + 1, q + slow + 1).
 
     Parameters
     ----------
     model : Model
-        Where it is linearised.
+        Model at which it is linearised.
     names : sequence of str
-        Numbers that are free.
+        Free parameters.
     slow : int
-        Zeros and waves of all records.
+        Number of zeros and waves of all records.
     """
     numbers, records = len(names), slow // (1 + WAVES)
     waves = np.zeros((slow - records, numbers + slow + 1))
@@ -115,7 +115,7 @@ def prior_of(model: Model, names: Sequence[str], slow: int) -> Array:
 
 
 def _row(model: Model, names: Sequence[str], terms: Sequence[tuple[str, float]], sigma: float, slow: int) -> Array:
-    """A sum of numbers that is zero within `sigma`, linearised where the model stands: (1, q + slow + 1)."""
+    """A sum of parameters that is zero within `sigma`, linearised at the model: (1, q + slow + 1)."""
     row = np.zeros((1, len(names) + slow + 1))
     values = model.values()
     for name, factor in terms:

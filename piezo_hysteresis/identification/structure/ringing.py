@@ -39,7 +39,7 @@ def ringing_frequency(model: Model, pieces: Sequence[RecordPiece]) -> float | No
     model : Model
         Model without a mode.
     pieces : sequence of RecordPiece
-        In order.
+        Pieces in order.
     """
     steps = [p.kind is Kind.STEP and p.record.size >= 4 * CYCLES for p in pieces]
     if not any(steps):

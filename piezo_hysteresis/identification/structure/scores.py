@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 MOST_LEFT_OUT = 0.75
-"""Largest share of the experiment that a fold leaves out; every record counts the same."""
+"""Largest share of the experiment that a fold leaves out; every record has the same weight."""
 FEWEST = 3
 """With fewer folds than this, every piece becomes a further fold."""
 FAST, SLOW = f"{CreepTwoRates.name}.gamma_fast", f"{CreepTwoRates.name}.gamma_slow"
@@ -41,12 +41,12 @@ FAST, SLOW = f"{CreepTwoRates.name}.gamma_fast", f"{CreepTwoRates.name}.gamma_sl
 
 @dataclass(frozen=True, slots=True)
 class ModelStructure:
-    """Which of the optional effects a model holds.
+    """The optional effects of a model.
 
     Parameters
     ----------
     square : bool
-        Whether it has the even term of the drive.
+        Whether the model has an even term of the drive.
     creep_rates : int
         Number of creep rates: 0, 1 (logarithmic) or 2.
     level : bool
@@ -59,7 +59,7 @@ class ModelStructure:
 
     @property
     def size(self) -> int:
-        """Number of optional parameters; one rate of creep is none, since every piezo ceramic creeps."""
+        """Number of optional parameters; one rate of creep does not count, because every piezo ceramic creeps."""
         return int(self.square) + abs(self.creep_rates - 1) + 2 * int(self.level)
 
     @property
@@ -108,7 +108,7 @@ class Judged:
 
 
 def folds_of(pieces: Sequence[RecordPiece]) -> list[Mask]:
-    """Folds as masks of the pieces that count: every rate, every amplitude and every record is left out once.
+    """Folds as masks of the used pieces: every rate, every amplitude and every record is left out once.
 
     If these are few, every piece is left out once, too. A fold never leaves out most of the experiment.
     """
@@ -185,7 +185,7 @@ def _space(full: PieceFit, structure: ModelStructure) -> tuple[Array, Array, Arr
         fixed[slow] = values[FAST] - values[SLOW]
         kept.remove(slow)
     if GAIN in full.names and (lag := full.names.index(GAIN)) in kept:
-        free[lag, full.names.index(POLE)] = dynamics_of(full.model).dc_gain  # G(1) is held
+        free[lag, full.names.index(POLE)] = dynamics_of(full.model).dc_gain  # G(1) is constant
         kept.remove(lag)
     return free[:, kept], fixed, low[kept], high[kept]
 

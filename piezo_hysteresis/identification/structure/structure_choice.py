@@ -66,7 +66,7 @@ Plays are preferred below it, because they stay inside the largest measured loop
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StructureChoice:
-    """Outcome of the choice.
+    """Result of the choice.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class StructureChoice:
         Every structure, best first.
     leads : mapping of str to float
         For every optional effect, the score (mean ln R²) of the best structure without it minus the score of the chosen
-        one; empty where the state of the operator was kept.
+        one; empty if the state of the operator was kept.
     notices : tuple of Notice
         ``structure``, ``memory``, ``ringing``.
     """
@@ -95,7 +95,7 @@ def choose_structure(
     Parameters
     ----------
     start : Model
-        Its hysteresis was fitted to the loops; its scales and its gain are kept.
+        Model with a hysteresis fitted to the loops; its scales and its gain are kept.
     records : sequence of Record
         Records in the order of the experiment.
     floors : sequence of float

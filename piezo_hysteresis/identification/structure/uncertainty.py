@@ -72,7 +72,7 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
         delay = found.names.index(DELAY)
         spread = spread.copy()
         spread[delay, delay] += BETWEEN_SAMPLES**2
-    known_to = max(1.0, found.cost) / INDEPENDENT  # the misfit holds so many independent parts, however long it is
+    known_to = max(1.0, found.cost) / INDEPENDENT  # independent parts of the misfit
     covariance = (inverse @ meat @ inverse + known_to * inverse)[:numbers, :numbers]
     origins = sorted({p.origin for p in counted})
     rms = []

@@ -133,7 +133,7 @@ def test_the_corrected_model_survives_its_file_and_names_its_envelope(
     np.testing.assert_array_equal(again.simulate(record), found.model.simulate(record))
     assert not [*outside_of(again, record)]
     (told,) = [n for n in outside_of(again, played(PLAIN, 4.0, 11.0, 0)) if n.kind == "outside_amplitudes"]
-    assert "correction without a name does not hold there" in told.message
+    assert "correction without a name is not valid there" in told.message
 
 
 def test_nothing_is_changed_beyond_the_positions_that_were_recorded() -> None:
