@@ -103,19 +103,19 @@ HYSTERESIS: type[HysteresisOperator] = BoucWen
 """The hysteresis that is identified by default."""
 
 MEMORY: type[HysteresisMemory] = HysteresisMemory
-"""What takes the place of an operator's state where the stage remembers its turning points."""
+"""The effect that replaces the state of an operator if the stage has a memory of turning points."""
 
 OPERATORS: dict[str, type[HysteresisOperator]] = {e.name: e for e in CHAIN if issubclass(e, HysteresisOperator)}
-"""Every operator that can play the role of the hysteresis, by its identifier."""
+"""Every operator that can be the hysteresis of a model, by its identifier."""
 
 BASELINE: tuple[type[Effect], ...] = (BoucWen, PublishedBoucWen, Arx, Offset)
-"""The published model: what the others are missing from."""
+"""The published model, to which the other effects are added."""
 
 FINER_FORMS: tuple[type[Effect], ...] = (LevelDependentMemory, CreepTwoRates, SecondOrderLowPass)
-"""Finer forms of effects that an identified model may hold; a search names the effect, not its form."""
+"""Forms of effects with more parameters for identified models; a search names the effect and not its form."""
 
 UNNAMED: tuple[type[UnnamedCorrection], ...] = (UnnamedPositionMap, UnnamedPlays, UnnamedRelaxation)
-"""Corrections without a physical name, for what no effect explains; no search for effects knows them."""
+"""Corrections without a physical name, for a residual that no effect explains; a search for effects excludes them."""
 
 CATALOGUE: tuple[type[Effect], ...] = tuple(e for e in CHAIN if e not in (*BASELINE, *FINER_FORMS, *UNNAMED))
 """The effects that can be added to a Hammerstein-MBW model."""
@@ -130,7 +130,7 @@ def effect_named(name: str) -> type[Effect]:
     Raises
     ------
     ModelError
-        If the catalogue has none of that name.
+        If the catalogue has no effect of that name.
     """
     if name not in BY_NAME:
         raise ModelError(f"unknown effect '{name}', expected one of {', '.join(BY_NAME)}")

@@ -37,7 +37,7 @@ from .invertibility import Invertibility
 
 
 class ChainPosition(IntEnum):
-    """Where along u → v → w → x → y an effect acts; the chain is sorted by it."""
+    """Position in the chain u → v → w → x → y at which an effect acts; the chain is sorted by it."""
 
     DRIVE = 0
     """Between the drive voltage and the actuator: volts in, volts out."""
@@ -60,7 +60,7 @@ class Discretisation:
     Parameters
     ----------
     sample_period : float
-        Period of the samples that will be run [s].
+        Period of the samples [s].
     model_period : float
         Period at which discrete dynamics were identified [s]; smaller than `sample_period` in slow phases.
     voltage_scale : float
@@ -76,7 +76,7 @@ class Discretisation:
 
     @property
     def is_slow(self) -> bool:
-        """True where discrete dynamics act as dc gain plus group delay."""
+        """True if discrete dynamics act as dc gain plus group delay."""
         return self.sample_period > 1.001 * self.model_period
 
 
@@ -91,26 +91,26 @@ class Effect(ABC):
     Raises
     ------
     ParameterError
-        On an unknown name, or a value outside its bounds.
+        If a name is unknown, or a value is outside its bounds.
     """
 
     name: ClassVar[str]
     family: ClassVar[str]
     place: ClassVar[ChainPosition]
     entry: ClassVar[str] = ""
-    """Entry of the catalogue that this is another law of (`creep_exponential` of ``creep``); empty for its own."""
+    """Effect of the catalogue of which this is another law (`creep_exponential` of ``creep``); empty if it is none."""
     host: ClassVar[str | None] = None
-    """Effect whose kernel holds this one as a term (terms of the Bouc-Wen loop, softening of the ARX mode)."""
+    """Effect whose kernel contains this one as a term (terms of the Bouc-Wen loop, softening of the ARX mode)."""
     channel: ClassVar[str | None] = None
     """Extra channel of the record that is needed: ``other_displacement`` or ``temperature``."""
     twin: ClassVar[str | None] = None
-    """Effect that slow drive cannot tell from this one: a residual left by one of them does not prove the other."""
+    """Effect that slow drive cannot distinguish from this one."""
     excitation_need: ClassVar[ExcitationNeed | None] = None
-    """Drive without which no record can show the effect; None where nearly every record can."""
+    """Kind of drive that is needed to show the effect; None if nearly every record can show it."""
     loop_names: ClassVar[tuple[str, ...]] = ()
     """Parameters to which the height of the hysteresis loop is proportional."""
     invertibility: ClassVar[Invertibility]
-    """Whether `piezo_hysteresis.compensation` can turn the effect round."""
+    """Whether `piezo_hysteresis.compensation` can invert the effect."""
     equation: ClassVar[str]
     signature: ClassVar[str]
     source: ClassVar[str]
@@ -125,7 +125,7 @@ class Effect(ABC):
         self.check()
 
     def check(self) -> None:
-        """Refuse values that are each inside their bounds but make no sense together."""
+        """Refuse combinations of values that are not valid, although each value is inside its bounds."""
 
     def __getitem__(self, name: str) -> float:
         value = self._values[name]
@@ -143,12 +143,12 @@ class Effect(ABC):
 
     @property
     def is_off(self) -> bool:
-        """True where every parameter that can switch the effect off does."""
+        """True if every parameter that can switch the effect off has its off value."""
         rows = [p for p in self.parameters if p.off is not None]
         return bool(rows) and all(np.all(np.asarray(self._values[p.name]) == p.off) for p in rows)
 
     def with_values(self, **values: Value) -> Self:
-        """The same effect with some other values."""
+        """The same effect with some values replaced."""
         return type(self)(**{**self._values, **values})
 
     def off(self) -> Self:
@@ -183,30 +183,30 @@ class Effect(ABC):
 
     @classmethod
     def public_name(cls) -> str:
-        """Identifier under which the catalogue knows the effect."""
+        """Identifier of the effect in the catalogue."""
         return cls.entry or cls.name
 
     @classmethod
     def is_predicted_live(cls) -> bool:
-        """False for an effect with numbers of its own in every recording: no model can know them in advance."""
+        """False for an effect with parameters that are different in every recording and cannot be known in advance."""
         return not any(row.per_record for row in cls.parameters)
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        """Values at which a search for the effect begins.
+        """Start values of a search for the effect.
 
-        Switched off where the sensitivity at the off value shows the way; at a finite size where it vanishes there
-        (a limit that is not reached), and at several where the search has more than one valley.
+        Switched off, if the sensitivity at the off value is useful; a finite size, if it is zero there (a limit that is
+        not reached); several sizes, if the cost has several minima.
 
         Parameters
         ----------
         extent : Extent
-            What the experiment spans.
+            Ranges that the experiment covers.
         """
         return (cls(),)
 
     def refined(self) -> Self | None:
-        """The same effect, unchanged in what it does, with more numbers to fit; None where it has no finer form."""
+        """The same effect with the same output and more parameters to fit; None if there is no such form."""
         return None
 
     @abstractmethod
@@ -218,7 +218,7 @@ class Effect(ABC):
         setting : Discretisation
             Sample periods and scales.
         terms : tuple of Effect
-            Effects hosted by this one, for hosts.
+            Effects that are terms of this one, if it is a host.
         """
 
     def __eq__(self, other: object) -> bool:
@@ -233,9 +233,9 @@ class Effect(ABC):
 
 
 class Term(Effect):
-    """An effect inside another one's recursion: the block of its `host` holds it."""
+    """An effect inside the recursion of another one, computed in the block of its `host`."""
 
     host: ClassVar[str]
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
-        raise ModelError(f"'{self.name}' has no block of its own: it is a term of '{self.host}'; give it to that block")
+        raise ModelError(f"'{self.name}' has no separate block: it is a term of '{self.host}'; pass it to that block")

@@ -20,7 +20,7 @@ from enum import Enum, auto
 
 
 class ExcitationNeed(Enum):
-    """Kinds of drive; an effect declares the one without which no record can show it."""
+    """Kinds of drive; an effect declares the one that it needs to be visible."""
 
     HELD_LEVEL = auto()
     """A level that is held for a second or more after a change."""

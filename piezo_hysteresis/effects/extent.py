@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 ROOM = 293.15
-"""Temperature where none was recorded [K]."""
+"""Temperature if none was recorded [K]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Extent:
     Parameters
     ----------
     voltage_min, voltage_max : float
-        Drive voltage [V].
+        Range of the drive voltage [V].
     max_slew : float
         Steepest drive between two samples [V/s].
     voltage_scale : float
@@ -39,16 +39,16 @@ class Extent:
     fastest_period : float
         Smallest sample period [s].
     duration : float
-        From the first to the last sample [s].
+        Time from the first to the last sample [s].
     longest_record : float
         Duration of the longest record [s].
     longest_run : float
         From the beginning of a record that starts at rest to the end of the last record that continues it, the longest
         [s].
     peaks : tuple of float
-        Frequencies at which the residual stands out of the displacement [Hz], highest first.
+        Frequencies of peaks in the ratio of residual to displacement [Hz], highest peak first.
     temperature : float
-        Mean over the records that have one [K].
+        Mean over the records with a temperature [K].
     """
 
     voltage_min: float

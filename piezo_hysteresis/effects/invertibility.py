@@ -20,13 +20,13 @@ from enum import StrEnum
 
 
 class Invertibility(StrEnum):
-    """Whether a wanted output of an effect can be turned into the input that gives it."""
+    """Whether the input that gives a wanted output of an effect can be computed."""
 
     EXACT = "exact"
-    """Exact up to rounding, wherever the wanted output is reachable."""
+    """Exact up to rounding, if the wanted output is reachable."""
     APPROXIMATE = "approximate"
     """With an error that `Inverse` states."""
     NOT_NEEDED = "not needed"
-    """The effect is not on the way from the drive to the displacement, and nobody knows its course beforehand."""
+    """The effect does not depend on the drive and cannot be predicted."""
     IMPOSSIBLE = "impossible"
-    """No inverse sample by sample is known."""
+    """No sample-by-sample inverse is known."""

@@ -40,7 +40,7 @@ def test_a_drive_inside_is_not_noticed_and_one_outside_is():
     assert kinds == [["outside_amplitudes"], ["outside_frequencies", "outside_rates"]]
     (slow,) = outside(model, Experiment((sine(2.5, 0.25),)))
     assert slow.kind == "outside_frequencies"
-    assert slow.message == "the drive is as slow as 0.25 Hz, the model was identified from 1 Hz on"
+    assert slow.message == "the drive is as slow as 0.25 Hz, the model was identified from 1 Hz"
 
 
 def test_a_stream_is_watched_block_by_block():

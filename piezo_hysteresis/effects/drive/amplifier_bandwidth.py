@@ -26,7 +26,7 @@ from ..extent import Extent
 from ..invertibility import Invertibility
 
 FOUND_BY = (1e-5, 2e-5, 5e-5, 1.5e-4)
-"""Time constants at which a search begins [s]."""
+"""Start values of the time constant [s]."""
 
 
 class AmplifierBandwidth(Effect):
@@ -52,7 +52,7 @@ class AmplifierBandwidth(Effect):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        """Off, and of several sizes: what stands behind the pole is no linear system."""
+        """Off, and several sizes, because the system after the pole is not linear."""
         return cls(), *(cls(tau=tau) for tau in FOUND_BY)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:

@@ -39,9 +39,9 @@ class AmplifierSaturation(Effect):
     Parameters
     ----------
     lower, upper : float
-        Limits, as drive voltage before the amplifier [V]; ∓1e9 is no limit.
+        Limits, as drive voltage before the amplifier [V]; ∓1e9 means no limit.
     corner : float
-        Half width of the bend into each limit [V]; 0 clips hard.
+        Half width of the bend into each limit [V]; 0 gives hard clipping.
     """
 
     name = "amplifier_saturation"
@@ -97,7 +97,7 @@ class AmplifierSaturationBlock(MemorylessBlock):
         self.lower, self.upper, self.corner = lower, upper, corner
 
     def _ramp(self, excess: Array) -> tuple[Array, Array, Array]:
-        """Ramp and its slopes by the excess and by the corner."""
+        """Ramp and its derivatives by the excess and by the corner."""
         c = self.corner
         bent = np.abs(excess) < c
         e = np.where(bent, excess, 0.0)

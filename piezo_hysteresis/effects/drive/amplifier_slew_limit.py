@@ -40,7 +40,7 @@ class AmplifierSlewLimit(Effect):
     Parameters
     ----------
     S : float
-        Largest slope I_max/(C·gain), as drive voltage before the amplifier [V/s]; 1e9 is no limit.
+        Largest slope I_max/(C·gain), as drive voltage before the amplifier [V/s]; 1e9 means no limit.
     """
 
     name = "amplifier_slew_limit"
@@ -49,14 +49,14 @@ class AmplifierSlewLimit(Effect):
     place = ChainPosition.DRIVE
     equation = "|dy/dt| ≤ S = I_max/C"
     signature = "Fast large signals become triangles"
-    source = "0.5 A into 20 µF: 25 V/ms behind the amplifier"
+    source = "0.5 A into 20 µF: 25 V/ms after the amplifier"
     parameters = (
         Parameter("S", "S", "V/s", UNLIMITED, 1e-2, UNLIMITED, "largest slope of the drive", "I_max/C", UNLIMITED, 1e3),
     )
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        slopes = extent.max_slew / 2.0 ** np.arange(1.0, 12.0, 0.5)  # a noise has a valley for every half octave
+        slopes = extent.max_slew / 2.0 ** np.arange(1.0, 12.0, 0.5)  # noise gives many local minima
         return tuple(cls(S=float(slope)) for slope in slopes if slope > extent.span)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:

@@ -29,7 +29,7 @@ from ..extent import Extent
 from ..invertibility import Invertibility
 
 FOUND_BY = (0.001, 0.002, 0.005, 0.01)
-"""Half widths at which a search begins, in ranges of the drive."""
+"""Start values of the half width, as shares of the drive range."""
 
 
 class Backlash(Effect):
@@ -54,7 +54,7 @@ class Backlash(Effect):
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         """Off, and several widths.
 
-        The slope at width 0 does not predict a play that is wider than the noise of the drive.
+        The derivative at width 0 does not predict a play that is wider than the noise of the drive.
         """
         return cls(), *(cls(b=share * extent.span) for share in FOUND_BY)
 
@@ -76,7 +76,7 @@ def run_play(x, b, state, y):
 def linearise_play(x, dx, b, state, tangent, y, dy):
     """`run_play` with rows dx (m, n) to dy (m + 1, n), the last by b; tangent (m + 1,) is updated.
 
-    Where an edge just touches, a row counts only if it pushes: the slope for a growing parameter.
+    If an edge just touches, a row counts only if it pushes: the derivative for a growing parameter.
     """
     m, held = dx.shape[0], state[0]
     for i in range(x.size):

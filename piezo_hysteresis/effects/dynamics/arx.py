@@ -131,7 +131,7 @@ class Arx(Effect):
         if not self.group_delay <= LONGEST_DELAY:
             raise ParameterError(
                 f"arx: got a group delay of {self.group_delay:.3g} samples near dc, expected at most "
-                f"{LONGEST_DELAY:g}; B(1) or A(1) all but vanishes"
+                f"{LONGEST_DELAY:g}; B(1) or A(1) is almost zero"
             )
         lag = max(0.0, ratio * self.group_delay)
         return GroupDelayBlock(names, self.dc_gain, lag, dc_gain_slopes(a, b), lag_slopes)

@@ -36,9 +36,9 @@ class ExtraDelay(Effect):
 
     Notes
     -----
-    A delay commutes with everything that does not depend on absolute time. It stands behind the hysteresis because the
-    loop must see the levels that the converter really holds, not levels interpolated between them. Third-order Lagrange
-    interpolation at the model's sample period, linear interpolation in slower records.
+    A delay commutes with every effect that does not depend on absolute time. It follows the hysteresis, because the
+    loop must see the levels of the converter and not interpolated levels. Third-order Lagrange interpolation at the
+    sample period of the model, linear interpolation in slower records.
     """
 
     name = "extra_delay"

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A second mode of the structure beside the identified dynamics."""
+"""A second mode of the structure in addition to the identified dynamics."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ from ..extent import Extent
 from ..invertibility import Invertibility
 
 RESOLVED = 0.45
-"""Cycles per sample up to which the mode is simulated; faster ones act as their lag."""
+"""Highest simulated frequency of the mode [cycles per sample]; a faster mode acts as a lag."""
 
 
 class ExtraResonance(Effect):
-    """A further mode that carries the share r of the static response.
+    """A further mode with the share r of the static response.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class ExtraResonance(Effect):
 
     Notes
     -----
-    Exact for an input that is linear between samples. Seed f0 from the peak of |E(f)|/|Y(f)|.
+    Exact for an input that is linear between samples. The start value of f0 is the peak of |E(f)|/|Y(f)|.
     """
 
     name = "extra_resonance"
@@ -82,7 +82,7 @@ class ExtraResonance(Effect):
 
 
 def oscillator(f0: float, zeta: float, sample_period: float) -> tuple[Array, Array]:
-    """Step of position and velocity/ω0 under an input that goes linearly from u to u + du.
+    """Step of position and velocity/ω0 for an input that changes linearly from u to u + du.
 
     Returns
     -------

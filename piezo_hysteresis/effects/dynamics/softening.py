@@ -25,7 +25,7 @@ from ..extent import Extent
 from ..invertibility import Invertibility
 
 FOUND_BY = (0.01, 0.03, 0.1)
-"""Sizes of k3 at which a search begins: a sharp resonance that moves by its width is far from linear in it."""
+"""Start values of k3; several, because a shift of a sharp resonance by its width is not linear in k3."""
 
 
 class Softening(Term):
@@ -40,8 +40,8 @@ class Softening(Term):
 
     Notes
     -----
-    x is the coordinate of the dominant complex pole pair of G, in units of the static hysteresis output w. That mode
-    drives the rest of G; the delay of G stays outside the loop of the mode.
+    x is the coordinate of the dominant complex pole pair of G, in units of the static hysteresis output w. This mode
+    drives the rest of G; the delay of G is outside the feedback of the mode.
     """
 
     name = "softening"
@@ -51,10 +51,10 @@ class Softening(Term):
     host = "arx"
     twin = "sensor_nonlinearity"
     path: ClassVar[type[Path]] = WholePath
-    """What the mode passes on its way to the sensor."""
+    """Form of the block between the mode and the sensor."""
     equation = "m ẍ + c ẋ + k x (1 + k2 |x| + k3 x²) = k w"
     signature = (
-        "The resonance moves with amplitude, which large chirps across it show. On slow drive the effect "
+        "The resonance frequency changes with amplitude, which large chirps show. On slow drive the effect "
         "equals a cubic sensor nonlinearity"
     )
     source = "Duffing oscillator on the modal coordinate"
@@ -65,5 +65,5 @@ class Softening(Term):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        """Switched off, and of several sizes of either sign."""
+        """Switched off, and several sizes of both signs."""
         return (cls(), *(cls(k3=sign * size) for size in FOUND_BY for sign in (-1.0, 1.0)))

@@ -35,12 +35,12 @@ class SofteningOfOneMode(Softening):
 
     Notes
     -----
-    As `Softening`, but the displacement is a sum of modes: the others do not feel what the dominant one does.
+    As `Softening`, but the displacement is a sum of modes, and the other modes do not depend on the dominant one.
     """
 
     name = "softening_of_one_mode"
     invertibility = Invertibility.IMPOSSIBLE
     entry = "softening"
-    signature = "The residual looks as for softening, on a stage of several modes"
+    signature = "The residual is the same as for softening, on a stage with several modes"
     source = "Duffing oscillator as one term of a modal expansion"
     path: ClassVar[type[Path]] = OwnPath

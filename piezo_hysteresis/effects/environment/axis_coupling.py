@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Motion of the other axis seen by this one."""
+"""Motion of the other axis in the measurement of this axis."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class AxisCoupling(Effect):
     kappa0 : float
         Coupling at the origin of the other axis [1].
     kappa1 : float
-        Its change with the other axis' position [1/m].
+        Change of the coupling with the position of the other axis [1/m].
 
     Notes
     -----
-    Needs the channel ``other_displacement`` q [m]; records without it get nothing added.
+    Needs the channel ``other_displacement`` q [m]; without it nothing is added.
     """
 
     name = "axis_coupling"
@@ -47,7 +47,7 @@ class AxisCoupling(Effect):
     place = ChainPosition.ENVIRONMENT
     channel = "other_displacement"
     equation = "y = x + (κ0 + κ1 q) q"
-    signature = "The residual is coherent with the displacement of the other axis, whatever the drive of this axis"
+    signature = "The residual is coherent with the displacement of the other axis, for any drive of this axis"
     source = "cross-coupling of XY stages; 0.5–1.2 % of the other axis' motion"
     parameters = (
         Parameter("kappa0", "κ0", "1", 0.0, -0.5, 0.5, "coupling at the origin", "XY stages", 0.0, 0.01),

@@ -31,19 +31,19 @@ from ..invertibility import Invertibility
 
 
 class MainsHum(Effect):
-    """Sines at the mains frequency and its harmonics, with an amplitude and phase of their own in every record.
+    """Sines at the mains frequency and its harmonics, with a different amplitude and phase in every record.
 
     Parameters
     ----------
     f : float
         Mains frequency [Hz].
     cosine, sine : sequence of float
-        Amplitudes at f, 2f, 3f, … [m]; equally many.
+        Amplitudes at f, 2f, 3f, … [m]; the same number of both.
 
     Notes
     -----
-    t counts from the start of the record, or of the first of those that continue one another, so that amplitude, phase
-    and frequency of short records can be distinguished. In block-averaged records they are those after averaging.
+    t counts from the start of the record, or of the first in a series of continuing records, so that amplitude, phase
+    and frequency of short records can be distinguished. In block-averaged records they are the values after averaging.
     """
 
     name = "mains_hum"
@@ -81,7 +81,7 @@ class MainsHum(Effect):
         if self.array("cosine").size != self.array("sine").size:
             raise ParameterError(
                 f"mains_hum: got {self.array('cosine').size} cosine and {self.array('sine').size} sine amplitudes, "
-                "expected equally many"
+                "expected the same number of both"
             )
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
@@ -90,7 +90,7 @@ class MainsHum(Effect):
 
 
 def harmonics(frequency: float, count: int, t: Array) -> tuple[Array, Array]:
-    """Cosines and sines of harmonics of `frequency` [Hz] at times (n,) [s], both (count, n): addition theorem."""
+    """Cosines and sines of harmonics of `frequency` [Hz] at times t (n,) [s], both (count, n), by addition theorems."""
     cosines, sines = np.empty((count, t.size)), np.empty((count, t.size))
     angle = 2.0 * np.pi * frequency * t
     c, s = np.cos(angle), np.sin(angle)

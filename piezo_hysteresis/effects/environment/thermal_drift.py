@@ -31,7 +31,7 @@ from ..invertibility import Invertibility
 
 
 class ThermalDrift(Effect):
-    """The displacement approaches a new zero exponentially with time, whatever the drive.
+    """The displacement approaches a new zero exponentially with time, for any drive.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class ThermalDrift(Effect):
 
     Notes
     -----
-    t is the time since the start of the experiment. Where temperature was recorded, `ThermalExpansion` says more.
+    t is the time since the start of the experiment. If the temperature was recorded, use `ThermalExpansion`.
     """
 
     name = "thermal_drift"

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Thermal expansion of the stage, where its temperature was recorded."""
+"""Thermal expansion of the stage, for records with temperature."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class ThermalExpansion(Effect):
     kappa : float
         Expansion between sensor and stage [m/K].
     T0 : float
-        Temperature at which it counts as zero [K].
+        Temperature at which the expansion is zero [K].
 
     Notes
     -----
-    Needs the channel ``temperature``; records without it get nothing added.
+    Needs the channel ``temperature``; without it nothing is added.
     """
 
     name = "thermal_expansion"
@@ -51,7 +51,7 @@ class ThermalExpansion(Effect):
     place = ChainPosition.ENVIRONMENT
     channel = "temperature"
     equation = "y = x + κ (T − T0)"
-    signature = "The residual follows the temperature, whatever the drive"
+    signature = "The residual follows the temperature, for any drive"
     source = "linear expansion; 0.1–1 µm/K"
     parameters = (
         Parameter("kappa", "κ", "m/K", 0.0, -1e-4, 1e-4, "expansion between sensor and stage", "expansion", 0.0, 1e-7),
@@ -62,7 +62,7 @@ class ThermalExpansion(Effect):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        """Switched off, about the mean temperature: far from it the expansion would be one with the sensor zero."""
+        """Switched off, at the mean temperature; far from it, expansion and sensor zero cannot be distinguished."""
         return (cls(T0=extent.temperature),)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:

@@ -33,7 +33,7 @@ class AsymmetricHysteresis(Term):
 
     Notes
     -----
-    The state stays bounded where β − |γ| > |φ1| + |φ2|.
+    The state is bounded if β − |γ| > |φ1| + |φ2|.
     """
 
     name = "asymmetric_hysteresis"

@@ -51,7 +51,7 @@ def check_bounded(effect: Effect) -> None:
 
 
 class ModifiedBoucWen(HysteresisOperator):
-    """Base of both forms of the modified Bouc-Wen operator: their parameters and start values."""
+    """Base class of both forms of the modified Bouc-Wen operator, with parameters and start values."""
 
     gain_names = ("A", "p1", "p2")
     memory_names = ("A", "beta", "gamma")
@@ -69,7 +69,7 @@ class ModifiedBoucWen(HysteresisOperator):
         return self["p2"] + self["A"]
 
     def started(self, loops: Sequence[Loop]) -> Self:
-        from .bouc_wen_start import closest_loop  # imports scipy.optimize, for which no node shall wait
+        from .bouc_wen_start import closest_loop  # imports scipy.optimize, which would delay the start of nodes
 
         return self.with_values(**closest_loop(loops))
 
@@ -87,11 +87,11 @@ class BoucWen(ModifiedBoucWen):
     Notes
     -----
     The drive is taken as linear between samples, so the result does not depend on the sample rate, unlike Eq. (7).
-    Asymmetry, exponent, rate dependence and initial state join this loop as terms.
+    Asymmetry, exponent, rate dependence and initial state are terms of this loop.
 
     Examples
     --------
-    The loop opens: at the same voltage, up and down differ.
+    At the same voltage, the rising and the falling branch differ:
 
     >>> import numpy as np
     >>> block = BoucWen().block(Discretisation(1e-3, 1e-3))

@@ -18,7 +18,7 @@ For given β and γ the state is proportional to A, and a negative A is the same
 
     w = p1 v³ + p2 v + A·g(v; β, γ·sgn A) + offset
 
-is linear in p1, p2, A and the offsets. So only (β, γ/β) are searched, on a grid and then downhill.
+is linear in p1, p2, A and the offsets. So only (β, γ/β) are searched, on a grid and then by a local search.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ RATIOS = np.linspace(-0.9, 0.9, 7)
 VALLEYS = 3
 """Largest number of grid points from which a local search starts."""
 DEEP = 10.0
-"""Cost, relative to that of the best place, up to which another one is tried."""
+"""Largest cost of a grid point for a local search, relative to the best one."""
 
 
 def _state(loops: Sequence[Loop], beta: float, gamma: float) -> list[Array]:
@@ -58,7 +58,7 @@ def _state(loops: Sequence[Loop], beta: float, gamma: float) -> list[Array]:
 
 
 class _Search:
-    """Linear least squares inside the nonlinear one, on thinned loops."""
+    """Linear least squares inside the nonlinear search, on loops with fewer points."""
 
     def __init__(self, loops: Sequence[Loop]) -> None:
         share = POINTS // max(1, sum(loop.weight > 0 for loop in loops))
@@ -69,7 +69,7 @@ class _Search:
         self.target = self._stack([loop.w for loop in self.loops])
 
     def _stack(self, columns: Sequence[Array]) -> Array:
-        """All records in one array, each without its mean and with its weight."""
+        """All records in one array, each weighted and without its mean."""
         return np.concatenate([self.roots[i] * (columns[i] - columns[i].mean(axis=0)) for i in self.used])
 
     def solve(self, beta: float, ratio: float) -> tuple[Array, Array]:
@@ -87,7 +87,7 @@ def closest_loop(loops: Sequence[Loop]) -> dict[str, float]:
     Parameters
     ----------
     loops : sequence of Loop
-        In experiment order; those of weight 0 only carry the state.
+        Loops in experiment order; loops with weight 0 only determine the state.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def closest_loop(loops: Sequence[Loop]) -> dict[str, float]:
 
 
 def _valleys(costs: Array) -> list[tuple[int, int]]:
-    """Places on the grid lower than their neighbours, the lowest first: loops of one amplitude have several."""
+    """Local minima on the grid, lowest first; for loops of one amplitude there are several."""
     lowest = scipy.ndimage.minimum_filter(costs, size=3, mode="nearest")
     places = np.argwhere((costs == lowest) & (costs <= DEEP * costs.min()))
     order = np.argsort([costs[i, j] for i, j in places])

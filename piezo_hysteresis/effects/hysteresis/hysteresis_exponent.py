@@ -25,7 +25,7 @@ from ..extent import Extent
 from ..invertibility import Invertibility
 
 FOUND_BY = (1.3, 1.7)
-"""Exponents at which a search begins."""
+"""Start values of the exponent."""
 
 
 class HysteresisExponent(Term):
@@ -38,7 +38,7 @@ class HysteresisExponent(Term):
 
     Notes
     -----
-    With h_ref = 0.2 (normalised, dimensionless) β and γ keep their meaning at typical sizes of the state for every n.
+    With h_ref = 0.2 (normalised, dimensionless), β and γ mean the same for every n at typical sizes of the state.
     """
 
     name = "hysteresis_exponent"
@@ -54,5 +54,5 @@ class HysteresisExponent(Term):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        """Off, and of several sizes."""
+        """Off, and several sizes."""
         return cls(), *(cls(n=n) for n in FOUND_BY)

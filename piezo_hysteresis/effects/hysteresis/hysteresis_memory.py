@@ -33,7 +33,7 @@ from ..invertibility import Invertibility
 from .level_dependent_memory import LevelDependentMemory, LevelDependentMemoryBlock, plays_in_c
 
 SPAN = 32.0
-"""Largest radius over the smallest."""
+"""Ratio of the largest to the smallest half width."""
 
 
 class HysteresisMemory(Effect):
@@ -42,12 +42,12 @@ class HysteresisMemory(Effect):
     Parameters
     ----------
     c : sequence of float
-        Weights of the plays, from the narrowest to the widest, any number of at least 2 [1]; none is negative, a
-        passive actuator returns no more work than it was given.
+        Weights of the plays, from the narrowest to the widest, at least 2 [1]; they are not negative, because an
+        actuator is passive.
     reach : float
-        Half width of the widest play [normalised, 1]; half the range of the drive uses them all.
+        Half width of the widest play [normalised, 1]; with half the drive range all plays move.
     virgin : float
-        How a stage came to rest [1]: at 0 every play is centred, at 1 each is where the way from 0 V has left it.
+        State at rest [1]: at 0 every play is centred, at 1 every play is in the state after a ramp from 0 V.
 
     Notes
     -----
@@ -67,7 +67,7 @@ class HysteresisMemory(Effect):
     source = "Prandtl-Ishlinskii operator; Gu et al. 2016"
     loop_names = ("c",)
     level_term: ClassVar[type[Term]] = LevelDependentMemory
-    """Term that lets the weights of the plays depend on the level."""
+    """Term that makes the weights of the plays depend on the level."""
     parameters = (
         Parameter("c", "c_j", "1", (0.0,) * 8, 0.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
         Parameter("reach", "r_max", "1", 0.5, 1e-3, 10.0, "half width of the widest play", "Gu 2016", fixed=True),
@@ -83,7 +83,7 @@ class HysteresisMemory(Effect):
         return cls(reach=half), cls(reach=max(half, farthest), virgin=1.0)
 
     def refined(self) -> Self:
-        """With a play between every two, of no weight yet."""
+        """The same effect with an additional play of zero weight between every two plays."""
         c = self.array("c")
         finer = np.zeros(2 * c.size - 1)
         finer[::2] = c
@@ -175,7 +175,7 @@ class HysteresisMemoryBlock(Block):
         y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
         rows = np.empty((len(dx) + self.c.size, x.size))
         mapped, own = rows[: len(dx)], rows[len(dx) :]
-        if not self.c.any():  # plays without weight pass nothing on
+        if not self.c.any():  # plays without weight have no output
             linearise_plays(x, dx[:0].copy(), self.c, self.radii, state, tangent[:0].copy(), y, mapped[:0], own)
             mapped[:] = 0.0
         else:

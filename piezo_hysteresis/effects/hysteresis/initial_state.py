@@ -27,7 +27,7 @@ class InitialState(Term):
     Parameters
     ----------
     h0 : float
-        h at the start [normalised, 1]; at most |A|/(β + γ sgn A) in size.
+        h at the start [normalised, 1]; its absolute value is at most |A|/(β + γ sgn A).
     """
 
     name = "initial_state"

@@ -28,18 +28,18 @@ from ..invertibility import Invertibility
 
 
 class LevelDependentMemory(Term):
-    """Weights of the plays that grow or shrink with the level at which each play stands.
+    """Weights of the plays that grow or shrink with the position of each play.
 
     Parameters
     ----------
     k_narrow, k_wide : float
-        Relative growth per unit of level of the narrowest and of the widest play [1]; linear in the number of the play
-        between them.
+        Relative growth per unit of level of the narrowest and of the widest play [1]; interpolated linearly in the
+        number of the play.
 
     Notes
     -----
-    A Preisach operator has, in its form of plays, one monotone function f_j for every play; this is the first bend of
-    it. Up to |k| = 0.5 and |p| = 1 every f_j is monotone, so that the operator can be inverted.
+    A Preisach operator, written with plays, has one monotone function f_j for every play; this is its quadratic term.
+    Up to |k| = 0.5 and |p| = 1 every f_j is monotone, so that the operator can be inverted.
     """
 
     name = "level_dependent_memory"
@@ -48,8 +48,8 @@ class LevelDependentMemory(Term):
     host = "hysteresis_memory"
     invertibility = Invertibility.EXACT
     equation = "Σ_j c_j (p_j + k_j p_j²),  k_j from k_narrow to k_wide"
-    signature = "loops of one amplitude that are wider at one end of the range than at the other"
-    source = "Preisach operator in the form of plays, one function for each; its first bend"
+    signature = "Loops of one amplitude are wider at one end of the range than at the other"
+    source = "quadratic term of a Preisach operator, written with one function for each play"
     parameters = (
         Parameter("k_narrow", "k_1", "1", 0.0, -0.5, 0.5, "growth of the narrowest play", "Preisach", 0.0, 0.1),
         Parameter("k_wide", "k_n", "1", 0.0, -0.5, 0.5, "growth of the widest play", "Preisach", 0.0, 0.1),
@@ -132,11 +132,11 @@ class LevelDependentMemoryBlock(Block):
     Parameters
     ----------
     names : tuple of str
-        Of the weights, then of the k numbers.
+        Names of the weights, then of the k numbers.
     c, radii : (s,) ndarray
         Weights and half widths of the plays.
     virgin : float
-        0 where a stage at rest has centred plays, 1 where each is as the way from 0 V has left it.
+        State at rest: 0 for centred plays, 1 for the state after a ramp from 0 V.
     numbers : (k,) ndarray
         Numbers of the bends.
     by_bend : (k, s) ndarray

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`HysteresisOperator`: the effect of a chain that plays the role of the hysteresis, found as `Model.hysteresis`.
+"""`HysteresisOperator`: the effect that is the hysteresis of a chain, available as `Model.hysteresis`.
 
-Another operator (Preisach, Prandtl-Ishlinskii, …) is one class that derives from it: identification, diagnosis and
-report ask for the role and for no name.
+Another operator (Preisach, Prandtl-Ishlinskii, …) is one class derived from it. Identification, diagnosis and report
+use this interface and no names of effects.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from ...errors import IdentificationError
 from ..effect import ChainPosition, Discretisation, Effect
 
 POINTS = 6000
-"""About how many points of the data a search for start values uses."""
+"""Approximate number of points of the data for a search of start values."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,11 +47,11 @@ class Loop:
     w : (n,) array
         Hysteresis output.
     continues : bool
-        True where the state of the loop before is carried on.
+        True if it starts with the state of the loop before.
     start : float
-        v at which the stage had settled before, where it does not continue.
+        v at which the stage had settled before, if it does not continue.
     weight : float
-        Weight in the search; 0 where the record only carries the state.
+        Weight in the search; 0 if the record only determines the state.
     """
 
     v: Array
@@ -68,9 +68,9 @@ class HysteresisOperator(Effect):
     place = ChainPosition.HYSTERESIS
 
     gain_names: ClassVar[tuple[str, ...]]
-    """Parameters to which w is proportional: w doubles when all of them do."""
+    """Parameters to which w is proportional: w doubles if all of them are doubled."""
     memory_names: ClassVar[tuple[str, ...]] = ()
-    """Parameters without meaning once the memory is switched off."""
+    """Parameters that have no meaning if the memory is switched off."""
 
     def fitted_names(self) -> tuple[str, ...]:
         """Names of the numbers that a fit adjusts: ``"beta"``, or ``"c[0]"`` for elements of an array parameter."""
@@ -92,30 +92,30 @@ class HysteresisOperator(Effect):
 
     @property
     def has_memory(self) -> bool:
-        """False where the numbers switch the memory off, so that w is a function of v alone."""
+        """False if the parameters switch the memory off, so that w is a function of v alone."""
         return True
 
     def memoryless(self) -> Self | None:
-        """The same operator with its memory switched off; None where it has no such form."""
+        """The same operator with its memory switched off; None if it has no such form."""
         return None
 
     def exact(self) -> HysteresisOperator:
-        """The operator that terms of the catalogue can join; itself, unless another one stands for it.
+        """The operator with an exact step, which can have terms of the catalogue; usually the operator itself.
 
         Raises
         ------
         ModelError
-            Where there is none for these values.
+            If there is none for these values.
         """
         return self
 
     @property
     @abstractmethod
     def turning_slope(self) -> float:
-        """∂w/∂v just after a turning point, at v = 0 [1]: the gain that small fast motion sees."""
+        """∂w/∂v just after a turning point, at v = 0 [1]: the gain for small fast motion."""
 
     def shaped(self, low: float, high: float) -> Self:
-        """The same operator with the shape from which a search begins.
+        """The same operator with the start values of its shape.
 
         Parameters
         ----------
@@ -125,19 +125,19 @@ class HysteresisOperator(Effect):
         return self
 
     def started(self, loops: Sequence[Loop]) -> Self:
-        """The operator closest to the loops, without a start value: its shape by `shaped`, its gains by least squares.
+        """The operator closest to the loops, without start values: shape from `shaped`, gains by least squares.
 
         Parameters
         ----------
         loops : sequence of Loop
-            In experiment order; those of weight 0 only carry the state.
+            Loops in experiment order; loops with weight 0 only determine the state.
 
         Raises
         ------
         IdentificationError
             If no loop has weight, or the input does not move.
         """
-        from scipy.optimize import lsq_linear  # takes 0.1 s to import, for which no node shall wait
+        from scipy.optimize import lsq_linear  # takes 0.1 s to import, which would delay the start of nodes
 
         range_of(loops)
         moved = [loop for loop in loops if loop.weight > 0]
@@ -169,7 +169,7 @@ class HysteresisOperator(Effect):
 
 
 def outputs(operator: HysteresisOperator, loops: Sequence[Loop]) -> list[Array]:
-    """Output w (n,) of an operator in every loop, the state carried where a loop continues."""
+    """Output w (n,) of an operator in every loop; the state continues if a loop continues."""
     block = operator.block(Discretisation(1.0, 1.0))
     state, found = None, []
     for loop in loops:
@@ -181,12 +181,12 @@ def outputs(operator: HysteresisOperator, loops: Sequence[Loop]) -> list[Array]:
 
 
 def range_of(loops: Sequence[Loop]) -> float:
-    """Largest range of v in the loops that have weight.
+    """Largest range of v in the loops with weight.
 
     Raises
     ------
     IdentificationError
-        If there is none, or the input does not move.
+        If there is no such loop, or the input does not move.
     """
     weighted = [loop for loop in loops if loop.weight > 0]
     span = max((float(np.ptp(np.append(loop.v, loop.start))) for loop in weighted), default=0.0)
@@ -199,7 +199,7 @@ def range_of(loops: Sequence[Loop]) -> float:
 
 
 def thinned(loop: Loop, points: int) -> Loop:
-    """Fewer points, the extremes of v in every segment among them, so that no turning point is lost."""
+    """The loop with fewer points, including the extremes of v in every segment, so that no turning point is lost."""
     per_bin = -(-3 * loop.v.size // points)
     if per_bin < 4:
         return loop

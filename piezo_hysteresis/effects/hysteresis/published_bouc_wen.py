@@ -41,8 +41,8 @@ class PublishedBoucWen(ModifiedBoucWen):
 
     Notes
     -----
-    An explicit Euler step: the result depends on the sample rate (4 % of the h range for white noise at 50 kHz). It
-    reproduces published figures; `BoucWen` is the form to identify with.
+    An explicit Euler step, so the result depends on the sample rate (4 % of the range of h for white noise at 50 kHz).
+    Use it to reproduce published figures, and `BoucWen` for identification.
     """
 
     name = "published_bouc_wen"
@@ -68,7 +68,7 @@ class PublishedBoucWen(ModifiedBoucWen):
 
 @kernel
 def step(h, dv, a, beta, gamma, n):
-    """h of Eq. (7) after Δv; for n = 1 little waits for the last h."""
+    """h of Eq. (7) after Δv; for n = 1 few operations depend on the last h."""
     if n == 1.0:
         return fma(-gamma * dv, abs(h), fma(h, fma(-beta, abs(dv), 1.0), a * dv))
     return h + (a * dv - (beta * abs(dv) * h + gamma * dv * abs(h)) * abs(h) ** (n - 1.0))
@@ -96,7 +96,7 @@ def run_published(v, p, state, w):
 
 @kernel
 def linearise_plain(v, p, state, tangent, w, dw):
-    """`linearise_published` for n = 1 and a drive that nothing is fitted of: a few registers, no row beside its own."""
+    """`linearise_published` for n = 1 without incoming rows; fast, because it needs few registers."""
     a, beta, gamma, p1, p2 = p[0], p[1], p[2], p[4], p[5]
     h, last = state[0], state[1]
     by_a, by_beta, by_gamma = tangent[0], tangent[1], tangent[2]
@@ -123,7 +123,7 @@ def linearise_plain(v, p, state, tangent, w, dw):
 def linearise_published(v, dv_in, p, state, tangent, last_in, w, dw):
     """`run_published` with rows dw (m + 5, n): m incoming, then A, β, γ, p1, p2; tangent (m + 3,), last_in (m,) follow.
 
-    The exponent n is chosen, not fitted: it has no row.
+    The exponent n is not fitted and has no row.
     """
     if dv_in.shape[0] == 0 and p[3] == 1.0:
         linearise_plain(v, p, state, tangent, w, dw)

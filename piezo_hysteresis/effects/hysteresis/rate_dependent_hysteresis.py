@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Loops that open or close with the speed of the drive: a term of the Bouc-Wen loop."""
+"""Loops whose width changes with the speed of the drive: a term of the Bouc-Wen loop."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ..extent import Extent
 from ..invertibility import Invertibility
 
 FOUND_BY = (-0.03, 0.03)
-"""Sizes k at which a search begins."""
+"""Start values of k."""
 
 
 class RateDependentHysteresis(Term):
@@ -37,13 +37,13 @@ class RateDependentHysteresis(Term):
     a : float
         Exponent of the rate law [1]; 0 is the logarithm, 1 is proportional to speed.
     jumps : float
-        How fast a slow record jumps [1]: at 0 in its own sample period, at 1 in the model's.
+        Duration of a jump in a slow record [1]: at 0 the sample period of the record, at 1 that of the model.
 
     Notes
     -----
     v̇ = Δv/Ts is the speed of the drive between two samples and v0 = 1 normalised unit per second. Speeds below
-    1e-4 per second count as that, so that the law stays finite at rest. A change of v by more than 0.05 in one sample
-    of a slow record may be a jump or part of a ramp, and the record does not show which: `jumps` covers both.
+    1e-4 per second are replaced by this value, so that the law stays finite at rest. A change of v by more than 0.05 in
+    one sample of a slow record may be a jump or part of a ramp, which the record does not show; `jumps` covers both.
     """
 
     name = "rate_dependent_hysteresis"
@@ -69,7 +69,7 @@ class RateDependentHysteresis(Term):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        """Off, and of a size of either sign: with it the exponent counts, which is nothing at k = 0."""
+        """Off, and sizes of both signs, because the exponent has no influence at k = 0."""
         off = tuple(cls(a=a, jumps=jumps) for jumps in (0.0, 1.0) for a in (0.5, 0.1))
         sizes = ((k, a) for k in FOUND_BY for a in (0.3, 0.1, -0.1))
         return off + tuple(cls(k=k, a=a, jumps=jumps) for k, a in sizes for jumps in (0.0, 1.0))

@@ -30,7 +30,7 @@ from ..extent import Extent
 from ..invertibility import Invertibility
 
 REFERENCE_TIME = 0.1
-"""Time after a step at which creep counts as zero [s]."""
+"""Time after a step at which creep is defined as zero [s]."""
 
 LASTING = 100.0
 """Slowest relaxation over the time T since the stage was at rest. A relaxation of time τ > T grows by the share T/τ:
@@ -52,12 +52,12 @@ class Creep(Effect):
 
     Notes
     -----
-    As an operator on any input the law is a sum of relaxations, two per decade, exact for an input that is linear
-    between samples. Outside ``tau_min`` … ``tau_max`` creep ends: a stage at rest has crept completely.
+    For any input, the law is computed as a sum of relaxations, two per decade; it is exact for an input that is linear
+    between samples. There is no creep outside ``tau_min`` … ``tau_max``; for a stage at rest, creep is complete.
 
     Examples
     --------
-    Ten times longer after a step, γ more:
+    After ten times the time, the response has grown by γ:
 
     >>> block = Creep(gamma=0.02).block(Discretisation(1e-2, 1e-2))
     >>> y, _ = block.run(np.ones(1001), block.rest(0.0, 0.0))
@@ -129,5 +129,5 @@ class Creep(Effect):
 
 
 def settled_mix(tau: Array, weights: Array) -> Array:
-    """Direct path and weights of relaxations whose sum is zero 0.1 s after a step, shape (1 + s,)."""
+    """Weights of the direct path and of the relaxations, whose sum is zero 0.1 s after a step, shape (1 + s,)."""
     return np.append(weights @ np.expm1(-REFERENCE_TIME / tau), weights)

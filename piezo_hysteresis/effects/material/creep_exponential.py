@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Creep of a few definite time constants."""
+"""Creep with a few time constants."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from ..extent import Extent
 from ..invertibility import Invertibility
 
 FASTEST = 5e-3
-"""Time constant below which a relaxation is no creep but dynamics [s]."""
+"""Time constant below which a relaxation counts as dynamics and not as creep [s]."""
 
 
 class CreepExponential(Effect):
@@ -43,7 +43,7 @@ class CreepExponential(Effect):
     c : sequence of float
         Final share of each relaxation [1].
     tau : sequence of float
-        Time constant of each [s]; as many as `c`.
+        Time constant of each relaxation [s]; as many as `c`.
     """
 
     name = "creep_exponential"
@@ -69,7 +69,7 @@ class CreepExponential(Effect):
         if self.array("c").size != self.array("tau").size:
             raise ParameterError(
                 f"creep_exponential: got {self.array('c').size} shares c and {self.array('tau').size} time constants "
-                "tau, expected equally many"
+                "tau, expected the same number of both"
             )
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:

@@ -59,7 +59,7 @@ class CreepFractional(Creep):
         "y = w + γ Σ_j g_j (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w,  g_j = ½ (τ_j/0.1)^λ;  "
         "after a step: 1 + γ ((t/0.1 s)^λ − 1)/(λ ln 10)"
     )
-    signature = "The residual looks as for logarithmic creep, but grows faster or slower than log t"
+    signature = "The residual is similar to that of logarithmic creep, but grows faster or slower than log t"
     source = "fractional creep as a bank of relaxations; Croft, Shed, Devasia 2001 for λ = 0"
     parameters = (
         Creep.parameters[0],

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Creep that is logarithmic at short and at long times, of another rate each."""
+"""Creep that is logarithmic at short and at long times, with different rates."""
 
 from __future__ import annotations
 
@@ -27,19 +27,20 @@ from .creep import PER_DECADE, Creep, settled_mix
 
 
 class CreepTwoRates(Creep):
-    """Creep of one rate per decade at the shortest times and of another at the longest, linear in log t between them.
+    """Creep with one rate per decade at the shortest times and another at the longest, linear in log t in between.
 
     Parameters
     ----------
     gamma_fast, gamma_slow : float
         Creep per decade of the relaxations with ``tau_min`` and with ``tau_max``, relative to the response 0.1 s after
-        a step [1/decade]; none is negative, creep goes on in the direction of the step.
+        a step [1/decade]; not negative, because creep continues in the direction of the step.
     tau_min, tau_max : float
         Range of the relaxation times [s], as in `Creep`.
 
     Notes
     -----
-    Equal rates are logarithmic creep. Both numbers are linear: unlike free time constants they cannot follow noise.
+    Equal rates give logarithmic creep. The output is linear in both, so, unlike free time constants, they do not fit
+    noise.
 
     Examples
     --------
@@ -59,7 +60,7 @@ class CreepTwoRates(Creep):
         "y = w + Σ_j g_j (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w,  "
         "g_j = ½ (γ_f (1 − s_j) + γ_s s_j),  s_j = log(τ_j/τ_min)/log(τ_max/τ_min)"
     )
-    signature = "as logarithmic creep, but of another rate at short times than at long ones"
+    signature = "The residual is similar to that of logarithmic creep, with different rates at short and long times"
     source = "relaxation bank of the logarithmic law; Croft, Shed, Devasia 2001 for equal rates"
     parameters = (
         Parameter("gamma_fast", "γ_f", "1/decade", 0.0, 0.0, 0.2, "creep per decade, fast end", "Croft", 0.0, 0.01),

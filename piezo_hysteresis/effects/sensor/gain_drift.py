@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sensitivity of actuator and sensor that changes while they warm up."""
+"""Change of the gain of actuator and sensor while they warm up."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class GainDrift(Effect):
 
     Notes
     -----
-    t is the time since the start of the experiment. It multiplies the normalised position, before the sensor's zero.
+    t is the time since the start of the experiment. The gain acts on the normalised position, before the sensor zero.
     """
 
     name = "gain_drift"

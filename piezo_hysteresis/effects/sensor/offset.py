@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Zero of the displacement sensor, and where the stage settles: part of every comparison with a measurement."""
+"""Zero of the displacement sensor, and additional settling at rest; part of every comparison with a measurement."""
 
 from __future__ import annotations
 
@@ -33,13 +33,12 @@ class Offset(Effect):
     y0 : float
         Sensor zero [m].
     settling : float
-        r, by how much further a stage has settled at rest than its model says, relative to its position there [1].
+        r: settling of the stage at rest beyond that of the model, relative to its position there [1].
 
     Notes
     -----
-    How far creep and hysteresis had settled before a record begins depends on what was done for minutes or days before,
-    which no record shows. The ratio r absorbs it, so that it is not taken for another effect. r is the same for all
-    records.
+    The state of creep and hysteresis before a record depends on the motion during minutes or days before, which is not
+    recorded. The ratio r absorbs this, so that it is not mistaken for another effect. r is the same for all records.
 
     Examples
     --------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Low-pass filter of second order in the chain of the sensor."""
+"""Second-order low-pass filter of the sensor."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BUTTERWORTH = 0.5**0.5
 
 
 class SecondOrderLowPass(Effect):
-    """A filter of second order, such as an anti-aliasing filter, stands before the converter of the sensor.
+    """A second-order filter, such as an anti-aliasing filter, before the converter of the sensor.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class SecondOrderLowPass(Effect):
     family = "lag"
     place = ChainPosition.SENSOR
     equation = "Y/X = 1/(1 + 2 ζ τ s + τ² s²)"
-    signature = "Everything measured lags and rolls off, and follows a step with the slope zero at first"
+    signature = "The whole measurement lags and rolls off; the response to a step starts with zero slope"
     source = "anti-aliasing filters: Butterworth, ζ = 0.7071"
     parameters = (
         Parameter("tau", "τ", "s", 0.0, 0.0, 1e-1, "time constant of the filter", "filter settings", 0.0, 2e-5),
@@ -66,7 +66,7 @@ class SecondOrderLowPass(Effect):
 
 
 class SecondOrderBlock(ModeBlock):
-    """A mode that carries the whole of its input, by its time constant."""
+    """A mode with the whole static response, defined by its time constant."""
 
     names = ("second_order_low_pass.tau",)
 

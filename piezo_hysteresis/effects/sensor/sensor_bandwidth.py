@@ -32,7 +32,7 @@ class SensorBandwidth(Effect):
     tau : float
         Time constant of each pole, 1/(2π·cut-off frequency) [s].
     poles : float
-        Their number, whole [1].
+        Number of poles, a whole number [1].
     """
 
     name = "sensor_bandwidth"
@@ -41,7 +41,7 @@ class SensorBandwidth(Effect):
     place = ChainPosition.SENSOR
     equation = "Y/X = 1/(1 + τ s)^n"
     signature = (
-        "Everything measured lags and rolls off. If τ is below one sample, it cannot be separated from the other lags"
+        "The whole measurement lags and rolls off. If τ is below one sample, it cannot be separated from other lags"
     )
     source = "bandwidth settings of capacitive sensors: 50 Hz, 500 Hz, 5 kHz"
     parameters = (

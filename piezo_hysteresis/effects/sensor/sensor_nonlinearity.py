@@ -37,8 +37,8 @@ class SensorNonlinearity(Effect):
 
     Notes
     -----
-    They act on the normalised position: relative errors at full scale where the model's ``displacement_scale`` is the
-    stroke [m].
+    They act on the normalised position: if the model's ``displacement_scale`` is the stroke, they are relative errors
+    at full scale.
     """
 
     name = "sensor_nonlinearity"
@@ -47,7 +47,7 @@ class SensorNonlinearity(Effect):
     place = ChainPosition.SENSOR
     equation = "y = x + s2 x² + s3 x³"
     signature = (
-        "The residual holds harmonics of the position itself, also at the resonance. On a unipolar drive p1 "
+        "The residual contains harmonics of the position, also at the resonance. On a unipolar drive p1 "
         "and p2 absorb the effect"
     )
     source = "capacitive sensors 0.02–0.1 %, strain gauges 0.1–1 %"

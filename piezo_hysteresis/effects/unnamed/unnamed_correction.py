@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`UnnamedCorrection`: what corrections without a physical name have in common."""
+"""`UnnamedCorrection`: base class of corrections without a physical name."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class CorrectionShape:
     Parameters
     ----------
     x_name, x_unit : str
-        What it depends on, and the unit.
+        Name and unit of the independent quantity.
     x : (n,) ndarray
-        In that unit.
+        Its values in that unit.
     y_name, y_unit : str
-        What it does, and the unit.
+        Name and unit of the correction.
     y : (n,) ndarray
-        In that unit.
+        Its values in that unit.
     """
 
     x_name: str
@@ -52,14 +52,14 @@ class CorrectionShape:
 class UnnamedCorrection(Effect):
     """A small, passive correction of the position that has no physical name.
 
-    It is no effect of the catalogue: no search for effects knows it, and compensation leaves it out.
+    It is not an effect of the catalogue: a search for effects excludes it, and compensation leaves it out.
     """
 
     family = "unnamed_correction"
     place = ChainPosition.SENSOR
     invertibility = Invertibility.IMPOSSIBLE
     depends_on: ClassVar[str]
-    """What the correction is a function of, in words."""
+    """Independent quantity of the correction, in words."""
 
     @abstractmethod
     def shape(self, displacement_scale: float) -> CorrectionShape:

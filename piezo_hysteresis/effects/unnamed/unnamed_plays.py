@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A correction without a name that depends on where the stage has turned."""
+"""A correction without a name that depends on the last turning points of the stage."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ from ..invertibility import Invertibility
 from .unnamed_correction import CorrectionShape, UnnamedCorrection
 
 SPAN = 64.0
-"""Largest radius over the smallest."""
+"""Ratio of the largest to the smallest half width."""
 
 
 class UnnamedPlays(UnnamedCorrection):
-    """A small part of the motion that lags in position, as friction of a guide does, without a physical name.
+    """A small part of the motion that lags in position, similar to friction of a guide, without a physical name.
 
     Parameters
     ----------
     c : sequence of float
-        Weights of the plays, from the narrowest to the widest, any number of at least 1 [1]; none is negative, a
-        passive stage returns no more work than it was given.
+        Weights of the plays, from the narrowest to the widest, at least 1 [1]; they are not negative, because a stage
+        is passive.
     reach : float
         Half width of the widest play [normalised, 1].
 
@@ -49,7 +49,7 @@ class UnnamedPlays(UnnamedCorrection):
     name = "unnamed_plays"
     invertibility = Invertibility.IMPOSSIBLE
     equation = "y = x + Σ_j c_j p_j,  p_j = max(x − r_j, min(x + r_j, p_j before))"
-    signature = "The residual depends on the distance from the last turning points, at every rate alike"
+    signature = "The residual depends on the distance from the last turning points, in the same way at every rate"
     source = "Prandtl-Ishlinskii operator on the position"
     depends_on = "distance from the last turning points"
     parameters = (

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A correction without a name that depends on where the stage is."""
+"""A correction without a name that depends on the position of the stage."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class UnnamedPositionMap(UnnamedCorrection):
     Parameters
     ----------
     m : sequence of float
-        Deviation at equally spaced positions between ``low`` and ``high``, any number of at least 1 [1].
+        Deviations at equally spaced positions between ``low`` and ``high``, at least 1 [1].
     low, high : float
         Positions at which the deviation begins and ends [normalised, 1].
 
     Notes
     -----
-    The deviation is linear between the positions. It is zero at ``low``, at ``high`` and outside: it says nothing of
-    positions that were not recorded. The map rises everywhere, so that one position belongs to every reading.
+    The deviation is linear between the positions. It is zero at ``low``, at ``high`` and outside, where no positions
+    were recorded. The map rises everywhere, so that every reading corresponds to one position.
     """
 
     name = "unnamed_position_map"
@@ -86,7 +86,7 @@ class UnnamedPositionMap(UnnamedCorrection):
 
 @kernel
 def bend(x, heights, low, step, y):
-    """x (n,) plus the deviation of `heights` (k,) on the grid low, low + step, … to y (n,); none outside."""
+    """x (n,) plus the deviation of `heights` (k,) on the grid low, low + step, … to y (n,); zero outside."""
     for i in range(x.size):
         at = (x[i] - low) / step
         y[i] = x[i]
@@ -97,7 +97,7 @@ def bend(x, heights, low, step, y):
 
 @kernel
 def hats(x, low, step, rows):
-    """∂y/∂m_k at x (n,) to rows (k, n), which come filled with zeros."""
+    """∂y/∂m_k at x (n,) to rows (k, n), which contain zeros before."""
     count = rows.shape[0] + 2
     for i in range(x.size):
         at = (x[i] - low) / step

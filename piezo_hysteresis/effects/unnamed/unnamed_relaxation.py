@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A correction without a name that depends on the time since the stage moved."""
+"""A correction without a name that depends on the time since the last motion of the stage."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from .unnamed_correction import CorrectionShape, UnnamedCorrection
 
 
 class UnnamedRelaxation(UnnamedCorrection):
-    """A small part of the motion that comes late, without a physical name.
+    """A small, delayed part of the motion without a physical name.
 
     Parameters
     ----------
     g_fast, g_slow : float
-        Late motion per decade of time at ``tau_min`` and at ``tau_max``, relative to the response 0.1 s after a step
-        [1/decade]; between them it is linear in log τ. None is negative: a passive stage follows its drive.
+        Delayed motion per decade of time at ``tau_min`` and at ``tau_max``, relative to the response 0.1 s after a step
+        [1/decade]; linear in log τ in between. Not negative, because a stage is passive.
     tau_min, tau_max : float
         Range of the relaxation times [s]: from the fastest sample period to 10 times the longest record.
     """
