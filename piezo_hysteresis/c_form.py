@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`CForm`: a block as C code, declared beside the kernel that it repeats.
+"""`CForm`: a block as C code, declared next to the equivalent kernel.
 
-The code is plain C99. A block becomes two functions, ``rest`` and ``step``, and the state that stands between their
-calls. `piezo_hysteresis.export` writes the frame around them.
+The code is plain C99. A block becomes two functions, ``rest`` and ``step``, and a state that is kept between their
+calls. `piezo_hysteresis.export` writes the rest of the program.
 """
 
 from __future__ import annotations
@@ -36,23 +36,23 @@ class CForm:
 
     ``double rest(state *s, double x)`` sets the state of a stage settled at the input x and returns the output there;
     ``double step(state *s, double x)`` takes the next input. A form without state has no argument s. ``ME_`` in a body
-    or a member stands for the name that the block gets in the program.
+    or a member is replaced by the name of the block in the program.
 
     Parameters
     ----------
     step : str
         Body of ``step``.
     rest : str, optional
-        Body of ``rest``; default that of ``step``, for forms without state.
+        Body of ``rest``; default: that of ``step``, for forms without state.
     numbers : mapping of str to int, float or ndarray
-        Constants by the name under which the bodies use them. A count becomes an enumeration constant.
+        Constants by their names in the bodies. An integer becomes an enumeration constant.
     state : tuple of str
         Declarations of the members of the state.
     library : tuple of str
-        Functions that the bodies call, in an order in which each knows those before it. A text is written once,
-        however many forms need it.
+        Functions that the bodies call, each after those that it calls. Every text is written once, even if several
+        forms use it.
     parts : mapping of str to CForm
-        Blocks inside, called as `call` says.
+        Inner blocks, called by the expressions of `call`.
     channel : str
         Further measured input of ``step``, by its name in the record; empty for none.
     """

@@ -29,10 +29,10 @@ from .errors import RecordError
 Samples = NDArray[np.float64]
 
 QUANTITIES: Mapping[str, str] = {"voltage": "V", "displacement": "m", "temperature": "K"}
-"""Quantity that a channel can be, to its SI unit."""
+"""SI unit of every quantity that a channel can contain."""
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
-"""How a channel may be called: words of small letters and digits."""
+"""Valid channel names: words of lower-case letters and digits."""
 
 
 def are_finite(samples: Samples) -> bool:
@@ -46,9 +46,9 @@ def channel_samples(name: str, values: ArrayLike, length: int | None) -> Samples
     Parameters
     ----------
     name : str
-        Of the channel, for the message of an error.
+        Name of the channel, for error messages.
     values : (n,) array_like
-        Its samples.
+        Samples of the channel.
     length : int or None
         Number of samples of the channels before it; None for the first one.
 
@@ -76,7 +76,7 @@ def channel_samples(name: str, values: ArrayLike, length: int | None) -> Samples
 
 
 def quantity_of(name: str) -> str | None:
-    """The quantity that a channel name contains as a word; None where it contains none, or two.
+    """The quantity that a channel name contains as a word; None if it contains none, or two.
 
     Examples
     --------
@@ -92,18 +92,18 @@ def quantity_of(name: str) -> str | None:
 
 
 class ChannelMapping(Mapping[str, Samples]):
-    """Frozen mapping of channel name to samples, beside the voltage and the displacement of a record.
+    """Frozen mapping of channel name to samples, for channels other than voltage and displacement.
 
     Parameters
     ----------
     channels : mapping of str to (n,) ndarray
-        A name holds one of `QUANTITIES` as a word, which fixes its unit: ``other_displacement`` [m],
+        A name contains one of `QUANTITIES` as a word, which defines its unit: ``other_displacement`` [m],
         ``displacement_3`` [m], ``monitor_voltage`` [V], ``temperature`` [K].
 
     Raises
     ------
     RecordError
-        On a name that holds no quantity, or that the record has already.
+        If a name contains no quantity, or the record already has it.
     """
 
     __slots__ = ("_held",)

@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`InverseTerms`: what a block contributes to the inverse of drive, hysteresis and creep, declared beside its kernel.
+"""`InverseTerms`: terms of a block in the inverse of drive, hysteresis and creep, declared next to its kernel.
 
-These blocks are inverted together, in one recursion (`piezo_hysteresis.compensation`). It knows a drive, a hysteresis
+These blocks are inverted together, in one recursion (`piezo_hysteresis.compensation`), for a drive, a hysteresis
 
     w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j (p_j + b_j p_j²)
 
-with plays p_j, and relaxations of w in series. A block states its numbers in these equations as `InverseTerms`, and its
-state as `InverseStart`.
+with plays p_j, and relaxations of w in series. A block returns its parameters in these equations as `InverseTerms`, and
+its state as `InverseStart`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 NO_LOOP, PLAIN, GENERAL, PUBLISHED = range(4)
 """Kinds of loop: none, n = 1 without terms, with terms, the explicit step of Eq. (7)."""
 POLYNOMIAL = ("p1", "p2", "p_e", "p_4")
-"""Numbers of the static polynomial, in order: of v³, v, v² and v⁴."""
+"""Coefficients of the static polynomial in order: of v³, v, v² and v⁴."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,9 +47,9 @@ class LoopTerms:
     kind : int
         `PLAIN`, `GENERAL` or `PUBLISHED`.
     numbers : (8,) ndarray
-        Of its step.
+        Parameters of its step.
     periods : tuple of float
-        Of the samples, and of the samples at which steps of the drive count as jumps [s].
+        Sample period, and duration of a jump of the drive [s].
     initial : float
         h of a stage at rest.
     library : tuple of str
@@ -72,7 +72,7 @@ class PlayTerms:
     weights, bends, radii : (s,) ndarray
         c_j, b_j, and half widths in units of v.
     virgin : float
-        0 where a stage at rest has centred plays, 1 where each is as the way from 0 V has left it.
+        State at rest: 0 for centred plays, 1 for the state after a ramp from 0 V.
     """
 
     weights: Array
@@ -104,7 +104,7 @@ class RelaxationTerms:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class InverseTerms:
-    """Numbers of a block in the recursion of the inverse; what it leaves out, it does not have.
+    """Parameters of a block in the recursion of the inverse; missing ones are not part of the block.
 
     Parameters
     ----------
@@ -125,13 +125,13 @@ class InverseTerms:
 
     @property
     def is_hysteresis(self) -> bool:
-        """Whether the block turns v into w, or into a summand of it."""
+        """Whether the output of the block is w, or a summand of w."""
         return bool(self.polynomial) or self.loop is not None or self.plays is not None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class InverseStart:
-    """State of a block in the recursion of the inverse; what it leaves out, it does not have.
+    """State of a block in the recursion of the inverse; missing parts are not part of the block.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class InverseStart:
 
 
 def summed(members: Sequence[InverseTerms | None]) -> InverseTerms | None:
-    """Terms of blocks side by side whose outputs add up; None where the recursion has no place for their sum."""
+    """Terms of the sum of parallel blocks; None if the recursion cannot represent the sum."""
     terms = [t for t in members if t is not None]
     loops, plays = [t.loop for t in terms if t.loop], [t.plays for t in terms if t.plays]
     if len(terms) < len(members) or not all(t.is_hysteresis for t in terms) or max(len(loops), len(plays)) > 1:
@@ -163,6 +163,6 @@ def summed(members: Sequence[InverseTerms | None]) -> InverseTerms | None:
 
 
 def started_together(members: Sequence[InverseStart]) -> InverseStart:
-    """State of blocks side by side."""
+    """State of parallel blocks."""
     h = [m.h for m in members if m.h is not None]
     return InverseStart(h=h[0] if h else None, plays=np.concatenate([m.plays for m in members]))

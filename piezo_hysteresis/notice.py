@@ -30,11 +30,11 @@ class Notice:
     kind : str
         Stable word: ``gap``, ``clipped``, ``non_finite``, ``duplicate``, ``not_at_rest``, ``units``, …
     message : str
-        One plain line, made printable.
+        One printable line.
     phase : str
-        Phase it was found in; empty for the whole experiment.
+        Phase in which it was found; empty for the whole experiment.
     severe : bool
-        True where no verdict should rest on the data.
+        True if no verdict should be based on the data.
     """
 
     kind: str

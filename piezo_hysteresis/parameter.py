@@ -38,19 +38,19 @@ class Parameter:
     symbol : str
         Symbol of docs/nomenclature, e.g. ``"γ"``.
     unit : str
-        SI unit, ``"1"`` where dimensionless.
+        SI unit; ``"1"`` if dimensionless.
     value : float or tuple of float
         Default value; a tuple is an array parameter of any length.
     lower, upper : float
         Inclusive bounds of every element.
     meaning : str
-        One line for a lab physicist.
+        Meaning in one line.
     source : str
         Paper and equation.
     off : float, optional
-        Value at which the effect is exactly absent; None where the parameter alone switches nothing off.
+        Value at which the effect is exactly absent; None if the parameter alone does not switch it off.
     scale : float
-        Typical size; conditions the identification and sets finite steps.
+        Typical size, for the conditioning of fits and for finite differences.
     per_record : bool
         True for a quantity that is free in every record (the phase of mains hum).
     fixed : bool
@@ -82,7 +82,7 @@ class Parameter:
 
     @property
     def is_array(self) -> bool:
-        """True where the value is a tuple."""
+        """True if the value is a tuple."""
         return isinstance(self.value, tuple)
 
     def check(self, value: object, prefix: str = "") -> Value:
@@ -98,7 +98,7 @@ class Parameter:
         Raises
         ------
         ParameterError
-            On a wrong type, a non-finite number or one outside the bounds.
+            If the type is wrong, or a number is not finite or outside the bounds.
         """
         name = prefix + self.name
         if self.is_array:
@@ -122,7 +122,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A setting that is no physical quantity: a word, a path, a switch, a number of something.
+    """A setting that is not a physical quantity: a word, a path, a switch, a count.
 
     Parameters
     ----------
@@ -133,14 +133,14 @@ class Setting:
     meaning : str
         One line for its description.
     choices : tuple of str
-        The words that are accepted; any where empty.
+        The accepted words; empty if any word is accepted.
     lower, upper : int
         Inclusive bounds of a number.
 
     Raises
     ------
     ParameterError
-        If the default is not acceptable itself.
+        If the default is not valid.
     """
 
     name: str

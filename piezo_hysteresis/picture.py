@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Picture`: what `plot` of a record, a model or a result returns. The room `report` draws it.
+"""`Picture`: the result of `plot` of a record, a model or a result, drawn by `report`.
 
-No room below `report` may import it. The package therefore names the function that draws, `draw_with`, and the function
-is loaded when the first picture is asked for. So nothing imports matplotlib before.
+No module below `report` may import `report`. The package therefore registers the drawing function by `draw_with`, and
+loads it when the first picture is requested, so that matplotlib is not imported before.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Picture(Protocol):
 
     @property
     def caption(self) -> str:
-        """What is drawn, and what to look for."""
+        """Explanation of the figure."""
 
     @property
     def figure(self) -> Any:
@@ -38,7 +38,7 @@ class Picture(Protocol):
 
     @property
     def data(self) -> Mapping[str, Any]:
-        """Columns drawn, named with units."""
+        """The data of the figure as columns, with units in their names."""
 
     def save_picture(self, path: str | os.PathLike[str]) -> None:
         """Write a new file; its ending chooses the format: .png, .svg, .pdf."""
@@ -48,7 +48,7 @@ Draw = Callable[..., Picture]
 
 
 class Pictured:
-    """What can be drawn alone: a record, an experiment, a diagnosis."""
+    """Base class of objects that can be drawn: a record, an experiment, a diagnosis."""
 
     __slots__ = ()
 
@@ -61,11 +61,11 @@ _loaders: list[Callable[[], Draw]] = []
 
 
 def draw_with(load: Callable[[], Draw]) -> None:
-    """Name what loads the function that draws; the package does so when it is imported."""
+    """Register the function that loads the drawing function; the package does this when it is imported."""
     _loaders[:] = [load]
 
 
 def picture_of(*what: object) -> Picture:
-    """The picture of an object, or of a model beside an experiment, as `piezo_hysteresis.plot` draws it."""
+    """The picture of an object, or of a model with an experiment, as `piezo_hysteresis.plot` draws it."""
     draw = _loaders[0]()
     return draw(*what)

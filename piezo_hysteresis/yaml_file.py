@@ -30,11 +30,11 @@ LONGEST = 1 << 16
 
 
 class _PlainLoader(yaml.SafeLoader):  # type: ignore[misc]  # yaml carries no types
-    """Plain values only: an alias can make nine lines as large as the memory."""
+    """Loader of plain values only, because with aliases a short file can fill the memory."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
-            raise yaml.YAMLError("an alias is not allowed, write the value out")
+            raise yaml.YAMLError("aliases are not allowed, write the value")
         return super().compose_node(parent, index)
 
 
@@ -46,7 +46,7 @@ def read_regular_file(path: Path, longest: int) -> bytes:
     path : Path
         The file.
     longest : int
-        Number of bytes that are read at most.
+        Largest number of bytes to read.
 
     Raises
     ------
@@ -69,14 +69,14 @@ def read_yaml(path: Path) -> Any:
     Parameters
     ----------
     path : Path
-        The file; `FileNotFoundError` is left to the caller, who knows whether it may be missing.
+        The file. The caller handles `FileNotFoundError`, because the file may be optional.
 
     Raises
     ------
     FileNotFoundError, NotADirectoryError
         If there is no such file.
     RecordingError
-        If it cannot be read, is longer than `LONGEST`, or is no plain YAML.
+        If it cannot be read, is longer than `LONGEST`, or is not plain YAML.
     """
     try:
         raw = read_regular_file(path, LONGEST + 1)

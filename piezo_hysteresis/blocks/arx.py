@@ -24,10 +24,10 @@ from .kernel import fma, kernel
 from .linear import LinearBlock
 
 ORDER = 8
-"""Taps and feedback are padded with zeros to multiples of this number, because eight numbers stay in registers."""
+"""Taps and feedback are padded with zeros to multiples of this number, because eight numbers fit into registers."""
 
 TILE = 1024
-"""Number of samples that pass taps and feedback together, so that they stay in the first-level cache."""
+"""Number of samples that are processed together, so that they stay in the first-level cache."""
 
 
 def lagrange(fraction: float) -> tuple[Array, Array]:
@@ -46,7 +46,7 @@ def lagrange(fraction: float) -> tuple[Array, Array]:
 
 
 def padded(coefficients: Array) -> Array:
-    """With zeros to a multiple of `ORDER`."""
+    """Coefficients padded with zeros to a multiple of `ORDER`."""
     return np.pad(coefficients, (0, -coefficients.size % ORDER))
 
 
@@ -56,7 +56,7 @@ def weigh(x, taps, y):
     for k in range(0, taps.size, 8):
         t0, t1, t2, t3 = taps[k], taps[k + 1], taps[k + 2], taps[k + 3]
         t4, t5, t6, t7 = taps[k + 4], taps[k + 5], taps[k + 6], taps[k + 7]
-        past = x[taps.size - 8 - k :]  # indices from zero: a negative one would count from the end, and cost the check
+        past = x[taps.size - 8 - k :]  # indices from zero avoid the check for negative indices
         for i in range(y.size):
             total = y[i] if k else 0.0
             total = fma(t7, past[i], total)
@@ -81,7 +81,7 @@ def recur(a, z, x, y0, y):
         total = x[i]
         for k in range(a.size - 1, 7, -1):
             total = fma(-a[k], z[k], total)
-        # the newest output comes last: everything else is ready before it
+        # the newest output is used last, so that the other products need not wait for it
         total = fma(-a8, y8, total)
         total = fma(-a7, y7, total)
         total = fma(-a6, y6, total)
@@ -131,8 +131,8 @@ def arx_filter(x, x0, y0, taps, offset, a, z, y):
 def arx_slopes(x, y, at_rest, taps_slope, first, a, interpolation, na, poles, before_x, before_y, rows):
     """Rows ∂y/∂a, ∂y/∂b, ∂y/∂d (na + nb + 1, n) of deviations x and y (n,), to which `at_rest` is added.
 
-    They are x/A and y/A at many delays. poles (2, a.size) are the states of these, before_x (first + taps_slope.size −
-    1,) and before_y (na,) what came out before; all are updated.
+    They are x/A and y/A at many delays. poles (2, a.size) are the states of these filters, before_x (first +
+    taps_slope.size − 1,) and before_y (na,) their last outputs; all are updated.
     """
     n, past_x, nb = x.size, before_x.size, rows.shape[0] - na - 1
     by_x, by_y = np.empty(past_x + n), np.empty(na + n)

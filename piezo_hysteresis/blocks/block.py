@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Block`: an effect realised at one sample period, able to run and to propagate sensitivities.
+"""`Block`: an effect at one sample period, which can run and propagate sensitivities.
 
-A block maps samples x to samples y. *Rest* is the state of a stage that has been at the constant input x0 for long.
-Sensitivities travel as rows: `linearise` takes ∂x/∂θ of everything upstream, shape (m, n), and returns those m rows
-mapped through the block, followed by the rows of the block's own `names`.
+A block maps samples x to samples y. *Rest* is the state after a long time at the constant input x0. Sensitivities are
+rows: `linearise` takes ∂x/∂θ of all parameters upstream, shape (m, n), and returns these m rows after the block,
+followed by the rows of the block's own parameters `names`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ..inverse_terms import InverseStart, InverseTerms, started_together, summed
 
 Array = NDArray[np.float64]
 State = Any
-"""Opaque to everyone but the block that made it."""
+"""State of a block, used by this block only."""
 Section = tuple[Array, Array]
 """Numerator and denominator of a transfer function, in powers of z⁻¹; the denominator begins with 1."""
 
@@ -45,7 +45,7 @@ class Block(ABC):
     names : tuple of str
         Own parameters, in the order of the own rows of `linearise`; the same at every sample period.
     keeps_state : bool
-        True where the state does not depend on the sample period, so that it passes to a record at another period.
+        True if the state does not depend on the sample period and can be used for a record with another period.
     """
 
     names: tuple[str, ...] = ()
@@ -68,28 +68,28 @@ class Block(ABC):
         """Next samples: y of shape (n,), and the state after them."""
 
     def run_into(self, x: Array, state: State, y: Array) -> State:
-        """`run` with y (n,) filled; to be overridden where writing it there spares a pass over the memory."""
+        """`run` with the output written to y (n,); override it if this saves a copy."""
         y[:], state = self.run(x, state)
         return state
 
     @abstractmethod
     def rest_tangent(self, x0: float, dx0: Array) -> State:
-        """Tangent state at rest, for incoming slopes dx0 of shape (m,)."""
+        """Tangent state at rest, for incoming sensitivities dx0 of shape (m,)."""
 
     @abstractmethod
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         """`run`, and the sensitivities: y (n,), dy (m + p, n), state, tangent state."""
 
     def c_form(self) -> CForm | str:
-        """The block as C code, equal to `run`; or the reason why there is none, for a message."""
+        """The block as C code, equivalent to `run`; or the reason why there is none, for a message."""
         return "has no C form"
 
     def sections(self) -> tuple[Section, ...]:
-        """Transfer functions in series that the block is; none if it is not linear, or has no finite ones."""
+        """Transfer functions whose series connection is the block; none if it is not linear or not of finite order."""
         return ()
 
     def inverse_terms(self) -> InverseTerms | None:
-        """What the block contributes to the inverse of drive, hysteresis and creep; None if it has no place there."""
+        """Terms of the block in the inverse of drive, hysteresis and creep; None if it is not a part of these."""
         return None
 
     def inverse_start(self, x: float, state: State) -> InverseStart:
@@ -138,7 +138,7 @@ class MemorylessBlock(Block):
 
 
 class SumBlock(Block):
-    """Blocks side by side on the same input; their outputs add up."""
+    """Parallel blocks with the same input; the output is the sum of their outputs."""
 
     keeps_state = True
 
@@ -193,7 +193,7 @@ class SumBlock(Block):
 
 
 class SeriesBlock(Block):
-    """Blocks one after the other."""
+    """Blocks in series."""
 
     def __init__(self, members: tuple[Block, ...]) -> None:
         self.members = members

@@ -18,10 +18,10 @@ Along the path length ℓ = |Δv| with s = sgn Δv and g = sgn h the loop with a
 
     dh/dℓ = s·A_eff − r·h,    r = |h/h_ref|^(n−1)·(β + γ s g) − φ1 s − φ2 g
 
-which for n = 1 has the closed solution h(ℓ) = h0 + (s·A_eff − r·h0)·(1 − e^(−rℓ))/r; where h crosses zero, g and with
-it r flip. For n ≠ 1 the power is frozen at the middle of sub-steps of at most `SUB_STEP`. Loop parameters are an array
-in the order of `LOOP`; a term at its off value leaves every bit of the plain loop as it is. The output is
-w = p1 v³ + p2 v + h.
+which for n = 1 has the closed solution h(ℓ) = h0 + (s·A_eff − r·h0)·(1 − e^(−rℓ))/r. When h crosses zero, g changes its
+sign, and r changes. For n ≠ 1 the power is evaluated at the middle of sub-steps of at most `SUB_STEP`. Loop parameters
+are an array in the order of `LOOP`. With all terms at their off values the result is bit-identical to the plain loop.
+The output is w = p1 v³ + p2 v + h.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ LOOP = ("A", "beta", "gamma", "phi1", "phi2", "n", "k", "a")
 LOOP_OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5])
 """Loop parameters with every term at its off value."""
 A, BETA, GAMMA, PHI1, PHI2, EXPONENT, RATE, RATE_EXPONENT = range(8)
-"""Places in the array of loop parameters."""
+"""Indices in the array of loop parameters."""
 H_REFERENCE = 0.2
-"""State h_ref at which the exponent n leaves β and γ their meaning [1]."""
+"""State h_ref at which β and γ have the same meaning for every exponent n [1]."""
 SUB_STEP = 0.01
 """Longest step of v for n ≠ 1 [1]."""
 JUMP = 0.05
-"""Change of v in one sample beyond which a slow record holds a jump; the jump takes one sample period of the model."""
+"""Change of v in one sample of a slow record from which it is a jump, which takes one sample period of the model."""
 SLOWEST = 1e-4
-"""Rates below this (normalised units per second) count as this, so that the rate law stays finite."""
+"""Lowest rate (normalised units per second); smaller rates are set to it, so that the rate law stays finite."""
 
 
 @kernel
@@ -59,7 +59,7 @@ def decay(r, length):
 
 @kernel
 def crossing(h, drive, r):
-    """Path length at which h, driven through zero, gets there."""
+    """Path length after which h reaches zero."""
     return -h / drive if abs(r) < 1e-12 else log1p(-h * r / drive) / r
 
 
@@ -72,7 +72,7 @@ def rate_factor(speed, a):
 
 @kernel
 def advance(h, drive, length, r_same, r_flipped):
-    """h after `length` from h with loss rate r_same, and r_flipped once h has crossed zero."""
+    """h after the path `length`, with loss rate r_same, and r_flipped after h has crossed zero."""
     end = h + (drive - r_same * h) * decay(r_same, length)
     if end * h < 0.0:
         end = drive * decay(r_flipped, max(0.0, length - crossing(h, drive, r_same)))
@@ -81,9 +81,9 @@ def advance(h, drive, length, r_same, r_flipped):
 
 @inlined
 def plain_step(h, dv, a, beta, gamma):
-    """h after the n = 1 loop without terms has gone by dv ≠ 0.
+    """h of the n = 1 loop without terms after a step dv ≠ 0.
 
-    Both losses are ready before h is known: each step waits for the last h only for a choice and two products.
+    Both loss rates are computed before h is known, so only few operations depend on the last h.
     """
     s, length = copysign(1.0, dv), abs(dv)
     drive = s * a
@@ -100,7 +100,7 @@ def plain_step(h, dv, a, beta, gamma):
 
 @inlined
 def general_step(h, dv, p, sample_period, jump_period):
-    """h after the loop with all its terms has gone by dv ≠ 0. A jump takes `jump_period`, all else `sample_period`."""
+    """h of the loop with all terms after a step dv ≠ 0. A jump takes `jump_period`, other steps `sample_period`."""
     n, k = p[EXPONENT], p[RATE]
     s = copysign(1.0, dv)
     drive = s * p[A]
@@ -141,7 +141,7 @@ def run_plain(v, p, p1, p2, state, w):
 
 @kernel
 def run_general(v, p, p1, p2, sample_period, jump_period, state, w):
-    """The loop with all its terms; arguments as `run_plain`. A jump takes `jump_period`, all else `sample_period`."""
+    """The loop with all terms; arguments as `run_plain`. A jump takes `jump_period`, other steps `sample_period`."""
     h, last = state[0], state[1]
     for i in range(v.size):
         x = v[i]

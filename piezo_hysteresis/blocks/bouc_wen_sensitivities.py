@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sensitivities of the Bouc-Wen loop: the kernels of `loop`, differentiated."""
+"""Sensitivities of the Bouc-Wen loop: derivatives of the kernels in `bouc_wen_kernel`."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from .bouc_wen_kernel import (
 from .kernel import inlined, kernel
 
 START = len(LOOP)
-"""Index of the initial state among the own rows: it has no forcing."""
+"""Index of the initial state in the own rows; it has no forcing term."""
 
 
 @kernel
@@ -87,7 +87,7 @@ def slope_at(h, p, s):
 
 @kernel
 def linearise_plain(v, p, p1, p2, state, tangent, w, dw):
-    """`linearise_general` for n = 1 without terms and a drive that nothing is fitted of: rows A, β, γ, p1, p2."""
+    """`linearise_general` for n = 1 without terms and without incoming rows: rows A, β, γ, p1, p2."""
     a, beta, gamma = p[A], p[BETA], p[GAMMA]
     h, last = state[0], state[1]
     by_a, by_beta, by_gamma = tangent[0], tangent[1], tangent[2]
@@ -116,9 +116,9 @@ def linearise_plain(v, p, p1, p2, state, tangent, w, dw):
 def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, state, tangent, last_in, w, dw):
     """`run_general` with sensitivities.
 
-    dv_in (m, n) are incoming rows; own (q,) the indices into `LOOP` of the own rows, or `START`; tangent (m + q,) holds
-    ∂h, last_in (m,) the incoming slopes of v_last; dw (m + q + 2, n) is filled, p1 and p2 last. While v is held, a row
-    that moves counts as a motion in its own direction: the slope for a growing parameter.
+    dv_in (m, n) are incoming rows; own (q,) are the indices of the own rows in `LOOP`, or `START`; tangent (m + q,) is
+    ∂h, last_in (m,) are the incoming sensitivities of v_last; dw (m + q + 2, n) is filled, with p1 and p2 last. While v
+    is constant, a changing row counts as motion in its direction: the derivative for a growing parameter.
     """
     m, q = dv_in.shape[0], own.size
     n, k = p[EXPONENT], p[RATE]

@@ -25,9 +25,9 @@ from .block import Array, Block, State
 
 
 class ChannelBlock(Block):
-    """y = x + f(c; θ) of another measured channel c, which the chain hands over as the state.
+    """y = x + f(c; θ) with another measured channel c, which the chain passes as the state.
 
-    A record without the channel gets nothing added.
+    Without the channel nothing is added.
     """
 
     keeps_state = True

@@ -32,11 +32,11 @@ def coupled_axes(u, taps, elongation, radii, decay, reference, power, history, p
     taps : (s, p, l, f) array
         Impulse responses of every pass, the oldest sample first, f = m (3 + r).
     elongation : (m, p) array
-        From displacements to the elongations of the actuators in volts of drive [V/m].
+        Matrix from displacements to elongations of the actuators, in volts of drive [V/m].
     radii : (r,) array
         Half widths of the play operators [V].
     decay, reference : float
-        Of the running mean square per sample [1], and the level at which the amplitude is 1 [V].
+        Decay of the running mean square per sample [1], and the level at which the amplitude is 1 [V].
     power : (1,) array
         Running mean square of the drives [V²].
     history : (s, l - 1 + n, f) array

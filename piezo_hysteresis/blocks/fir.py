@@ -40,13 +40,13 @@ class FirBlock(AddedBlock):
     Parameters
     ----------
     names : tuple of str
-        Parameters that the taps depend on.
+        Parameters on which the taps depend.
     first : int
-        Whole samples before the first tap.
+        Number of whole samples before the first tap.
     taps : (k,) ndarray
         Weights.
     slopes : (p, k) ndarray
-        Their derivatives by the parameters.
+        Derivatives of the weights by the parameters.
     """
 
     def __init__(self, names: tuple[str, ...], first: int, taps: Array, slopes: Array) -> None:

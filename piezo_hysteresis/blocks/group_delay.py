@@ -28,7 +28,7 @@ class GroupDelayBlock(LinearBlock):
     Parameters
     ----------
     names : tuple of str
-        Parameters that gain and lag depend on.
+        Parameters on which gain and lag depend.
     gain : float
         dc gain K.
     lag : float

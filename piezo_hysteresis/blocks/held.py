@@ -24,7 +24,7 @@ from .block import Array, Block, State
 
 
 class HeldBlock(Block):
-    """State [y]. At rest the output equals the input, whatever the value of the one parameter."""
+    """State [y]. At rest the output equals the input, for any value of the parameter."""
 
     keeps_state = True
 

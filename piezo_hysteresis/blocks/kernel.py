@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`kernel`: the decorator of every per-sample loop. Compiled and cached with numba, plain Python without it.
+"""`kernel`: decorator of all per-sample loops: compiled and cached with numba, plain Python without it.
 
-Numba's own variable NUMBA_DISABLE_JIT=1 asks for plain Python too; numba, 60 MB, is not loaded then.
+With NUMBA_DISABLE_JIT=1, a variable of numba, they are plain Python too, and numba (60 MB) is not loaded.
 
-A kernel is a top-level function of float64 arrays and scalars: numba never caches closures, and a new argument type
-(read-only, strided) would compile again in a running node, so callers hand over fresh contiguous arrays.
+A kernel is a top-level function of float64 arrays and scalars, because numba does not cache closures. A new argument
+type (read-only, strided) would start a compilation in a running node, so callers pass new contiguous arrays.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def fma(x: float, y: float, z: float) -> float:
-    """x y + z; in a kernel rounded once, in one instruction, where a recursion would wait for two."""
+    """x y + z; in a kernel a fused multiply-add with one rounding, which shortens the latency of recursions."""
     return x * y + z
 
 
 _IS_PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
-"""Whether plain Python is asked for."""
+"""Whether plain Python was requested."""
 
 try:
     if _IS_PLAIN:
@@ -46,12 +46,12 @@ try:
 except ImportError:
     if not _IS_PLAIN:
         warnings.warn(
-            "numba is not installed: same results but for rounding, and simulations run about 100 times slower",
+            "numba is not installed: results differ only by rounding, but simulations take about 100 times longer",
             stacklevel=2,
         )
 
     def kernel(function: F) -> F:
-        """Leave the loop as plain Python."""
+        """Return the loop unchanged, as plain Python."""
         return function
 
     inlined = kernel
@@ -62,7 +62,7 @@ else:
         return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
 
     def inlined(function: F) -> F:
-        """A kernel of one sample that is compiled into the loops that call it: this avoids the cost of a call."""
+        """A kernel of one sample that is inlined into the loops that call it, which avoids the cost of a call."""
         return numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)(function)
 
     @intrinsic

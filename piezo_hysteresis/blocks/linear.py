@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`LinearBlock`: linear dynamics around the rest point, alone or beside a direct path."""
+"""`LinearBlock`: linear dynamics around the rest point, alone or in parallel with a direct path."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .block import Array, Block, State
 class LinearBlock(Block):
     """Linear dynamics acting on the deviation from the rest point: y = K·x0 + filter(x − x0).
 
-    At rest the filter state is exactly zero, so a stage at rest stays there without rounding drift.
+    At rest the filter state is exactly zero, so a stage at rest does not drift by rounding.
     """
 
     gain: float = 1.0
@@ -82,16 +82,16 @@ class LinearBlock(Block):
 
 
 class AddedBlock(LinearBlock):
-    """A direct path with linear dynamics beside it: y = x + K·x0 + filter(x − x0).
+    """A direct path with linear dynamics in parallel: y = x + K·x0 + filter(x − x0).
 
-    An addition of zero leaves every bit of x as it is, so that effects in this form are exactly absent when off.
+    The addition of zero does not change x, so effects in this form are exactly absent if they are off.
     """
 
     gain = 0.0
 
     @property
     def is_idle(self) -> bool:
-        """True where `filter` gives zero for every input: sensitivities from upstream pass as they are."""
+        """True if `filter` gives zero for every input, so that incoming sensitivities are not changed."""
         return False
 
     def static(self, x0: float) -> float:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`LowPassBlock`: equal poles in a row, exact for an input that is linear between samples."""
+"""`LowPassBlock`: equal poles in series, exact for an input that is linear between samples."""
 
 from __future__ import annotations
 
@@ -72,18 +72,18 @@ return x + (y - (x - s->x_rest));
 
 
 class LowPassBlock(AddedBlock):
-    """`count` poles with time constant τ; its lag near dc is count·τ at every sample period, and τ = 0 is no pole.
+    """`count` poles with time constant τ; the lag near dc is count·τ at every sample period; τ = 0 gives y = x.
 
     Parameters
     ----------
     name : str
-        Parameter that is τ.
+        Name of the parameter τ.
     tau : float
         Time constant [s], zero or more.
     count : int
         Number of poles.
     sample_period : float
-        [s]
+        Sample period [s].
     """
 
     keeps_state = True

@@ -31,7 +31,7 @@ LANES = 4
 
 
 class Hold(NamedTuple):
-    """Step x_i = x_(i−1) + fade·(u_(i−1) − x_(i−1)) + lead·(u_i − u_(i−1)), each shape (s,), and its slopes by τ."""
+    """Step x_i = x_(i−1) + fade·(u_(i−1) − x_(i−1)) + lead·(u_i − u_(i−1)), each (s,), and its derivatives by τ."""
 
     fade: Array
     lead: Array
@@ -59,7 +59,7 @@ def hold(tau: Array, sample_period: float) -> Hold:
 def relax(u, fade, lead, weights, z, y):
     """Rows of u (r, n) to y (r, n) = Σ weights_j x_j; z (r, 1 + s) = last input and x_j, updated; s a multiple of 4.
 
-    Four relaxations go through the samples together: one alone would wait for its own last result.
+    Four relaxations are computed together, because each sample of a single one depends on the sample before.
     """
     n = u.shape[1]
     for r in range(u.shape[0]):
@@ -105,11 +105,11 @@ class RelaxationBlock(AddedBlock):
     Parameters
     ----------
     names : tuple of str
-        Parameters that `direct` and the weights depend on.
+        Parameters on which `direct` and the weights depend.
     tau : (s,) ndarray
         Time constants [s].
     sample_period : float
-        [s]
+        Sample period [s].
     mix : (1 + s,) ndarray
         `direct`, then the weights.
     mix_slopes : (p, 1 + s) ndarray

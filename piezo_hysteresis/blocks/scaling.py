@@ -26,7 +26,7 @@ from .kernel import kernel
 
 @kernel
 def take_in(x: Array, factor: float, y: Array) -> bool:
-    """y (n,) = factor · x (n,); whether every x_i is finite."""
+    """y (n,) = factor · x (n,); True if every x_i is finite."""
     outside = 0
     for i in range(x.size):
         y[i] = factor * x[i]
@@ -36,7 +36,7 @@ def take_in(x: Array, factor: float, y: Array) -> bool:
 
 @kernel
 def hand_out(y: Array, factor: float, limit: float) -> bool:
-    """y (n,) times `factor` in place; whether every |y_i| is below `limit` then, which not a number is not."""
+    """y (n,) times `factor` in place; True if every |y_i| is below `limit` afterwards (False with NaN)."""
     outside = 0
     for i in range(y.size):
         y[i] *= factor

@@ -30,17 +30,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ExpectedError:
-    """Error to expect on a path, rms [m]; independent parts add up as squares.
+    """Expected RMS error on a path [m]; independent parts are added as squares.
 
     Parameters
     ----------
     planned : float
-        Error that the plan itself leaves, because of the band, the limits, and effects left out or inverted
-        approximately [m].
+        Difference between the wanted displacement and the simulation of the plan, because of the band, the limits, and
+        effects that were left out or inverted approximately [m].
     free_run : float or None
-        Free-run error of the model on data that were not fitted [m]; None where the model file does not state it.
+        Free-run error of the model on data that were not fitted [m]; None if the model file does not contain it.
     parameters : float or None
-        Error from the uncertainty of the parameters [m]; None where the model file states no covariance.
+        Error from the uncertainty of the parameters [m]; None if the model file does not contain a covariance.
     """
 
     planned: float
@@ -64,7 +64,7 @@ class ExpectedError:
 
 
 def free_run_error(model: Model) -> float | None:
-    """Free-run error that the model file states [m]; None where it states no number."""
+    """Free-run error in the model file [m]; None if there is none."""
     try:
         value = float(model.provenance["free_run_error"])
     except (KeyError, ValueError):
@@ -73,9 +73,9 @@ def free_run_error(model: Model) -> float | None:
 
 
 def parameter_error(model: Model, voltage: Array) -> float | None:
-    """Rms over the drive (n,) [V] of the standard error that the model's covariance gives the displacement [m].
+    """RMS over the drive (n,) [V] of the standard error of the displacement, from the covariance of the model [m].
 
-    None where the model states no covariance of its numbers.
+    None if the model has no covariance.
     """
     if model.covariance is None:
         return None

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Kernels that find the v at which the hysteresis gives a wanted w, from the state before the sample.
+"""Kernels that compute the v at which the hysteresis gives a wanted w, from the state before the sample.
 
 w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j (p_j + b_j p_j²) with the plays p_j(v); c and b are the rows of
-one array. The loop is stepped by the kernels that the model runs, so that the root is that of the model to rounding.
-Where the slope of the loop is known in closed form, the search is Newton's method. Otherwise, and where Newton's method
-leaves the range or does not settle, it is Newton's first step and then the secant, kept inside a bracket.
+one array. The loop is computed by the kernels of the model, so the root agrees with the model to rounding. If the
+derivative of the loop is known in closed form, the search is Newton's method. Otherwise, or if Newton's method leaves
+the range or does not converge, it is one Newton step followed by the secant method inside a bracket.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from ..effects.hysteresis.published_bouc_wen import step as published_step
 from ..inverse_terms import GENERAL, NO_LOOP, PLAIN, PUBLISHED
 
 P1, P2, SQUARE, FOURTH = range(4)
-"""Numbers of the static polynomial, in the order of `POLYNOMIAL`: of v³, v, v² and v⁴."""
+"""Coefficients of the static polynomial in the order of `POLYNOMIAL`: of v³, v, v² and v⁴."""
 ROUNDING = 1e-15
-"""Share of w, and of v, below which a difference is rounding."""
+"""Relative difference of w, and of v, below which it is rounding."""
 NEWTON = 6
-"""Steps of Newton's method before the search keeps a bracket."""
+"""Number of steps of Newton's method before the search uses a bracket."""
 MOST = 80
-"""Steps of the search at most; the bracket is halved at every sixth."""
+"""Largest number of steps of the search; every sixth step halves the bracket."""
 
 
 @inlined
 def loop_end(kind, p, periods, h, last, v):
-    """h after the loop of `kind` has gone from `last` to v."""
+    """h of the loop of `kind` after a step from `last` to v."""
     if kind == NO_LOOP or v == last:
         return h
     if kind == PLAIN:
@@ -79,7 +79,7 @@ def output(kind, p, periods, poly, c, radii, h, last, plays, v):
 
 @inlined
 def slope_at(kind, p, poly, c, radii, h, v, plays, s):
-    """∂w/∂v where v moves on in the direction s and the loop is at h; plays as before the sample."""
+    """∂w/∂v for motion in the direction s from the state h; plays as before the sample."""
     square = v * v
     slope = fma(3.0 * poly[P1], square, poly[P2]) + 2.0 * v * fma(2.0 * poly[FOURTH], square, poly[SQUARE])
     if kind != NO_LOOP:
@@ -92,7 +92,7 @@ def slope_at(kind, p, poly, c, radii, h, v, plays, s):
 
 @inlined
 def solve(kind, p, periods, poly, c, radii, h, last, plays, wanted, now, orientation, low, high):
-    """v in [low, high] with w(v) = wanted; if there is none, the nearer end. `now` is w at `last`."""
+    """v in [low, high] with w(v) = wanted; without a solution, the nearer end. `now` is w at `last`."""
     gap = wanted - now
     enough = ROUNDING * (abs(wanted) + abs(now))
     if abs(gap) <= enough:
@@ -113,8 +113,8 @@ def solve(kind, p, periods, poly, c, radii, h, last, plays, wanted, now, orienta
         if abs(g) <= enough:
             return x
         x += g / slope_at(kind, p, poly, c, radii, end, x, plays, s)
-    near = last  # wanted − w has the sign of gap here,
-    far, closed = edge, False  # and the other one here, once found
+    near = last  # wanted − w has the sign of gap here
+    far, closed = edge, False  # wanted − w has the other sign here, if closed
     x0, g0 = last, gap
     x = last + gap / slope
     best, best_gap = last, abs(gap)
@@ -149,7 +149,7 @@ LOOP_END_IN_C = {
     GENERAL: "enum { NEWTON = 0 };\n#define LOOP_END(p, h, dv) general_step(h, dv, p, p[8], p[9])\n",
     PUBLISHED: "enum { NEWTON = 0 };\n#define LOOP_END(p, h, dv) published_step(h, dv, p[0], p[1], p[2], p[3])\n",
 }
-"""C code of `loop_end` for every kind of loop; p holds its numbers and then both periods."""
+"""C code of `loop_end` for every kind of loop; p contains its parameters and then both periods."""
 SOLVE_IN_C = (
     f"""\
 static const double ROUNDING = {ROUNDING!r};
@@ -258,4 +258,4 @@ static double solve(
 }
 """
 )
-"""C functions of `solve` and what it calls."""
+"""C functions of `solve` and the functions that it calls."""

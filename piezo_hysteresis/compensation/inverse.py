@@ -78,18 +78,18 @@ class Inverse:
     preview : int
         Number of samples by which the wanted displacement must be known ahead.
     is_exact : bool
-        False where an effect was left out or has an approximate inverse.
+        False if an effect was left out or has an approximate inverse.
     left_out : tuple of str
         Effects that have no inverse and were left out.
     not_on_path : tuple of str
         Effects that the drive voltage does not influence.
     noise_gain : float
-        Largest factor by which rounding errors of the wanted displacement grow on the way to the drive.
+        Largest factor by which rounding errors of the wanted displacement grow in the drive.
 
     Raises
     ------
     ModelError
-        If the chain holds an effect without an inverse and `approximate` is not set.
+        If the chain contains an effect without an inverse and `approximate` is not set.
 
     Examples
     --------
@@ -150,7 +150,7 @@ class Inverse:
         return self.resume(self.chain.rest(voltage, time))
 
     def resume(self, state: ChainState) -> InverseState:
-        """State of the inverse for a stage whose model is in `state`; the dynamics are taken as settled."""
+        """State of the inverse for a stage whose model is in `state`, with settled dynamics."""
         end = self._nonlinear_end
         started = tuple(
             stage.start(state.inputs[-1] if k is None else state.inputs[k], None if k is None else state.blocks[k])
@@ -178,7 +178,7 @@ class Inverse:
         Raises
         ------
         ModelError
-            On empty or non-finite samples.
+            If samples are empty or not finite.
         """
         y = np.ascontiguousarray(samples(wanted, "displacement")).copy()
         index, states = state.count + np.arange(y.size, dtype=np.float64), []
@@ -198,9 +198,10 @@ class Inverse:
         return self.run(np.append(path, np.full(self.preview, path[-1])), state)
 
     def c_forms(self) -> dict[str, tuple[int | None, CForm | str]]:
-        """C code of every stage in order, by name, with the number of the block of the chain that it inverts.
+        """C code of every stage in order, by name, with the number of the block that it inverts.
 
-        None is the band, which settles at the displacement; the last, of number 0, is all before the dynamics.
+        The number is None for the band, which rests at the displacement. The last stage, with number 0, inverts all
+        blocks before the dynamics.
         """
         labels = self.chain.labels
         found: dict[str, tuple[int | None, CForm | str]] = {

@@ -62,7 +62,7 @@ class InvertedBlock(ABC):
         """Inputs x (n,) at `time` (n,) [s] that give the wanted outputs y (n,), and the state after them."""
 
     def c_form(self, ahead: int) -> CForm | str:
-        """`run` as C code from `ahead` samples after the start on; ``rest`` takes the input x of the block at rest."""
+        """`run` as C code, beginning `ahead` samples after the start; ``rest`` takes the input x at rest."""
         return "has no C form of its inverse"
 
 
@@ -115,7 +115,7 @@ class InvertedLinear(InvertedBlock):
 
 @kernel
 def force_for(x, x0, p, z, w):
-    """w (n,) − w0 that moves the mode along x (n,); p = [m1, m2, k2, k3], z = the two deflections before, updated."""
+    """w (n,) − w0 for a motion x (n,) of the mode; p = [m1, m2, k2, k3]; z, the last two deflections, is updated."""
     gain, held = 1.0 + p[0] + p[1], force(x0, p[2], p[3])
     for i in range(x.size):
         moved = x[i] - x0
@@ -151,7 +151,7 @@ class InvertedSoftening(InvertedBlock):
 
 @kernel
 def cubic_root(y, s2, s3, x):
-    """x (n,) with x + s2 x² + s3 x³ = y (n,), on the branch through zero; where there is none, its extremum."""
+    """x (n,) with x + s2 x² + s3 x³ = y (n,), on the branch through zero; its extremum if there is no solution."""
     for i in range(y.size):
         root = y[i]
         for _ in range(60):

@@ -68,8 +68,8 @@ def default_filter(model: Model) -> LearningFilter:
 class IterativeLearning:
     """Corrects the reference of a path by the measured error, round by round.
 
-    The corrected reference passes the inverse of the model, as the path itself does. So the inverse takes care of
-    hysteresis, creep and dynamics, and a round only removes errors of the model.
+    The inverse of the model converts the corrected reference to the drive, as it does with the path. So the inverse
+    compensates hysteresis, creep and dynamics, and a round only removes errors of the model.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class IterativeLearning:
     first : Plan
         First plan of the path.
     limits : Limits
-        Of the drive.
+        Limits of the drive.
     filter : LearningFilter, optional
         Default: `default_filter`.
     noise : float
@@ -127,7 +127,7 @@ class IterativeLearning:
         Raises
         ------
         ModelError
-            If the number of samples is another one, or learning has ended.
+            If the number of samples is wrong, or learning has ended.
         """
         if self.next is None:
             raise ModelError(f"learning: has ended ({self.reason}), expected no more measurements")
@@ -156,7 +156,7 @@ class IterativeLearning:
             way_back=(played.voltage.size - played.begin - played.wanted.size) * played.sample_period,
         )  # fmt: skip
         if not following.reachability.is_whole and played.reachability.is_whole:
-            self._end("the corrected path is out of reach")
+            self._end("the limits of the drive do not allow the corrected path")
             return None
         self._expected = float(np.sqrt(max(self.rounds[-1].rms ** 2 - now**2, 0.0) + left**2))
         self.next = following
@@ -177,7 +177,7 @@ def learn(learning: IterativeLearning, play: Callable[[Array], Array], rounds: i
     Parameters
     ----------
     learning : IterativeLearning
-        With the first plan.
+        Learning with its first plan.
     play : callable
         Plays a drive (m,) [V] on the stage, settled at the voltage of the plan's start, and returns the displacement
         (m,) [m].

@@ -73,19 +73,19 @@ class ResponseCheck:
 class LearningFilter:
     """Gain of the correction as a function of frequency.
 
-    A round turns the error E into (1 − L R) E, with R the response of stage and inverse together. The error shrinks
-    where |1 − L R| < 1. The gain L falls to zero where this does not hold with two standard deviations of margin.
+    A round changes the error E to (1 − L R) E, with the response R of stage and inverse in series. The error decreases
+    if |1 − L R| < 1. The gain L falls to zero where this does not hold with a margin of two standard deviations.
 
     Parameters
     ----------
     sample_period : float
-        [s]
+        Sample period [s].
     passed, stopped : float
         The gain is `gain` up to `passed` and tapers to zero at `stopped`, by a raised cosine [Hz].
     gain : float
         Largest gain, above 0 and at most 1.
     check : ResponseCheck, optional
-        Uncertainty of the identified response. Default: the response is taken as exact.
+        Uncertainty of the identified response. Default: the response is exact.
     margin : float
         |1 − L R| with two standard deviations must stay below 1 − margin · L.
 
@@ -140,19 +140,19 @@ class LearningFilter:
         error : (n,) ndarray
             Wanted minus measured displacement along the path [m].
         noise : float
-            RMS sensor noise, taken as white [m].
+            RMS of white sensor noise [m].
 
         Returns
         -------
         correction : (n,) ndarray
-            To be added to the reference [m].
+            Correction to add to the reference [m].
         left : float
             RMS error predicted after the round, without measurement noise [m].
         now : float
             RMS of the present error in the band of the filter, without noise [m].
         """
         n = error.size
-        whole = np.concatenate((error, error[::-1]))  # mirrored: no step where it repeats
+        whole = np.concatenate((error, error[::-1]))  # mirrored, so that the periodic signal has no step
         size = whole.size
         spectrum = np.fft.rfft(whole)
         gain = self.at(np.asarray(np.fft.rfftfreq(size, self.sample_period), dtype=np.float64))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`reachable`: whether the limits allow a path, where they do not and by how much, and the nearest path they allow."""
+"""`reachable`: the parts of a path that the limits do not allow, and the nearest path that they allow."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def reachable(
     approximate: bool = False,
     search: bool = True,
 ) -> Reachability:
-    """Which part of a path the limits of the drive allow, by the model alone.
+    """Parts of a path that the limits of the drive allow, from the model alone.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def _nearest(
 def _smallest(works: Callable[[float], bool], most: float) -> float | None:
     """Smallest change up to `most` that works, found by bisection; None if none of `FIRST_TRIALS` works.
 
-    A change that is larger than necessary may fail, too.
+    A change that is larger than necessary may not work either.
     """
     tried = [0.0, *(most * share for share in FIRST_TRIALS)]
     found = next((k for k in range(1, len(tried)) if works(tried[k])), None)

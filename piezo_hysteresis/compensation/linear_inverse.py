@@ -40,7 +40,7 @@ class LinearInverse:
     section : tuple of ndarray
         Numerator and denominator of H in powers of z⁻¹.
     gain : float
-        H(1) as the block uses it at rest.
+        Value of H(1) that the block uses at rest.
     name : str
         Name of the effect, for messages.
 
@@ -74,7 +74,7 @@ class LinearInverse:
         self.noise_gain = float(np.abs(self.impulse_response()).sum())
 
     def impulse_response(self, size: int = 20000) -> Array:
-        """Of the inverse, `preview` samples late, shape (size,)."""
+        """Impulse response of the inverse, delayed by `preview` samples, shape (size,)."""
         impulse, out = np.eye(1, size)[0], np.empty(size)
         arx_row(impulse, 0.0, 0.0, self._padded, 0, self._recursion, self._zeros(), out)
         return out
@@ -90,7 +90,7 @@ class LinearInverse:
         return np.zeros(self._padded.size - 1 + self._recursion.size)
 
     def rest(self, x0: float) -> tuple[float, Array]:
-        """State of a stage that has been at the input x0 for long."""
+        """State after a long time at the input x0."""
         return x0, self._zeros()
 
     def c_form(self) -> CForm:

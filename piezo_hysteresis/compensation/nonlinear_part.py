@@ -14,7 +14,7 @@
 
 """`NonlinearPart`: creep, hysteresis, amplifier and limits of a chain, which are inverted together.
 
-What a block contributes it states itself: `Block.inverse_terms`.
+Every block defines its terms in `Block.inverse_terms`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ RecursionState = tuple[Array, Array, Array, Array]
 FARTHEST = 1e3
 """Largest normalised drive in which a root is searched."""
 WITHOUT_LOOP = LoopTerms(NO_LOOP, np.zeros(8))
-"""Loop of a chain that has none."""
+"""Loop of a chain without a loop."""
 
 
 class NonlinearPart:
@@ -51,11 +51,11 @@ class NonlinearPart:
     Parameters
     ----------
     terms : sequence of InverseTerms
-        Of the blocks from the drive to the creep.
+        Terms of the blocks from the drive to the creep.
     limits : Limits
-        Of the drive.
+        Limits of the drive.
     sample_period : float
-        [s]
+        Sample period [s].
 
     Raises
     ------

@@ -51,7 +51,7 @@ class Plan:
     begin : int
         Index of the drive sample at which the path begins.
     sample_period : float
-        [s]
+        Sample period [s].
     reachability : Reachability
         Reachability of the approach and the path; times count from the start of the path.
     expected : ExpectedError
@@ -101,7 +101,7 @@ def _way_back(last: float, rest: float, duration: float, limits: Limits, period:
     """Drive from `last` to `rest` [V] inside the slew limit, shape (k,), without the first; empty for no duration."""
     if duration == 0.0:
         return np.empty(0)
-    steepest = 0.5 * np.pi * abs(rest - last)  # of a half cosine, times its duration
+    steepest = 0.5 * np.pi * abs(rest - last)  # largest slope of a half cosine, times its duration
     count = max(round(duration / period), math.ceil(1.001 * steepest / limits.max_slew_rate / period), 1)
     return np.append(smooth_way(last, rest, count)[1:], rest)
 
@@ -117,7 +117,7 @@ def plan(
     band: Band | None = None,
     approximate: bool = False,
 ) -> Plan:
-    """Drive for a path, by the model alone.
+    """Drive for a path, from the model alone.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ class UnreachablePart:
 
 @dataclass(frozen=True, slots=True)
 class NearestPath:
-    """Changes of a path, each of which alone makes it reachable; None where that change does not.
+    """Changes of a path that make it reachable, each alone; None if that change does not.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class NearestPath:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Reachability:
-    """Answer of `reachable`.
+    """Result of `reachable`.
 
     Parameters
     ----------

@@ -36,18 +36,18 @@ DRIVE = (
 )  # fmt: skip
 """Names of the same numbers, in `InverseTerms` and in C code."""
 VOLTAGE, SLEWED, POLE, HELD, PUSHED, LAST, H, W = range(8)
-"""States: drive, behind the slew limit, behind the pole, behind the play, before the play [V]; v, h and w."""
+"""States: drive; after the slew limit, the pole and the play; before the play [V]; v, h and w."""
 STATE = ("voltage", "slewed", "pole", "held", "pushed", "v", "h", "w")
 """Names of the same states, in `InverseStart` and in C code."""
 SAME = 1e-13
 """A change below this share of the voltage does not count as a reversal of a play."""
 TOUCHING = 1e-6
-"""Distance from an edge of the play, in shares of its half width, that counts as touching."""
+"""Largest distance from an edge of the play that counts as touching, as a share of its half width."""
 
 
 @kernel
 def saturated(u, lower, upper, corner):
-    """Voltage behind the amplifier's saturation."""
+    """Voltage after the saturation of the amplifier."""
     return u - ramp(u - upper, corner) + ramp(lower - u, corner)
 
 
@@ -61,7 +61,7 @@ def ramp(excess, corner):
 
 @inlined
 def before_saturation(v, lower, upper, corner):
-    """The voltage that `saturated` turns into v; where v is beyond the end, where the end is reached."""
+    """Inverse of `saturated`; if v is beyond the limit, the voltage at which the limit is reached."""
     if v > upper - corner:
         return upper + corner - 2.0 * sqrt(corner * max(upper - v, 0.0))
     if v < lower + corner:
@@ -71,12 +71,12 @@ def before_saturation(v, lower, upper, corner):
 
 @inlined
 def voltage_for(v, d, state):
-    """Drive voltage inside the limits for a voltage v behind the play."""
+    """Drive voltage inside the limits for a voltage v after the play."""
     pushed = v
     if d[PLAY] > 0.0:
         move, same = v - state[HELD], SAME * (abs(v) + d[PLAY])
         side, touching = state[PUSHED] - state[HELD], d[PLAY] * (1.0 - TOUCHING)
-        up = same if side >= touching else max(same, d[RESOLUTION])  # to the edge that is not touched: a jump
+        up = same if side >= touching else max(same, d[RESOLUTION])  # a reversal needs a jump to the other edge
         down = same if side <= -touching else max(same, d[RESOLUTION])
         pushed = v + d[PLAY] if move > up else v - d[PLAY] if move < -down else state[PUSHED]
     slewed = pushed
@@ -90,7 +90,7 @@ def voltage_for(v, d, state):
 
 @inlined
 def drive(u, d, state):
-    """Voltage behind the play for the drive u; the state follows."""
+    """Voltage after the play for the drive u; the state is updated."""
     state[VOLTAGE] = u
     slewed = saturated(u, d[LOWER], d[UPPER], d[CORNER])
     slewed = min(max(slewed, state[SLEWED] - d[REACH]), state[SLEWED] + d[REACH])
@@ -103,7 +103,7 @@ def drive(u, d, state):
 
 @inlined
 def settle_before(target, starts, direct, fade, lead, weights, lasts, banks, gains, ahead):
-    """w that gives `target` behind the relaxation banks; ahead (s,) becomes their states for an unchanged input."""
+    """w that gives `target` after the relaxation banks; ahead (s,) is set to their states for an unchanged input."""
     for b in range(direct.size - 1, -1, -1):
         rest, last = 0.0, lasts[b]
         for j in range(starts[b], starts[b + 1]):
@@ -115,7 +115,7 @@ def settle_before(target, starts, direct, fade, lead, weights, lasts, banks, gai
 
 @inlined
 def relax_to(w, starts, direct, lead, weights, lasts, banks, ahead):
-    """States of the banks for the w that comes."""
+    """States of the banks for the next w."""
     for b in range(direct.size):
         moved, lasts[b] = w - lasts[b], w
         for j in range(starts[b], starts[b + 1]):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A model where there is no Python: C99 without dependencies, and FMI 3.0 co-simulation units around it."""
+"""Export of a model without Python: C99 without dependencies, and FMI 3.0 co-simulation units with this code."""
 
 from .fmu import fmus
 from .program import c_program

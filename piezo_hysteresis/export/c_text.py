@@ -27,7 +27,7 @@ from ..c_form import CForm, Number
 INDENT = " " * 4
 """One level of C code."""
 ROW = 4
-"""Numbers in a line of an array."""
+"""Number of values in a line of an array."""
 
 
 def number(value: float) -> str:
@@ -73,7 +73,7 @@ def structures(prefix: str, name: str, form: CForm) -> Iterator[str]:
 
 
 def functions(prefix: str, name: str, form: CForm, *, always_rest: bool = True) -> Iterator[str]:
-    """The functions ``NAME_rest`` and ``NAME_step`` of a form, those of its parts before.
+    """The functions ``NAME_rest`` and ``NAME_step`` of a form, after those of its parts.
 
     Without `always_rest` a form without state has no ``rest``.
     """
@@ -92,7 +92,7 @@ def functions(prefix: str, name: str, form: CForm, *, always_rest: bool = True) 
 
 
 def library(forms: Mapping[str, CForm]) -> tuple[str, ...]:
-    """What the forms and their parts call, every text once."""
+    """Library functions of the forms and their parts, each once."""
     found: dict[str, None] = {}
     for form in forms.values():
         found |= dict.fromkeys((*library(form.parts), *form.library))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A model as FMI 3.0 co-simulation units (FMU): the C program, a description, and a library where a compiler is."""
+"""A model as FMI 3.0 co-simulation units (FMU): C program, description, and a library if there is a compiler."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Input or output of a unit: name, SI unit, meaning, and value before it is set."""
+    """Input or output of a unit: name, SI unit, meaning, and start value."""
 
     name: str
     unit: str
@@ -65,22 +65,22 @@ CHANNELS = {
 
 @dataclass(frozen=True, slots=True)
 class CoSimulation:
-    """What one unit computes.
+    """Description of one unit.
 
     Parameters
     ----------
     identifier : str
         Name of the unit and of its library.
     prefix : str
-        Of its functions in the C program: empty, or ``"inverse_"``.
+        Prefix of its functions in the C program: empty, or ``"inverse_"``.
     token : str
-        By which an importer tells this unit from others.
+        Token by which an importer distinguishes this unit from others.
     description : str
         One sentence.
     inputs, output : tuple of Quantity, Quantity
-        In the order of the arguments of the C function, and what it returns.
+        Inputs in the order of the arguments of the C function, and its output.
     limit : float
-        Outputs of this size mean that the model runs away.
+        Outputs of this size mean that the model diverges.
     """
 
     identifier: str
@@ -93,14 +93,14 @@ class CoSimulation:
 
 
 def fmus(model: Model, name: str = "piezo", inverse: Inverse | None = None) -> Mapping[str, bytes]:
-    """Co-simulation units by the names of their files: NAME.fmu, and NAME_inverse.fmu with an inverse.
+    """Co-simulation units by file name: NAME.fmu, and NAME_inverse.fmu with an inverse.
 
-    They hold their C sources, and a library for this computer where it has a C compiler (see `compiler`).
+    They contain their C sources, and a library for this computer if it has a C compiler (see `compiler`).
 
     Raises
     ------
     ModelError
-        As `c_program`; also if the compiler fails.
+        As for `c_program`; also if the compiler fails.
     """
     program, digest = c_program(model, name, inverse), model_hash(model)
     further = tuple(CHANNELS[channel] for channel in prediction(model).channels)
@@ -117,7 +117,7 @@ def fmus(model: Model, name: str = "piezo", inverse: Inverse | None = None) -> M
 
 
 def compiler() -> str | None:
-    """The C compiler of this computer: that of the environment variable CC, or cc, gcc or clang; None without one."""
+    """The C compiler of this computer: from the environment variable CC, or cc, gcc or clang; None without one."""
     return next(filter(None, (shutil.which(c) for c in (os.environ.get("CC"), "cc", "gcc", "clang") if c)), None)
 
 
@@ -142,7 +142,7 @@ def _packed(part: CoSimulation, model: Model, name: str, program: Mapping[str, s
 
 
 def _library(identifier: str, sources: Mapping[str, str]) -> dict[str, bytes]:
-    """The compiled library by its place in the unit; none where there is no compiler."""
+    """The compiled library by its path in the unit; none if there is no compiler."""
     program, system = compiler(), {"Linux": ("linux", ".so"), "Darwin": ("darwin", ".dylib")}.get(platform.system())
     if program is None or system is None:
         return {}

@@ -27,16 +27,16 @@ from .prediction import step_calls
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CInverse:
-    """What turns a wanted displacement into a drive voltage.
+    """C code from a wanted displacement to a drive voltage.
 
     Parameters
     ----------
     forms : dict of str to CForm
-        By name, in the order of the inverse; the first takes metres, the last returns volts.
+        Forms by name, in the order of the inverse; the first takes metres, the last returns volts.
     stages : dict of str to (int or None)
-        Number of the block of the chain that each inverts; None settles at the displacement.
+        Number of the block that each form inverts; None for a form that rests at the displacement.
     preview : int
-        Samples that must be known ahead.
+        Number of samples that must be known ahead.
     """
 
     forms: dict[str, CForm]
@@ -44,7 +44,7 @@ class CInverse:
     preview: int
 
     def rest_calls(self, chain: dict[str, CForm]) -> Iterator[str]:
-        """C calls that set every stage to rest, where those of the prediction pass x from block to block."""
+        """C calls that set every stage to rest, between the calls of the prediction, which pass on x."""
         waiting = {at: name for name, at in self.stages.items() if self.forms[name].has_state}
         for k, (name, form) in enumerate(chain.items()):
             if k in waiting:
@@ -64,7 +64,7 @@ def inversion(inverse: Inverse) -> CInverse:
     Raises
     ------
     ModelError
-        If one has none; the message names it.
+        If a stage has no C form; the message names it.
     """
     forms, stages = {}, {}
     for label, (at, form) in inverse.c_forms().items():

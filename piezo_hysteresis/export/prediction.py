@@ -27,14 +27,14 @@ from ..model.model import Model
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CChain:
-    """What turns a drive voltage into a displacement, at the sample period of the model.
+    """C code from a drive voltage to a displacement, at the sample period of the model.
 
     Parameters
     ----------
     forms : mapping of str to CForm
-        By name, in chain order; the first takes volts, the last returns metres.
+        Forms by name, in chain order; the first takes volts, the last returns metres.
     channels : tuple of str
-        Further measured inputs, in alphabetical order, which is that of the arguments.
+        Further measured inputs in alphabetical order, the order of the arguments.
     """
 
     forms: dict[str, CForm]
@@ -59,7 +59,7 @@ def prediction(model: Model) -> CChain:
 
 
 def rest_calls(forms: dict[str, CForm], state: str) -> Sequence[str]:
-    """C calls that set every form to rest at x, and make x its output, one after the other."""
+    """C calls that set every form in turn to rest at x, and set x to its output."""
     return [f"x = {name}_rest({f'&{state}->{name}, ' if form.has_state else ''}x);" for name, form in forms.items()]
 
 

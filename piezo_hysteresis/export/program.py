@@ -34,12 +34,12 @@ from .prediction import prediction, rest_calls, step_calls, units
 from .vectors import vectors
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,40}")
-"""Names that a program can have: they begin every function, type and file."""
+"""Valid names of a program; every function, type and file begins with the name."""
 
 
 @cache
 def templates() -> Environment:
-    """Where the frames of the files come from."""
+    """Templates of the files."""
     environment = Environment(
         loader=PackageLoader("piezo_hysteresis.export"), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, keep_trailing_newline=True,
@@ -54,16 +54,16 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
     Parameters
     ----------
     model : Model
-        To be exported, at its own sample period.
+        Model to export, at its sample period.
     name : str
-        Begins the names of all files, functions and types.
+        Beginning of the names of all files, functions and types.
     inverse : Inverse, optional
-        Of the same model, to be exported beside it.
+        Inverse of the same model, to export with it.
 
     Raises
     ------
     ModelError
-        If the name is no lower-case C identifier, or an effect has no C form.
+        If the name is not a lower-case C identifier, or an effect has no C form.
     """
     if not NAME.fullmatch(name):
         raise ModelError(f"name: got {name!r}, expected lower-case letters, digits and '_', a letter first")
@@ -105,10 +105,10 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
 
 
 def model_hash(model: Model) -> str:
-    """Hash of everything but validity and provenance, as in the model file."""
+    """Hash of the model without validity and provenance, as in the model file."""
     return str(to_parameters(model)[f"{PREFIX}hash"])
 
 
 def _comment(text: str) -> str:
-    """Text that does not end a C comment."""
+    """Text without the end of a C comment."""
     return text.replace("*/", "* /")

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Test vectors of an exported model: a drive with swings, steps and holds, and what the model says to it."""
+"""Test vectors of an exported model: a drive with swings, steps and holds, and the prediction of the model."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from ..model.model import Model
 Array = NDArray[np.float64]
 
 SIZE = 400
-"""Samples of a self-test."""
+"""Number of samples of a self-test."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -44,11 +44,11 @@ class Vectors:
     channels : mapping of str to (n,) ndarray
         Further measured inputs.
     displacement : (n,) ndarray
-        What the model says [m].
+        Prediction of the model [m].
     inverse : (n,) ndarray or None
-        What the inverse says, if this displacement is wanted [V].
+        Drive of the inverse for this displacement [V].
     noise_gain : float
-        How much rounding may grow in the inverse.
+        Largest factor by which rounding errors grow in the inverse.
     """
 
     start: float
@@ -70,14 +70,14 @@ def drive(low: float, high: float, size: int = SIZE) -> Array:
 
 
 def vectors(model: Model, inverse: Inverse | None = None) -> Vectors:
-    """What the exported model, and its inverse, have to reproduce.
+    """Values that the exported model and its inverse have to reproduce.
 
-    The voltages are inside those that were identified, where the model states them.
+    The voltages are inside the identified range, if the model contains it.
 
     Raises
     ------
     DivergenceError
-        If the model runs away under this drive.
+        If the model diverges with this drive.
     """
     low, high = (_stated(model, f"voltage_{end}", other) for end, other in (("min", 0.0), ("max", model.voltage_scale)))
     voltage = drive(low, high) if high > low else drive(0.0, model.voltage_scale)

@@ -31,7 +31,7 @@ def split(a: Array, b: Array) -> tuple[Array, Array, Array]:
     Raises
     ------
     ModelError
-        If A has no complex pole pair, or the dominant one twice.
+        If A has no complex pole pair, or if the dominant one is double.
 
     >>> mode, rest, _ = split(np.array([-1.7, 1.1, -0.16]), np.ones(1))
     >>> mode.round(9).tolist(), rest.round(9).tolist()
@@ -58,9 +58,9 @@ def split(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 
 def share_of_mode(a: Array, b: Array, mode: Array, rest: Array, by_a: Array) -> tuple[Array, Array, Array]:
-    """Numerator (n0, n1) of the mode where B/A is a sum, and its derivatives by a (2, na) and b (2, nb).
+    """Numerator (n0, n1) of the mode with B/A written as a sum, and its derivatives by a (2, na) and b (2, nb).
 
-    B = N R + S M with R the rest of A: one linear equation for N and S, by Sylvester's matrix.
+    B = N R + S M, with the rest R of A, is one linear equation for N and S (Sylvester matrix).
 
     >>> mode, rest, by_a = split(np.array([-1.7, 1.1, -0.16]), np.ones(1))
     >>> share_of_mode(np.array([-1.7, 1.1, -0.16]), np.ones(1), mode, rest, by_a)[0].round(6).tolist()
@@ -87,7 +87,7 @@ def _inverse(matrix: Array) -> Array:
     try:
         return np.asarray(np.linalg.inv(matrix))
     except np.linalg.LinAlgError:
-        raise ModelError("softening: the ARX has its dominant pole pair twice; expected one mode of its own") from None
+        raise ModelError("softening: the dominant pole pair of the ARX is double; expected a single mode") from None
 
 
 class Path:
@@ -98,24 +98,24 @@ class Path:
     arx : ArxBlock
         G.
     delay : float
-        Of it, in samples.
+        Delay of G [samples].
 
     Attributes
     ----------
     mode, rest : (2,), (na - 2,) ndarray
         m1 and m2, and the rest of A.
     mode_by_a, rest_by_a : (2, na), (na - 2, na) ndarray
-        Their derivatives.
+        Derivatives of `mode` and `rest`.
     gain : float
         g.
     filter : ArxBlock
-        The path, of gain 1/g less.
+        The path divided by g.
     share : float
         Static gain of mode and path.
     share_slopes : (p,) ndarray
-        Its derivatives by the numbers of the ARX.
+        Derivatives of `share` by the parameters of the ARX.
     by_a, by_b : (k, na), (k, nb) ndarray
-        Derivatives of the numbers of the filter, g held.
+        Derivatives of the coefficients of the filter at constant g.
     """
 
     filter: ArxBlock
@@ -155,5 +155,5 @@ class OwnPath(Path):
         free[: arx.a.size] = (by_a.sum(axis=0) - self.share * self.mode_by_a.sum(axis=0)) / self.gain
         free[arx.a.size : arx.a.size + arx.b.size] = by_b.sum(axis=0) / self.gain
         self.share_slopes = free
-        still = ((1, 0), (0, 0))  # the feedback of the filter, which has none
+        still = ((1, 0), (0, 0))  # the filter has no feedback
         self.by_a, self.by_b = np.pad(by_a / self.gain, still), np.pad(by_b / self.gain, still)

@@ -15,9 +15,9 @@
 """The ARX with a dominant mode whose stiffness changes with deflection.
 
 G has a dominant mode M = g/(1 + m1 z⁻¹ + m2 z⁻²), g = 1 + m1 + m2. With the force N(x) = k2 |x| x + k3 x³ its modal
-coordinate obeys x_i = −m1 x_(i−1) − m2 x_(i−2) + g (w_i − N(x_(i−1))). Only its deviation ξ from the linear mode goes
-through R, beside the unchanged ARX: y = G w + R ξ. Off, ξ is exactly zero. R is what the mode passes on its way to the
-sensor: all the rest of G, R = G/M, or nothing but its own share of a sum of modes.
+coordinate is x_i = −m1 x_(i−1) − m2 x_(i−2) + g (w_i − N(x_(i−1))). Its deviation ξ from the linear mode passes through
+R and is added to the output of the unchanged ARX: y = G w + R ξ. If the effect is off, ξ is exactly zero. R is the path
+from the mode to the sensor: the rest of G, R = G/M, or the share of the mode in a sum of modes.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def force_slope(x, k2, k3):
 
 @kernel
 def settle(w, k2, k3, x):
-    """Static deflections x (n,) with x + N(x) = w; not a number where the stiffness vanishes on the way."""
+    """Static deflections x (n,) with x + N(x) = w; NaN if the stiffness becomes zero before."""
     for i in range(w.size):
         x[i] = w[i]
         for _ in range(50):
@@ -76,7 +76,7 @@ def run_mode_deviation(w, x0, p, z, xi):
 def linearise_mode_deviation(w, dw, x0, dx0, p, z, dz, xi, dxi):
     """`run_mode_deviation` with ∂ξ to dxi (m + 4, n): rows dw (m, n), then p.
 
-    dx0 (m + 4,) are slopes of x0; dz (m + 4, 4) is updated.
+    dx0 (m + 4,) are the sensitivities of x0; dz (m + 4, 4) is updated.
     """
     gain, m, n = 1.0 + p[0] + p[1], dw.shape[0], w.size
     m1, m2 = p[0], p[1]
@@ -118,7 +118,7 @@ def add_mixed(weights, rows, out):
 
 
 class StaticSoftening(MemorylessBlock):
-    """Deflection under a slow w, for records slower than the model."""
+    """Static deflection, for records slower than the model."""
 
     def __init__(self, name: str, k2: float, k3: float) -> None:
         self.names = (f"{name}.k2", f"{name}.k3")
@@ -139,7 +139,7 @@ class StaticSoftening(MemorylessBlock):
 
 
 class SoftenedArxBlock(Block):
-    """State: of the ARX; w and x at rest; of mode and ξ; of the path."""
+    """State: state of the ARX; w and x at rest; states of mode and ξ; state of the path."""
 
     def __init__(self, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
         self.arx, self.settled, self.path = arx, settled, path
