@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Identify a piezo stage, predict its displacement live, and find the physical effect that its model misses.
+"""Identify a piezo stage, predict its displacement live, and find the physical effect that is missing in its model.
 
-docs/architecture.md shows the rooms (the folders), what each holds, and how they depend on one another.
+docs/architecture.md describes the rooms (the folders), their contents, and their dependencies.
 
 Examples
 --------
@@ -78,7 +78,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load a room when one of its public names is first asked for: `piezo --help` needs no compiler."""
+    """Load a module when one of its public names is first used, so that `piezo --help` needs no compiler."""
     if name not in _ROOMS:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     return getattr(import_module(f".{_ROOMS[name]}", __name__), name)

@@ -12,32 +12,32 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The error classes. A message says what was got, what was expected and what to do.
+"""The error classes. A message states what was got, what was expected and what to do.
 
 ::
 
     PiezoError
     ├── ParameterError        (ValueError)       a value outside its bounds, an unknown name
-    ├── RecordError           (ValueError)       samples that are no record of a stage
-    ├── ModelError            (ValueError)       a chain or a model file that makes no sense
-    ├── IdentificationError   (RuntimeError)     data that do not determine what was asked
-    ├── DivergenceError       (ArithmeticError)  a simulation that ran away
+    ├── RecordError           (ValueError)       samples that do not form a record
+    ├── ModelError            (ValueError)       an inconsistent chain or model file
+    ├── IdentificationError   (RuntimeError)     data that do not determine the requested result
+    ├── DivergenceError       (ArithmeticError)  a simulation that diverged
     ├── StageError            (OSError)          a stage or its limits, link, state
     │   ├── DeviceError                          the device itself failed
-    │   └── StoppedError                         work on a device was broken off because a stop was asked for
+    │   └── StoppedError                         work on a device was interrupted by a stop
     └── RecordingError        (OSError)          a file that cannot be read or written
 
-`UnknownStateWarning` is the one warning: a simulation that starts from rest although its record does not.
+`UnknownStateWarning` is the only warning: a simulation starts from rest although its record does not.
 """
 
 from __future__ import annotations
 
 
 def printable(text: str) -> str:
-    r"""One line that any terminal shows as it is: what cannot be printed stands as its escape.
+    r"""Text as one line without control characters, which are replaced by escape sequences.
 
-    Control characters, line breaks, and marks that change the direction of writing are escaped: text from a message, a
-    file or a device can neither forge a line of a log nor steer a terminal.
+    Control characters, line breaks, and marks that change the direction of writing are escaped, so that text from a
+    message, a file or a device can neither forge a line of a log nor control a terminal.
 
     Examples
     --------
@@ -50,19 +50,19 @@ def printable(text: str) -> str:
 
 
 def reason_of(error: BaseException) -> str:
-    """An exception in one line: what a PiezoError says, or what fault of this program it is."""
+    """An exception in one line: the message of a PiezoError, or a fault of this program."""
     return str(error) if isinstance(error, PiezoError) else printable(f"fault of this program: {error!r}")
 
 
 class PiezoError(Exception):
-    """Whatever this package raises on purpose; one line that a user can act on, whatever text of others is in it."""
+    """Base class of the errors of this package; the message is one printable line for the user."""
 
     def __str__(self) -> str:
         return printable(super().__str__())
 
 
 class ParameterError(PiezoError, ValueError):
-    """A parameter value, name or unit that is not acceptable."""
+    """An invalid parameter value, name or unit."""
 
 
 class RecordError(PiezoError, ValueError):
@@ -78,15 +78,15 @@ class IdentificationError(PiezoError, RuntimeError):
 
 
 class StageError(PiezoError, OSError):
-    """A stage refused, failed, or was asked to leave its limits."""
+    """A stage refused, failed, or would have to leave its limits."""
 
 
 class DeviceError(StageError):
-    """The device refused, answered nonsense, or its link failed: a fault of the device, not of its user."""
+    """The device refused, gave an invalid answer, or its link failed: a fault of the device and not of the user."""
 
 
 class StoppedError(StageError):
-    """Work on a device was broken off because a stop was asked for; nothing was started after that."""
+    """Work on a device was interrupted by a stop; nothing was started afterwards."""
 
 
 class RecordingError(PiezoError, OSError):
@@ -94,14 +94,14 @@ class RecordingError(PiezoError, OSError):
 
 
 class DivergenceError(PiezoError, ArithmeticError):
-    """A simulation left every physical range.
+    """A simulation diverged.
 
     Parameters
     ----------
     effect : str
-        Identifier of the effect whose output ran away.
+        Identifier of the effect whose output diverged.
     sample : int
-        Index of the first non-finite or runaway sample in the block.
+        Index of the first diverged or non-finite sample in the block.
     time : float
         Time of that sample since the start of the block [s].
     """

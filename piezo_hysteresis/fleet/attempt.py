@@ -37,7 +37,7 @@ Row = dict[str, Any]
 
 
 class RowStatus(StrEnum):
-    """What became of a recording."""
+    """Result of the work on a recording."""
 
     DONE = "done"
     FAILED = "failed"
@@ -48,29 +48,29 @@ class RowStatus(StrEnum):
 
 
 class OtherCodeError(PiezoError):
-    """A worker runs another version of this package than the one that asks."""
+    """A worker runs another version of this package than the client."""
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What a worker is asked to do.
+    """The order for a worker.
 
     Parameters
     ----------
     source : Source
         The recording.
     work : Work
-        What is done with it.
+        The task.
     reading : mapping of str to object
         Arguments of `recording.read`.
     settings : str
         Hash of work and reading.
     code : str
-        `code_hash` of who asks.
+        `code_hash` of the client.
     limit : float
         Time limit [s].
     known : str
-        Hash of the data that a row exists for; equal data are not worked on again. Empty where there is none.
+        Hash of the data of an existing row; equal data are not processed again. Empty if there is no row.
     """
 
     source: Source
@@ -82,7 +82,7 @@ class Order:
     known: str = ""
 
     def row(self, status: RowStatus, **columns: Any) -> Row:
-        """A row with what is known before the work, and `columns`."""
+        """A row with the data of the order, and `columns`."""
         source = self.source
         return {
             "recording": source.url,
@@ -101,7 +101,7 @@ class Order:
 
 
 def attempt(order: Order) -> Row:
-    """The row of a recording, whatever happens to it.
+    """The row of a recording, also if it fails.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def attempt(order: Order) -> Row:
     Raises
     ------
     OtherCodeError
-        If this process has other code than who asks: its results would be filed under a wrong hash.
+        If this process has other code than the client, because its results would get a wrong hash.
     """
     if code_hash() != order.code:
         raise OtherCodeError(
@@ -124,7 +124,7 @@ def attempt(order: Order) -> Row:
             status = _worked_on(order, stack, columns)
     except RecordingTimeSpent:
         status = RowStatus.TIMED_OUT
-        columns["error"] = f"no result after {order.limit:g} s, the time limit; give more by --time-limit"
+        columns["error"] = f"no result within the time limit of {order.limit:g} s; increase --time-limit"
     columns |= {"seconds": time.monotonic() - began, "processor_seconds": time.process_time() - spent}
     return order.row(status, worker=f"{socket.gethostname()}", **columns)
 
@@ -133,7 +133,7 @@ def _worked_on(order: Order, stack: ExitStack, columns: Row) -> RowStatus:
     try:
         path = fetch(order.source, stack)
         columns["data_hash"] = content_hash(order.source, path)
-    except Exception as error:  # every kind of storage fails in its own way
+    except Exception as error:  # storages raise different exceptions
         columns["error"] = f"{type(error).__name__}: {_line(error)}"
         return RowStatus.UNREACHABLE
     if columns["data_hash"] == order.known:
@@ -149,7 +149,7 @@ def _worked_on(order: Order, stack: ExitStack, columns: Row) -> RowStatus:
     except MemoryError:
         columns["error"] = "the recording does not fit into memory; decimate it or give fewer rows"
         return RowStatus.FAILED
-    except Exception as error:  # a fault of this program costs one row, not the others
+    except Exception as error:  # a fault of this program must affect only one row
         columns["error"] = reason_of(error).replace(str(path), order.source.url)
         return RowStatus.FAILED
     return RowStatus.DONE
@@ -160,11 +160,11 @@ def _line(error: BaseException) -> str:
 
 
 def lost(order: Order) -> Row:
-    """The row of a recording with which every worker has died.
+    """The row of a recording with which every worker process ended.
 
     Parameters
     ----------
     order : Order
     """
-    said = "the worker process ended at every try: too little memory, or a crash in a library"
+    said = "the worker process ended in every attempt: too little memory, or a crash in a library"
     return order.row(RowStatus.KILLED, error=said)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`cluster`: Dask workers on this machine, or those of a scheduler elsewhere, with warm kernels."""
+"""`cluster`: Dask workers on this machine, or those of another scheduler, with compiled kernels."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ from ..record import Record
 from .extra import package
 
 PERIOD = 2e-5
-"""Sample period of the signals that warm the kernels up [s]."""
+"""Sample period of the signals for loading the kernels [s]."""
 
 
 def warm_up() -> None:
-    """Load the compiled kernels into this process, and leave one thread to every library."""
+    """Load the compiled kernels into this process, and limit every library to one thread."""
     threadpool_limits(limits=1)
     drive = 3.0 + np.sin(np.arange(64.0))
     base = Model((BoucWen(), Arx(a=(-1.6, 0.8), b=(0.1, 0.1), delay=3), Offset()), PERIOD)
@@ -64,14 +64,14 @@ def _plugin() -> type:
 
 @contextmanager
 def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterator[Any]:
-    """A Dask client whose workers are warm.
+    """A Dask client whose workers have loaded the kernels.
 
     Parameters
     ----------
     scheduler : str, optional
-        Address, e.g. ``"tcp://lab-server:8786"``; by default workers start on this machine and end with the block.
+        Address, e.g. ``"tcp://lab-server:8786"``. By default, workers start on this machine and end with the block.
     workers : int, optional
-        Processes on this machine; default one per processor that this process may use.
+        Number of processes on this machine; default: one per available processor.
 
     Raises
     ------
@@ -86,9 +86,9 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         "distributed.admin.tick.interval": "1s",
         "distributed.admin.system-monitor.interval": "5s",
         "distributed.worker.memory.monitor-interval": "1s",
-        "distributed.deploy.lost-worker-timeout": "120s",  # a busy machine takes long to start a worker again
+        "distributed.deploy.lost-worker-timeout": "120s",  # on a busy machine, the restart of a worker takes long
         "distributed.worker.profile.enabled": False,  # it samples the stack of a fit a hundred times a second
-        # set, it takes arrays from the system and gives them back at every step of a fit: twice the processor time
+        # with this variable, every step of a fit allocates and frees arrays in the system: twice the processor time
         "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
     }
     with dask.config.set(settings):
@@ -120,12 +120,12 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
 
 
 def revive(client: Any) -> None:
-    """Start workers of this machine anew that nobody else would: those killed while they started.
+    """Restart workers of this machine that were killed during their start, which Dask does not restart.
 
     Parameters
     ----------
     client : distributed.Client
-        From `cluster`; one of a scheduler elsewhere is left alone.
+        From `cluster`; nothing is done for another scheduler.
     """
     host = client.cluster
     if host is None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`code_hash`: tells whether results were computed by the same code."""
+"""`code_hash`: hash of the code that computes results."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ ROOMS = (
     "blocks", "channel_mapping.py", "discrepancy", "effects", "fleet/work.py", "fleet/work_result.py", "identification",
     "model", "notice.py", "online", "parameter.py", "record.py", "recording", "report/words.py",
 )  # fmt: skip
-"""What a result depends on: the rooms that read, model and fit, and what is taken from their answers."""
+"""Modules on which a result depends."""
 LIBRARIES = ("numba", "numpy", "scipy")
-"""Packages whose version may change a result."""
+"""Packages whose version can change a result."""
 
 
 @cache

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Hands recordings to workers, a few ahead, and takes their rows; tries again where workers died."""
+"""Sends recordings to workers, a few at a time, and collects their rows; repeats a recording if its worker ended."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from .attempt import Order, Row, attempt, lost
 from .cluster import revive
 
 AHEAD = 4
-"""Recordings per thread that the scheduler knows of at a time."""
+"""Number of submitted recordings per thread."""
 TOGETHER, ALONE = 2, 2
-"""Workers that may die with a recording among others, which may be to blame, and then while nothing else runs."""
+"""Numbers of lost workers after which a recording fails: while others run, which may be the cause, and alone."""
 WAIT, LOOK = 0.5, 5.0
-"""Longest wait for the next result, and time between two looks at the workers [s]."""
+"""Longest wait for the next result, and time between two checks of the workers [s]."""
 
 
 class Dispatch:
-    """The recordings of one run on their way through the workers.
+    """The recordings of one run and their state.
 
     Parameters
     ----------
@@ -59,21 +59,21 @@ class Dispatch:
         return not (self._waiting or self._suspects or self._under_way)
 
     def submit(self, room: int) -> None:
-        """Hand over recordings until `room` of them are under way; suspects one by one, after all others."""
+        """Submit recordings until `room` of them are running; recordings that lost a worker run last, one by one."""
         while self._waiting and len(self._under_way) < room:
             self._submit(self._waiting.popleft())
         if self._suspects and not self._under_way:
             self._submit(self._suspects.popleft())
 
     def rows(self) -> list[Row]:
-        """Rows that are there, after a short wait for the first."""
+        """Finished rows, after a short wait for the first."""
         try:
             futures = [self._ended.get(timeout=WAIT)]
         except queue.Empty:
             return []
         while not self._ended.empty():
             futures.append(self._ended.get())
-        # what a worker took with it when it died is computed again, which may fail: then there is no row
+        # the results of a lost worker are computed again, which may fail; then there is no row
         finished = {self._under_way[f]: f for f in futures if f.status == "finished"}
         found: dict[int, Row | None] = self._client.gather(finished, errors="skip")
         rows = []
@@ -90,7 +90,7 @@ class Dispatch:
         return rows
 
     def check(self) -> None:
-        """Make sure that there is still a scheduler.
+        """Check the connection to the scheduler.
 
         Raises
         ------
@@ -100,8 +100,8 @@ class Dispatch:
         for future, number in self._under_way.items():
             if future.status in ("cancelled", "lost"):
                 raise RecordingError(
-                    f"{self._orders[number].source.url}: the scheduler was lost; give the same command again, it goes "
-                    "on from here"
+                    f"{self._orders[number].source.url}: the scheduler was lost; repeat the same command, it continues "
+                    "from here"
                 )
 
     def _submit(self, number: int) -> None:
@@ -125,7 +125,7 @@ class Dispatch:
 
 
 def finished(orders: Sequence[Order], client: Any) -> Iterator[list[Row]]:
-    """The rows of orders as they are finished, in lists; an empty list now and then while none is.
+    """The rows of orders as they are finished, in lists; a list may be empty.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The packages of the extra `fleet`, which the rest of the package does without."""
+"""The packages of the extra `fleet`, which the rest of the package does not need."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from ..errors import RecordingError
 
 
 def package(name: str) -> Any:
-    """A module of the extra, or of a package that it brings.
+    """A module of the extra, or of a package that it depends on.
 
     Parameters
     ----------
     name : str
-        Of the module, e.g. ``"pyarrow.parquet"``.
+        Name of the module, e.g. ``"pyarrow.parquet"``.
 
     Raises
     ------

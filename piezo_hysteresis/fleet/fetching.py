@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Brings the files of a recording to this machine, and their hash."""
+"""Copies the files of a recording to this machine, and computes their hash."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from tempfile import TemporaryDirectory
 from .source import Source
 
 BLOCK = 1 << 20
-"""Bytes that are read at a time."""
+"""Number of bytes that are read at once."""
 
 
 def fetch(source: Source, stack: ExitStack) -> Path:
-    """The path of a recording on this machine: its own, or a copy that lasts as long as `stack`.
+    """The path of a recording on this machine: the original, or a copy that exists as long as `stack`.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def fetch(source: Source, stack: ExitStack) -> Path:
     Raises
     ------
     Exception
-        Whatever the storage raises where it cannot be reached.
+        Any exception of the storage, if it cannot be reached.
     """
     if "://" not in source.url:
         path = Path(source.folder or source.files[0])
@@ -66,7 +66,7 @@ def content_hash(source: Source, path: Path) -> str:
     ----------
     source : Source
     path : Path
-        Where `fetch` put it.
+        Result of `fetch`.
     """
     digest = hashlib.sha256()
     files = [path / file.rpartition("/")[2] for file in source.files] if source.folder else [path]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`find_recordings`: the recordings that paths, patterns and URLs name, without reading any."""
+"""`find_recordings`: the recordings of paths, patterns and URLs, without reading them."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from .storage import Storage
 ENDINGS = frozenset(
     (".csv", ".txt", ".tsv", ".dat", ".mat", ".npz", ".npy", ".h5", ".hdf5", ".hdf", ".tdms", ".mcap", ".db3")
 )
-"""Files that are taken for recordings where a folder or a pattern is given."""
+"""Endings of files that count as recordings in a folder or pattern."""
 _BAG = frozenset((".mcap", ".db3", ".zstd"))
 """Endings of the files of a bag."""
 _PHASE = re.compile(r"\d{1,3}[_ -][A-Za-z]\w*\.npz")
 """Name of one phase of an experiment that is a folder of NPZ files."""
 _MAGIC = re.compile(r"[*?\[]")
-"""What makes a path a pattern."""
+"""Characters that make a path a pattern."""
 
 Info = dict[str, Any]
 
@@ -44,22 +44,22 @@ Info = dict[str, Any]
 def find_recordings(
     urls: Sequence[str], storage: Storage | None = None, names: NamePattern | None = None
 ) -> tuple[Source, ...]:
-    """The recordings that are there, each once, in the order of their URLs.
+    """The existing recordings, each once, in the order of their URLs.
 
     Parameters
     ----------
     urls : sequence of str
         Files, folders or patterns with ``*``, ``?`` and ``**``: local, s3:// or http(s)://. In a folder, at any depth,
-        a bag or a folder of ``NN_<phase>.npz`` is one recording, and so is every other file of a known ending.
+        a bag or a folder of ``NN_<phase>.npz`` is one recording, and every other file with a known ending too.
     storage : Storage, optional
-        How S3 is reached.
+        Access to S3.
     names : NamePattern, optional
-        How a URL tells stage and date.
+        Pattern that finds stage and date in a URL.
 
     Raises
     ------
     RecordingError
-        If a URL names nothing, or its storage cannot be reached.
+        If there is nothing at a URL, or its storage cannot be reached.
     """
     storage, names = storage or Storage(), names or NamePattern()
     found: dict[str, Source] = {}
@@ -68,7 +68,7 @@ def find_recordings(
             sources = list(_named_by(url, storage, names))
         except PiezoError:
             raise
-        except Exception as error:  # every kind of storage fails in its own way
+        except Exception as error:  # storages raise different exceptions
             said = printable(" ".join(str(error).split())) or type(error).__name__
             raise RecordingError(f"{url}: {said}; expected a file, a folder or a pattern that can be read") from None
         if not sources:

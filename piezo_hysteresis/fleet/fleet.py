@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`run_fleet`: works on many recordings, and keeps one row for each."""
+"""`run_fleet`: processes many recordings, and keeps one row for each."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ from .table.results import Known, Results
 from .work import Work
 
 FLUSH_TIME, FLUSH_ROWS = 20.0, 1000
-"""Time [s], and number of rows, after which rows are written; a run that is killed loses no more."""
+"""Time [s], and number of rows, after which rows are written; a killed run loses at most so many."""
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
 class FleetSummary:
-    """What a run has done.
+    """Summary of a run.
 
     Parameters
     ----------
     counts : mapping of str to int
-        Recordings by status; ``unchanged`` are those whose files looked new but held the same data.
+        Number of recordings by status; ``unchanged``: files with a new version but the same data.
     seconds : float
-        Time of the run [s].
+        Duration of the run [s].
     """
 
     counts: Mapping[str, int]
@@ -61,7 +61,7 @@ class FleetSummary:
 
 
 def settings_hash(work: Work, reading: Mapping[str, Any]) -> str:
-    """``sha256:`` and 16 digits of the options that a result depends on."""
+    """``sha256:`` and 16 digits, from the options that influence a result."""
     given = sorted((name, repr(value)) for name, value in reading.items() if value not in (None, {}, [], ()))
     return "sha256:" + hashlib.sha256(f"{work.settings()}\n{given}".encode()).hexdigest()[:16]
 
@@ -75,20 +75,20 @@ def open_orders(
     limit: float = float("inf"),
     retry: bool = False,
 ) -> list[Order]:
-    """What is still to be done: recordings without a row, or whose data, code or options have changed.
+    """Orders for all recordings without a row, or with changed data, code or options.
 
     Parameters
     ----------
     sources : sequence of Source
     work : Work
     results : Results
-        What is known.
+        Results so far.
     reading : mapping, optional
         Arguments of `recording.read`.
     limit : float
-        Time limit per recording [s]; a recording that took longer than a smaller one is tried again.
+        Time limit per recording [s]; a recording that exceeded a smaller limit is tried again.
     retry : bool
-        Whether recordings that failed are tried again, too.
+        Whether recordings that failed are tried again.
     """
     reading, code = dict(reading or {}), code_hash()
     settings = settings_hash(work, reading)
@@ -113,25 +113,25 @@ def _is_final(known: Known, limit: float, retry: bool) -> bool:
 
 
 def run_fleet(orders: Sequence[Order], results: Results, client: Any, progress: Progress | None = None) -> FleetSummary:
-    """Work on recordings, and write their rows as they come.
+    """Process recordings, and write their rows when they are finished.
 
     Parameters
     ----------
     orders : sequence of Order
         From `open_orders`.
     results : Results
-        Open.
+        Results, open for writing.
     client : distributed.Client
         From `cluster`.
     progress : callable, optional
-        Called with a word and the fraction done.
+        Called with a message and the fraction done.
 
     Raises
     ------
     OtherCodeError
         If a worker runs another version of this package.
     RecordingError
-        If the scheduler is lost; the rows that were finished are kept.
+        If the scheduler is lost; finished rows are kept.
     """
     began = flushed = time.monotonic()
     counts: Counter[str] = Counter()
@@ -158,7 +158,7 @@ def run_fleet(orders: Sequence[Order], results: Results, client: Any, progress: 
 
 
 def _refresh(results: Results, unchanged: Sequence[Row]) -> None:
-    """Keep the rows of recordings whose files look new but hold the same data."""
+    """Keep the rows of recordings whose files have a new version but the same data."""
     now = {(row["task"], row["recording"]): row for row in unchanged}
     fresh = ("version", "stage", "month", "recorded_at", "finished_at")
     for row in list(results.rows(now)):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Source`: one recording, where it lies, of which stage it is and when it was taken."""
+"""`Source`: one recording with its location, its stage and its date."""
 
 from __future__ import annotations
 
@@ -25,36 +25,36 @@ from ..errors import ParameterError
 from .storage import Storage
 
 UNKNOWN = "unknown"
-"""Stage or month that nothing tells."""
+"""Name of an unknown stage or month."""
 _DATE = re.compile(
     r"(?<!\d)(20\d\d)[-_]?([01]\d)[-_]?([0-3]\d)(?:[T _-]?([0-2]\d)[-:_]?([0-5]\d)(?:[-:_]?([0-5]\d))?)?"
 )
-"""A date, and a time of the day behind it or not, as they stand in names of files."""
+"""A date with or without a time of day, as in file names."""
 _STAGE = re.compile(r"(?:^|/)stage=([^/]+)")
-"""A folder that names the stage, as in results of this kind."""
+"""A folder with the name of the stage, as in the results of a fleet."""
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A recording that is still to be read.
+    """A recording that has not been read.
 
     Parameters
     ----------
     url : str
-        Path or URL; the recording is known by it.
+        Path or URL, the identifier of the recording.
     files : tuple of str
         Paths of its files in the storage.
     folder : str
-        Path of the folder that is the recording; empty for a single file.
+        Path of the folder of the recording; empty for a single file.
     storage : Storage
-        How it is opened.
+        Storage that opens it.
     stage : str
-        Which stage was recorded.
+        Name of the stage.
     recorded_at : datetime or None
-        When [UTC]; None where neither name nor storage tell.
+        Time of the recording [UTC]; None if neither name nor storage contain it.
     version : str
-        Sizes and times of change, or tags, as the storage lists them: another one means that the data may have changed.
-        Empty where the storage tells nothing.
+        Sizes and modification times, or tags, as listed by the storage; if they differ, the data may have changed.
+        Empty if the storage does not list them.
     """
 
     url: str
@@ -73,18 +73,18 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class NamePattern:
-    """How a URL tells stage and date.
+    """Pattern that finds stage and date in a URL.
 
     Parameters
     ----------
     text : str
-        Regular expression with a group ``stage``, a group ``date`` or both; empty for the usual places: the folder in
-        which the recording lies, and the first date in the URL.
+        Regular expression with a group ``stage``, a group ``date`` or both; empty for the default: the folder of the
+        recording, and the first date in the URL.
 
     Raises
     ------
     ParameterError
-        If it is no regular expression, or has neither group.
+        If it is not a regular expression, or has neither group.
     """
 
     text: str = ""
@@ -98,7 +98,7 @@ class NamePattern:
             raise ParameterError(f"name: got '{self.text}', expected a group (?P<stage>…) or (?P<date>…) in it")
 
     def stage(self, url: str) -> str:
-        """The stage that a URL names.
+        """The stage in a URL.
 
         >>> NamePattern().stage("s3://lab/stage_7/2026-11-03.npz"), NamePattern("(?P<stage>[0-9]+)_").stage("/1_x.csv")
         ('stage_7', '1')
@@ -111,7 +111,7 @@ class NamePattern:
         return (folders[-2] if len(folders) > 1 else "") or UNKNOWN
 
     def date(self, url: str, changed: datetime | None) -> datetime | None:
-        """When a recording was taken; where the URL does not say, when its newest file was written.
+        """Time of a recording; if the URL contains none, the modification time of its newest file.
 
         >>> NamePattern().date("/lab/x/20261103T1530.npz", None).isoformat()
         '2026-11-03T15:30:00+00:00'
@@ -130,7 +130,7 @@ class NamePattern:
 
 
 def version_of(infos: list[dict[str, Any]]) -> str:
-    """What the storage tells about files, in one line; empty where it tells no time and no tag of some file."""
+    """Sizes and times or tags of files in one line; empty if the storage lists neither time nor tag of some file."""
     parts = []
     for info in infos:
         mark = info.get("ETag") or info.get("mtime") or info.get("Last-Modified") or info.get("LastModified")
@@ -141,7 +141,7 @@ def version_of(infos: list[dict[str, Any]]) -> str:
 
 
 def changed_at(infos: list[dict[str, Any]]) -> datetime | None:
-    """When the newest of some files was written [UTC]."""
+    """Modification time of the newest file [UTC]."""
     times = []
     for info in infos:
         time = info.get("mtime") or info.get("LastModified")

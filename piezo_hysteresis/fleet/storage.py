@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Storage`: opens the place that a URL names: a disk, an S3 server, a web server."""
+"""`Storage`: opens the location of a URL: a disk, an S3 server, a web server."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ from .extra import package
 
 @dataclass(frozen=True, slots=True)
 class Storage:
-    """How URLs are opened. The keys of S3 come from the environment or from ``~/.aws``, never from here.
+    """Access to URLs. Keys for S3 come from the environment or from ``~/.aws``.
 
     Parameters
     ----------
     endpoint : str, optional
-        URL of an S3 server other than Amazon's; default the environment variable ``AWS_ENDPOINT_URL``, if there is one.
+        URL of an S3 server other than Amazon's; default: the environment variable ``AWS_ENDPOINT_URL``, if it is set.
     anonymous : bool
-        Whether S3 is asked without keys, as public buckets allow.
+        Whether S3 is used without keys, for public buckets.
     """
 
     endpoint: str | None = field(default_factory=lambda: os.environ.get("AWS_ENDPOINT_URL"))
     anonymous: bool = False
 
     def open(self, url: str) -> tuple[Any, str]:
-        """The file system (an fsspec one) that holds `url`, and the path there.
+        """The fsspec file system of `url`, and the path in it.
 
         Raises
         ------
@@ -72,9 +72,9 @@ def _disk() -> Any:
 
 @cache
 def _s3(bucket: str, endpoint: str | None, anonymous: bool) -> Any:
-    """The S3 client of Arrow behind the interface of fsspec.
+    """The S3 client of Arrow with the interface of fsspec.
 
-    The usual partner of fsspec (s3fs) needs python-dateutil below 3, see docs/decisions/0025.
+    The usual S3 client of fsspec (s3fs) needs python-dateutil below 3, see docs/decisions/0025.
     """
     wrapper = package("fsspec.implementations.arrow").ArrowFSWrapper
     arrow = package("pyarrow.fs")

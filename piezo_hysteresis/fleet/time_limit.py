@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A time limit for work in a thread: first the work is broken off, and if it does not end, its process."""
+"""A time limit for work in a thread: first the work is interrupted; if it does not end, its process is ended."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 GRACE = 60.0
-"""Time that a library may take to come back to Python after the limit, before the process ends [s]."""
+"""Time that a library has to return to Python after the limit, before the process is ended [s]."""
 
 
 class RecordingTimeSpent(BaseException):
-    """The time for a recording is over; no `Exception`, so that nothing that handles errors takes it for one."""
+    """The time limit of a recording has passed; not an `Exception`, so that error handlers do not catch it."""
 
 
 @contextmanager
 def within(limit: float, end_process: Callable[[], None] | None = None) -> Iterator[None]:
-    """Raise `RecordingTimeSpent` in this thread, wherever it is, when the time is over.
+    """Raise `RecordingTimeSpent` in this thread after a time.
 
     Parameters
     ----------
     limit : float
-        Time [s]; infinite for none.
+        Time [s]; infinite for no limit.
     end_process : callable, optional
-        Called from another thread if this one has not come back `GRACE` later; default ends the process at once, so
-        that a scheduler sees a dead worker.
+        Called from another thread if this one has not returned `GRACE` later. By default it ends the process at once,
+        so that the scheduler detects the loss of the worker.
     """
     if limit == float("inf"):
         yield
@@ -65,7 +65,7 @@ def within(limit: float, end_process: Callable[[], None] | None = None) -> Itera
         gone.set()
         with lock:
             over = True
-            _raise_in(thread, None)  # one that is on its way must not hit whatever runs here next
+            _raise_in(thread, None)  # a pending exception must not reach later code
 
 
 def _raise_in(thread: int, error: type[BaseException] | None) -> None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Work`: what is done with every recording: identify, validate or diagnose."""
+"""`Work`: the task for every recording: identify, validate or diagnose."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from .work_result import WorkResult, fitted_parameters
 
 
 class Work(Protocol):
-    """A function of an experiment that can be sent to another process."""
+    """A function of an experiment; it can be sent to another process."""
 
     @property
     def name(self) -> str:
-        """One word: the task of the row."""
+        """Name of the task, one word."""
 
     def settings(self) -> str:
-        """All that the result depends on besides data and code, as text."""
+        """Everything that influences the result besides data and code, as text."""
 
     def __call__(self, experiment: Experiment) -> WorkResult:
-        """The result; a PiezoError becomes the error of the row."""
+        """The result of an experiment. The message of a PiezoError becomes the error of the row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ class Diagnose:
     Parameters
     ----------
     model : str, optional
-        Text of the model file that the search begins with; empty to identify a model first.
+        Text of the model file with which the search begins; empty to identify a model first.
     """
 
     model: str = ""
@@ -164,7 +164,7 @@ def work_for(task: str, model: str = "", hysteresis: str = HYSTERESIS.name) -> W
     Raises
     ------
     ParameterError
-        If there is no such task, or it cannot be done with what is given.
+        If there is no such task, or the arguments do not fit the task.
     """
     if task == Identify.name and not model:
         return Identify(hysteresis)

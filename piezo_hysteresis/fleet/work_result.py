@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`WorkResult`: what one recording gave, in the form that a row holds."""
+"""`WorkResult`: the result of one recording, in the form of a row."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ from ..record import Notice
 
 @dataclass(frozen=True, slots=True)
 class WorkResult:
-    """The answer of one work on one recording.
+    """The result of one task for one recording.
 
     Parameters
     ----------
     verdict : str
-        A stable word: see the page about fleets.
+        One of a fixed set of words, see docs/fleet.md.
     effects : tuple of str
         Effects of the model, or those that a diagnosis names.
     converged : bool or None
-        Whether a fit came to its end; None where nothing was fitted.
+        Whether the fit converged; None if nothing was fitted.
     error : float or None
         Free-run error [m].
     error_percent, before_percent, floor_percent : float or None
-        Free-run error, that before effects were added, and its floor [% of range].
+        Free-run error, the error before effects were added, and the noise floor [% of range].
     parameters : tuple of mapping
         ``name``, ``value``, ``lower`` and ``upper`` (95 %, may be None), ``unit``, ``at_bound``.
     notices : tuple of Notice
-        What was found in the data.
+        Notices about the data.
     model : str or None
         Text of the model file.
     """
@@ -61,7 +61,7 @@ class WorkResult:
     model: str | None = None
 
     def columns(self) -> dict[str, Any]:
-        """The columns of the row that this fills; numbers that are not finite become None."""
+        """The columns of the row; numbers that are not finite become None."""
         return {
             "verdict": self.verdict,
             "effects": list(self.effects),
@@ -80,12 +80,12 @@ class WorkResult:
 
 
 def fitted_parameters(fit: Fit | None) -> tuple[Mapping[str, Any], ...]:
-    """The fitted numbers with their 95 % intervals, ended at their bounds.
+    """The fitted parameters with their 95 % intervals, limited to their bounds.
 
     Parameters
     ----------
     fit : Fit or None
-        None gives nothing.
+        The fit; None gives an empty tuple.
     """
     return () if fit is None else tuple(_parameters(fit))
 

@@ -25,16 +25,16 @@ from scipy.signal import welch
 Array = NDArray[np.float64]
 
 BINS = 160
-"""Frequencies of a density at most, evenly spaced on the logarithmic axis."""
+"""Largest number of frequencies, equally spaced on the logarithmic axis."""
 
 
 def density(signals: Sequence[Array], period: float) -> tuple[Array, Array]:
-    """Root of the mean power density over the signals, on one frequency axis without dc, smoothed on a log axis.
+    """Root of the mean power density of the signals, on one frequency axis without dc, smoothed on a log axis.
 
     Parameters
     ----------
     signals : sequence of (n,) ndarray
-        At least 64 samples each [m].
+        Signals of at least 64 samples each [m].
     period : float
         Time between samples [s].
 

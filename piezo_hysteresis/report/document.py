@@ -31,12 +31,12 @@ from .verdict import VerdictText
 from .words import nanometre
 
 FREE_RUN = (
-    "Errors are those of free-run simulation: the model sees the drive only, never the measured displacement. Per\n"
-    "cents are RMS over peak-to-peak displacement of the experiment. The floor of a phase is its sensor noise or 0.03 %"
-    " of\nrange, whichever is larger. A figure grows when it is clicked. piezo view EXPERIMENT shows every sample, "
+    "Errors are those of free-run simulation: the model uses the drive and not the measured displacement. Percentages\n"
+    "are RMS over the peak-to-peak displacement of the experiment. The noise floor of a phase is its sensor noise or\n"
+    "0.03 % of the range, whichever is larger. Click a figure to enlarge it. piezo view EXPERIMENT shows every sample, "
     "with zoom."
 )
-"""How the numbers of a page about an experiment are to be read."""
+"""Explanation of the numbers of a page about an experiment."""
 
 
 def document(
@@ -52,11 +52,11 @@ def document(
     title : str
         Heading.
     comparison : ModelComparison
-        For source, chain and the figures under the verdict.
+        Comparison, for source, chain and the numbers under the verdict.
     verdict : VerdictText
-        Comes first.
+        Verdict, at the top of the page.
     parts : mapping of str to (drawings, tables)
-        Heading of every section and what stands under it.
+        Contents of every section by its heading.
     """
     merit = tuple(_figures_of_merit(comparison))
     return framed(title, comparison.experiment.source, chain(comparison.model), verdict, merit, parts, FREE_RUN)
@@ -81,15 +81,15 @@ def framed(
     Parameters
     ----------
     title, source, about : str
-        Heading, where the data lie, and the line under the heading.
+        Heading, location of the data, and the line under the heading.
     verdict : VerdictText
-        Comes first.
+        Verdict, at the top of the page.
     merit : sequence of (str, str)
-        Names and values of the figures under the verdict.
+        Names and values of the numbers under the verdict.
     parts : mapping of str to (drawings, tables)
-        Heading of every section and what stands under it.
+        Contents of every section by its heading.
     footer : str
-        How the numbers are to be read.
+        Explanation of the numbers.
     """
     return _template().render(
         title=title,
@@ -118,7 +118,7 @@ def _figures_of_merit(comparison: ModelComparison) -> Iterator[tuple[str, str]]:
         if before is not None:
             yield "error before", f"{before.percent:.3g} %"
         yield "error after" if before is not None else "error", f"{now.percent:.3g} %"
-        yield "floor", f"{100 * comparison.floor / now.range:.2g} %"
+        yield "noise floor", f"{100 * comparison.floor / now.range:.2g} %"
         yield "rms error", nanometre(now.rms)
         yield "range", nanometre(now.range)
     yield "phases", f"{len(comparison.experiment)}"

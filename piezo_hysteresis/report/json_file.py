@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Results for machines: one JSON file, written whole or not at all."""
+"""Results as a JSON file, which is written atomically."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def read_json(path: str) -> dict[str, Any]:
     Raises
     ------
     RecordingError
-        If there is no such file, or it holds no JSON object.
+        If there is no such file, or it is not a JSON object.
     """
     try:
         answer = json.loads(Path(path).expanduser().read_text(encoding="utf-8"))

@@ -55,7 +55,7 @@ SECTIONS: Mapping[str, tuple[Draw, ...]] = {
     "Dynamics": (bode, step),
     "Residual": (residual_maps, residual_spectrum, whiteness),
 }
-"""Headings of the page and the figures under them."""
+"""Headings of the page with their figures."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -65,16 +65,16 @@ class Page:
     Parameters
     ----------
     html : str
-        The whole page; needs no other file and no network.
+        The whole page, which needs no other file and no network.
     drawings : tuple of Drawing
-        Its figures in order.
+        Figures of the page in order.
     """
 
     html: str
     drawings: tuple[Drawing, ...]
 
     def save(self, path: Path) -> None:
-        """Write the page, and beside it a folder ``<name>_figures`` with every figure as SVG, PNG and CSV.
+        """Write the page, and next to it a folder ``<name>_figures`` with every figure as SVG, PNG and CSV.
 
         Raises
         ------
@@ -99,7 +99,7 @@ def page(
     title: str = "Piezo stage: model against measurement",
     progress: Progress | None = None,
 ) -> Page:
-    """Draw everything that the experiment shows and write the page.
+    """Draw all figures of the experiment and write the page.
 
     Parameters
     ----------
@@ -108,11 +108,11 @@ def page(
     fit : Fit, optional
         Fit of the last model, for intervals, correlations and bounds.
     answer : mapping, optional
-        Answer of a diagnosis, as it is written for machines.
+        Answer of a diagnosis, as in the JSON file.
     title : str
         Heading.
     progress : callable, optional
-        Called with a word and the fraction done.
+        Called with a message and the fraction done.
     """
     drawn: dict[str, list[Drawing]] = {}
     count = sum(len(figures) for figures in SECTIONS.values())

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`plot`: the figure of a record, an experiment, a model against an experiment, an identification or a diagnosis."""
+"""`plot`: the figure of a record, an experiment, a model with an experiment, an identification or a diagnosis."""
 
 from __future__ import annotations
 
@@ -32,29 +32,28 @@ from .figures.time_series import time_series
 def plot(
     what: Record | Experiment | Model | Identification | Diagnosis, experiment: Experiment | None = None
 ) -> Drawing:
-    """The figure that shows `what` at a glance; a notebook shows it, and `Drawing.save_picture` writes it.
+    """The overview figure of `what`. A notebook shows it, and `Drawing.save_picture` writes it.
 
-    `Record.plot`, `Experiment.plot`, `Model.plot`, `Identification.plot` and `Diagnosis.plot` call it. Without a figure
-    nothing imports matplotlib.
+    `Record.plot`, `Experiment.plot`, `Model.plot`, `Identification.plot` and `Diagnosis.plot` call this function.
+    matplotlib is imported with the first figure.
 
     Parameters
     ----------
     what : Record, Experiment, Model, Identification or Diagnosis
-        Records are drawn against time and as loops; a model or an identification against an experiment, with the
-        residual and the 95 % band that the covariance of the model gives the prediction; a
-        diagnosis as the gap before and after.
+        Records are drawn against time and as loops; a model or an identification together with an experiment, with the
+        residual and the 95 % band of the prediction; a diagnosis as the gap before and after.
     experiment : Experiment, optional
-        What a model or an identification is compared with; the state is carried from phase to phase.
+        Experiment for a model or an identification; the state continues from phase to phase.
 
     Returns
     -------
     Drawing
-        With caption, data and a `matplotlib` figure.
+        Caption, data and a `matplotlib` figure.
 
     Raises
     ------
     RecordError
-        If a model comes without an experiment, or a diagnosis has nothing to draw.
+        If a model is given without an experiment, or a diagnosis has nothing to draw.
     """
     if isinstance(what, Record):
         return preview(Experiment((what,)))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Numbers of a model over the recalibrations of its stage."""
+"""Parameters of a model over the recalibrations of its stage."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .figures.style import MEASURED, RESIDUAL, canvas, styled
 
 @styled
 def recalibrations(numbers: Sequence[RecalibratedNumber]) -> Drawing:
-    """One panel for every number, with its intervals, and the residual before and after.
+    """One panel for every parameter with its intervals, and the residual before and after.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def recalibrations(numbers: Sequence[RecalibratedNumber]) -> Drawing:
         If nothing has been recalibrated.
     """
     if not numbers:
-        raise RecordingError("the history holds no recalibration, expected at least one")
+        raise RecordingError("the history contains no recalibration, expected at least one")
     names = list(dict.fromkeys(number.parameter for number in numbers))
     figure, axes = canvas(len(names) + 1, 1, 1.6 + 1.7 * len(names), sharex=True)
     times = np.array([datetime.fromisoformat(n.time).replace(tzinfo=None) for n in numbers], dtype="datetime64[s]")
@@ -61,8 +61,8 @@ def recalibrations(numbers: Sequence[RecalibratedNumber]) -> Drawing:
     return Drawing(
         "recalibrations",
         "Recalibrations",
-        "Numbers of the model over time, with 95 % intervals, and the RMS residual before and after every "
-        "recalibration beside that of the baseline.",
+        "Parameters of the model over time with 95 % intervals, and the RMS residual before and after every "
+        "recalibration, compared with that of the baseline.",
         f"{len(numbers)} changes of {len(names)} numbers; the last one at {last.time}: {last.parameter} from "
         f"{last.old:.6g} to {last.new:.6g} {last.unit}.",
         figure,

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`write_rerun`: an experiment, and what a model predicts of it, as a file for the Rerun viewer with a blueprint."""
+"""`write_rerun`: an experiment and the prediction of a model, as a file for the Rerun viewer with a blueprint."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from .words import duration, nanometre
 Array = NDArray[np.float64]
 
 APPLICATION = "piezo_hysteresis"
-"""Name under which the viewer keeps what the user has arranged."""
+"""Name under which the viewer stores the user's layout."""
 
 TIMELINE = "time"
 """Timeline of the file: time since the start of the experiment."""
 
 LOOP_POINTS = 4000
-"""Points of one loop at most."""
+"""Largest number of points of a loop."""
 
 SERIES = {
     "voltage": ("drive voltage [V]", GREY),
@@ -57,7 +57,7 @@ def write_rerun(comparison: ModelComparison, path: str | Path, title: str) -> No
     Parameters
     ----------
     comparison : ModelComparison
-        The experiment, and the model held against it, if there is one.
+        The experiment, and the model if there is one.
     path : str or Path
         The new file.
     title : str

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The verdict in plain words, before any figure."""
+"""The verdict as text, at the top of the page."""
 
 from __future__ import annotations
 

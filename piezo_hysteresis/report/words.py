@@ -21,7 +21,7 @@ USELESS, POOR = 30.0, 3.0
 
 
 def nanometre(metres: float) -> str:
-    """A length for reading: nm below a micrometre, else µm.
+    """A length as text: in nm below a micrometre, otherwise in µm.
 
     >>> nanometre(1.234e-8), nanometre(2.5e-6)
     ('12.3 nm', '2.5 µm')
@@ -30,7 +30,7 @@ def nanometre(metres: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time for reading.
+    """A time as text.
 
     >>> duration(2e-5), duration(0.25), duration(175.0)
     ('20 µs', '250 ms', '175 s')

@@ -57,7 +57,7 @@ def test_hum_counts_time_from_the_start_of_the_record() -> None:
 
 
 def test_hum_needs_both_parts_of_every_harmonic() -> None:
-    with pytest.raises(ParameterError, match="equally many"):
+    with pytest.raises(ParameterError, match="the same number"):
         MainsHum(cosine=[0.0], sine=[0.0, 0.0])
 
 

@@ -162,7 +162,7 @@ def test_a_recording_that_ends_its_process_costs_one_row(recordings, run, rows):
     assert run(recordings / "stage_b", Wait(0.01)) == {"done": 2, "killed": 1}
     (lost,) = [row for row in rows() if row["status"] == "killed"]
     assert lost["recording"].endswith("2026-12-01")
-    assert "ended at every try" in lost["error"]
+    assert "ended in every attempt" in lost["error"]
 
 
 def test_no_row_is_lost_or_doubled_when_workers_are_killed(tmp_path, client):

@@ -14,9 +14,9 @@
 
 """`Results`: the folder of results, a table in Parquet that always holds one row per recording and task.
 
-Rows are first written as small parts beside the merged file of their partition; every file appears whole under its name
-or not at all. Parts are merged from time to time and at the end. A run that was killed leaves parts, or a part whose
-rows are merged already; the next run puts that right before it begins.
+Rows are first written as small parts in the folder of their partition. Every file is written atomically. Parts are
+merged from time to time and at the end. A killed run may leave parts, or parts whose rows are merged already; the next
+run repairs this before it begins.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ from ..extra import package
 from .schema import PARTITIONS, schema
 
 MERGED = "rows.parquet"
-"""The file of a partition after its parts were merged."""
+"""File of a partition with merged parts."""
 MOST_PARTS = 20
-"""Parts of a partition from which they are merged."""
+"""Number of parts of a partition from which they are merged."""
 INDEX = (
     "recording", "task", "status", "data_hash", "code_hash", "settings_hash", "version", "time_limit_s", "finished_at",
 )  # fmt: skip
-"""Columns that tell whether a recording has to be worked on again."""
+"""Columns that decide whether a recording has to be processed again."""
 
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What the results hold about a recording."""
+    """Known data of a recording in the results."""
 
     status: str
     data_hash: str
@@ -67,7 +67,7 @@ class Results:
     Parameters
     ----------
     folder : Path
-        Made where it does not exist.
+        Folder of the results; it is created if it does not exist.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -79,19 +79,19 @@ class Results:
         self._lock = -1
 
     def __enter__(self) -> Self:
-        """Lock the folder, read what it holds, and put right what a run that was killed has left.
+        """Lock the folder, read it, and repair the remains of a killed run.
 
         Raises
         ------
         RecordingError
-            If another process works on it, or it cannot be read or written.
+            If another process uses it, or it cannot be read or written.
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._lock = os.open(self.folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise RecordingError(f"{self.folder}: another process writes results there; wait for its end") from None
+            raise RecordingError(f"{self.folder}: another process writes results there; wait until it ends") from None
         except OSError as error:
             raise RecordingError(f"{self.folder}: {error.strerror or error}, expected a folder for results") from None
         for draft in self.folder.glob("stage=*/month=*/.*.tmp"):
@@ -106,7 +106,7 @@ class Results:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Write what is left, merge, unlock."""
+        """Write the remaining rows, merge, unlock."""
         try:
             self.flush()
             self.merge()
@@ -114,16 +114,16 @@ class Results:
             os.close(self._lock)
 
     def add(self, row: Row) -> None:
-        """Take a row; it replaces the one of the same recording and task. It is on disk after `flush`."""
+        """Add a row; it replaces the row of the same recording and task. It is on disk after `flush`."""
         self._new.append(row)
 
     @property
     def waiting(self) -> int:
-        """Rows that are not on disk yet."""
+        """Number of rows that are not on disk yet."""
         return len(self._new)
 
     def flush(self) -> None:
-        """Write the rows that were taken."""
+        """Write the added rows."""
         groups: dict[Path, list[Row]] = defaultdict(list)
         for row in self._new:
             names = (f"{column}={quote(str(row[column]), safe='')}" for column in PARTITIONS)
@@ -140,12 +140,12 @@ class Results:
             self._merge(place)
 
     def merge(self) -> None:
-        """One file for every partition, without rows that were replaced."""
+        """Merge every partition into one file, without replaced rows."""
         for place in sorted(self._changed):
             self._merge(place)
 
     def rows(self, recordings: Iterable[tuple[str, str]]) -> Iterator[Row]:
-        """The whole rows of recordings, as (task, recording)."""
+        """The complete rows of recordings, given as (task, recording)."""
         wanted: dict[Path, set[tuple[str, str]]] = defaultdict(set)
         for identity in recordings:
             wanted[self.known[identity].file].add(identity)
@@ -211,14 +211,14 @@ def read_results(folder: Path, columns: list[str] | None = None) -> Any:
     Parameters
     ----------
     folder : Path
-        Written by `Results`.
+        Folder written by `Results`.
     columns : list of str, optional
-        All by default.
+        Columns to read; default: all.
 
     Raises
     ------
     RecordingError
-        If the folder holds no results.
+        If the folder contains no results.
     """
     pa = package("pyarrow")
     tables = []

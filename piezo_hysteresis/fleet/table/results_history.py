@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The results of a folder as the history that the page shows."""
+"""The results of a folder as the history for the page."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def results_history(folder: Path, task: str) -> FleetHistory:
     Parameters
     ----------
     folder : Path
-        Written by `Results`.
+        Folder written by `Results`.
     task : str
-        Which rows.
+        Task of the rows.
 
     Raises
     ------
     RecordingError
-        If there are none.
+        If there are no such rows.
     """
     rows = [row for row in read_results(folder, COLUMNS).to_pylist() if row["task"] == task]
     if not rows:

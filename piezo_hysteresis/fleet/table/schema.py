@@ -22,7 +22,7 @@ from typing import Any
 from ..extra import package
 
 PARTITIONS = ("stage", "month")
-"""Columns that stand in the names of the folders."""
+"""Columns that are stored in the names of the folders."""
 
 
 @cache

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Frequency response: the empirical one with its uncertainty, the model's through the same estimator, and G alone."""
+"""Frequency response: measured with its uncertainty, of the model by the same estimator, and of G alone."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ from .style import PREDICTED, canvas, handles_of, legend_above, plain_log, style
 Array = NDArray[np.float64]
 
 POINTS = 48
-"""Frequencies drawn per level."""
+"""Number of frequencies drawn per level."""
 COHERENT = 0.5
-"""Lines of less coherence are left out."""
+"""Smallest coherence of a line that is drawn."""
 GAP = 8
-"""Incoherent lines in a row at which the drive is taken to end."""
+"""Number of consecutive incoherent lines after which the drive has no power."""
 EDGE = 20
-"""Lines with which the last one is compared; it is left out where it is three times as uncertain."""
+"""Number of lines with which the last one is compared; it is left out if it is three times as uncertain."""
 
 
 @styled
 def bode(comparison: ModelComparison) -> Drawing | None:
-    """Gain and phase from drive to displacement, from the noise phases or what replaces them."""
+    """Gain and phase from drive to displacement, from the noise phases or other broadband phases."""
     levels = _levels(comparison)
     if not levels:
         return None
@@ -97,10 +97,10 @@ def bode(comparison: ModelComparison) -> Drawing | None:
         "bode",
         "Frequency response",
         (
-            "Frequency response from drive to displacement, hysteresis included, averaged over "
+            "Frequency response from drive to displacement, including hysteresis, averaged over "
             "segments. The bars are ± 2σ. Dashed: the model, estimated in the same way. Dotted: G "
             "alone, times the slope of the loop at a turning point. At low frequency the measured "
-            "response departs from this line, because noise of larger amplitude shows more hysteresis. "
+            "response differs from this line, because noise of larger amplitude shows more hysteresis. "
             "If two amplitudes of noise disagree, the stage has hysteresis, backlash or a gain that "
             "depends on amplitude."
         ),
@@ -111,7 +111,7 @@ def bode(comparison: ModelComparison) -> Drawing | None:
 
 
 def _levels(comparison: ModelComparison) -> list[tuple[float, list[int]]]:
-    """Broadband records of one sample period, grouped by the rms of their drive; at most two groups, largest first."""
+    """Broadband records of one sample period, grouped by the RMS of their drive; at most two groups, largest first."""
     for phases in (("noise",), ("multisine",), ("chirp",), ("validation",)):
         members = comparison.indices(*phases)
         if members:
@@ -133,7 +133,7 @@ def _levels(comparison: ModelComparison) -> list[tuple[float, list[int]]]:
 
 
 def _middle(samples: Array) -> Array:
-    """Without the ways from and to the safe voltage."""
+    """Samples without the ramps from and to the safe voltage."""
     edge = samples.size // 4
     return samples[edge : samples.size - edge]
 
@@ -158,10 +158,10 @@ def _spread(found: FrequencyResponse) -> NDArray[np.intp]:
     """Indices of coherent lines, about equally spaced on a logarithmic axis."""
     (good,) = np.nonzero(found.coherence > COHERENT)
     good = good[good > 0] if good.size > 2 else np.arange(1, found.frequency.size)
-    # by chance single lines of pure noise look coherent: stop at the first wide gap
+    # single lines of pure noise can be coherent by chance, so stop at the first wide gap
     (gaps,) = np.nonzero(np.diff(good) > GAP)
     good = good[: gaps[0] + 1] if gaps.size else good
-    # at the edge of the band of the drive single lines are left that say nothing
+    # single lines at the edge of the band of the drive are not reliable
     while good.size > EDGE and found.deviation[good[-1]] > 3.0 * np.median(found.deviation[good[-EDGE:-1]]):
         good = good[:-1]
     wanted = np.geomspace(found.frequency[good[0]], found.frequency[good[-1]], POINTS)

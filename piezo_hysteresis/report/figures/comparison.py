@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ModelComparison`: an experiment and the models it is compared with; the last one is reported."""
+"""`ModelComparison`: an experiment and the models that are compared with it; the last one is reported."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ class ModelComparison:
     experiment : Experiment
         The measurement.
     models : mapping of str to Model
-        Label to model, in the order in which the model grew; may be empty.
+        Models by label, in the order in which effects were added; may be empty.
     errors : mapping of str to Errors
         Free-run errors of every model.
     noise : (r,) ndarray
         Noise of every record at its own sample period [m].
     floors : (r,) ndarray
-        Residual of every record below which nothing is left to explain [m].
+        Noise floor of every record [m].
     bands : tuple of (n,) ndarray, optional
-        Half of the 95 % prediction band of the model that is reported, per record [m]; None where it was not asked for.
+        Half of the 95 % prediction band of the reported model, per record [m]; None if it was not requested.
     """
 
     experiment: Experiment
@@ -61,36 +61,36 @@ class ModelComparison:
 
     @property
     def floor(self) -> float:
-        """Floor of all judged records together, each counting the same [m]."""
+        """Noise floor of all judged records together, with equal weights [m]."""
         floors = self.floors if self.now is None else self.floors[[row.index for row in self.now.judged]]
         return float(np.sqrt(np.mean(floors**2)))
 
     @property
     def label(self) -> str | None:
-        """Label of the model that is reported, None where there is no model."""
+        """Label of the reported model; None without a model."""
         return list(self.models)[-1] if self.models else None
 
     @property
     def model(self) -> Model | None:
-        """The model that is reported."""
+        """The reported model."""
         return None if self.label is None else self.models[self.label]
 
     @property
     def now(self) -> Errors | None:
-        """Errors of the model that is reported."""
+        """Errors of the reported model."""
         return None if self.label is None else self.errors[self.label]
 
     @property
     def before(self) -> Errors | None:
-        """Errors of the model that growth began with, None where it did not grow."""
+        """Errors of the first model; None if there is only one."""
         return self.errors[next(iter(self.models))] if len(self.models) > 1 else None
 
     def drawn(self) -> list[int]:
-        """Numbers of the records to draw: those whose start is known, or all where none is or no model is given."""
+        """Indices of the records to draw: those with known initial state; all, if there is none or no model."""
         return list(range(len(self.experiment))) if self.now is None else [row.index for row in self.now.judged]
 
     def indices(self, *phases: str) -> list[int]:
-        """Numbers of the records whose phase name is, or begins with, one of `phases`."""
+        """Indices of the records whose phase name is, or begins with, one of `phases`."""
         return [i for i, r in enumerate(self.experiment) if r.phase in phases or r.phase.split("_")[0] in phases]
 
 
@@ -108,13 +108,13 @@ def compare(
     experiment : Experiment
         The measurement.
     models : mapping of str to Model, optional
-        Label to model, the one to report last.
+        Models by label; the last one is reported.
     nuisances : mapping of str to Nuisance, optional
-        Label to what is free per record, as for `errors`; for the others one zero of the sensor is free.
+        Disturbances that are free in every record, by label, as for `errors`; for other models one sensor zero is free.
     record_floors : sequence of float, optional
-        Floor of every record [m] where a diagnosis has found it.
+        Noise floor of every record [m], if a diagnosis has computed it.
     with_band : bool
-        Whether the 95 % prediction band of the last model is computed, where the model states a covariance.
+        Whether the 95 % prediction band of the last model is computed, if the model has a covariance.
     """
     models, nuisances = dict(models or {}), nuisances or {}
     records = experiment.records
@@ -134,7 +134,7 @@ def compare(
 
 
 def compare_diagnosis(found: Diagnosis) -> ModelComparison:
-    """The experiment of a diagnosis, with the model before and, where an effect was named, after it."""
+    """The experiment of a diagnosis, with the model before and, if an effect was named, after it."""
     models = {}
     if found.baseline is not None:
         models["before"] = found.baseline

@@ -29,13 +29,13 @@ from .style import BEFORE, MEASURED, PREDICTED, canvas, plain_log, styled
 Array = NDArray[np.float64]
 
 LONGEST_RAMP = 0.3
-"""Changes of level that take longer [s] are no start of a hold."""
+"""Longest change of level before a hold [s]."""
 SHORTEST_HOLD = 0.5
-"""Holds shorter than this [s] show no creep."""
+"""Shortest hold that shows creep [s]."""
 REFERENCE = 0.1
-"""Time after the change of level at which creep counts as zero [s]."""
+"""Time after the change of level at which creep is defined as zero [s]."""
 POINTS = 60
-"""Times drawn."""
+"""Number of times drawn."""
 
 
 @styled
@@ -80,7 +80,7 @@ def creep(comparison: ModelComparison) -> Drawing | None:
         (
             f"Mean over {len(holds)} holds of at least {SHORTEST_HOLD} s after a change of level, set "
             f"to zero at {REFERENCE} s. Logarithmic creep is a straight line here. Drift bends the line "
-            "upwards at long times. A stage without both gives a flat line."
+            "upwards at long times. A stage without creep and drift gives a flat line."
         ),
         "Creep: " + "; ".join(descriptions) + ".",
         figure,
@@ -105,7 +105,7 @@ def _holds(record: Record, index: int) -> list[tuple[int, int, int, float]]:
 
 
 def _curve(record: Record, y: Array, start: int, end: int, time: Array) -> Array:
-    """Creep in % at the times wanted for one change of level."""
+    """Creep in % at given times after one change of level."""
     stop = min(record.size, end + int(1.05 * time[-1] / record.sample_period) + 2)
     t, part = record.sample_period * np.arange(1, stop - end + 1), y[end:stop]
     edges = np.concatenate(([time[0] / 1.1], np.sqrt(time[1:] * time[:-1]), [time[-1] * 1.1]))

@@ -44,13 +44,13 @@ class Drawing:
     title : str
         Heading.
     caption : str
-        What is drawn and what to look for.
+        Explanation of the figure.
     alternative : str
-        What a reader learns who cannot see the figure.
+        Text with the result for readers who cannot see the figure.
     figure : Figure
         The picture.
     data : mapping of str to (n,) ndarray
-        Columns drawn, named with units; of equal length or not.
+        Data of the figure as columns with units in their names; lengths may differ.
     """
 
     name: str
@@ -63,13 +63,13 @@ class Drawing:
     def __post_init__(self) -> None:
         with mpl.rc_context(SETTINGS):
             self.figure.draw_without_rendering()
-        self.figure.set_layout_engine("none")  # found once, kept for every format
+        self.figure.set_layout_engine("none")  # computed once, the same for every format
 
     def __repr__(self) -> str:
         return f"Drawing({self.name}: {self.alternative})"
 
     def svg(self) -> str:
-        """The figure as SVG text, the same for the same data."""
+        """The figure as SVG text, identical for identical data."""
         stream = io.StringIO()
         with mpl.rc_context({**SETTINGS, "svg.hashsalt": self.name}):
             self.figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
@@ -79,7 +79,7 @@ class Drawing:
         return self.svg()
 
     def csv(self) -> str:
-        """The numbers drawn; shorter columns end early."""
+        """The data of the figure as CSV; shorter columns end early."""
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(self.data)
@@ -89,12 +89,12 @@ class Drawing:
         return stream.getvalue()
 
     def save_picture(self, path: str | os.PathLike[str]) -> None:
-        """Write the figure alone, in the format that the ending of the path names.
+        """Write the figure in the format given by the ending of the path.
 
         Raises
         ------
         RecordingError
-            If the ending names none, or the file cannot be written.
+            If the ending is not known, or the file cannot be written.
         """
         if (ending := Path(path).suffix).lower() not in (".png", ".svg", ".pdf"):
             raise RecordingError(f"{path}: got the ending '{ending}', expected .png, .svg or .pdf")

@@ -33,14 +33,14 @@ from .thinning import thinned
 Array = NDArray[np.float64]
 
 CLOSED = 0.25
-"""A curve is no loop if its ends are farther apart than this share of its height."""
+"""Largest distance between the ends of a loop, as a share of its height."""
 PANELS = 6
-"""Most loops in one figure."""
+"""Largest number of loops in one figure."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """One way up and down of the drive in a record, between two samples of equal drive."""
+    """One rise and fall of the drive in a record, between two samples of equal drive."""
 
     index: int
     part: slice
@@ -48,14 +48,14 @@ class Cycle:
 
 
 def cycles(record: Record, index: int = 0) -> list[Cycle]:
-    """Cycles of a drive between its troughs; wiggles below 5 % of its span do not count.
+    """Cycles of a drive between its minima; changes below 5 % of its range are ignored.
 
     Parameters
     ----------
     record : Record
-        Its drive is cut; the way down to the first trough and up from the last one are no cycles.
+        Record whose drive is cut; the parts before the first and after the last minimum are not cycles.
     index : int
-        Number of the record, handed on to the cycles.
+        Index of the record, stored in the cycles.
     """
     u = record.voltage
     span = float(np.ptp(u))
@@ -67,7 +67,7 @@ def cycles(record: Record, index: int = 0) -> list[Cycle]:
 
 
 def _closed(u: Array, first: int, last: int, index: int) -> Cycle:
-    """The part between two troughs that begins and ends at the drive of the higher one."""
+    """The part between two minima that begins and ends at the drive of the higher one."""
     peak = first + int(np.argmax(u[first : last + 1]))
     level = max(u[first], u[last])
     start = first + int(np.flatnonzero(u[first : peak + 1] <= level)[-1])
@@ -76,13 +76,13 @@ def _closed(u: Array, first: int, last: int, index: int) -> Cycle:
 
 
 def _closes(record: Record, cycle: Cycle) -> bool:
-    """False where the stage comes from elsewhere: the first way of a record, with its transient, is no loop."""
+    """False if the curve is not closed, as in the first cycle of a record with its transient."""
     y = record.displacement[cycle.part]
     return abs(float(y[-1] - y[0])) < CLOSED * float(np.ptp(y))
 
 
 def opening(voltage: Array, displacement: Array) -> float:
-    """Width of a loop halfway up, in % of its height; NaN where a branch has too few samples there."""
+    """Width of a loop at half its height, in % of the height; NaN if a branch has too few samples there."""
     peak = int(np.argmax(voltage))
     middle, height = (voltage.max() + voltage.min()) / 2, float(np.ptp(displacement))
     ways = []
@@ -122,7 +122,7 @@ def loops_by_amplitude(comparison: ModelComparison) -> Drawing | None:
         (
             "Slow loops, one panel per amplitude of the drive. The dashed line (model) should cover "
             "the solid line (measured). The opening is the width of the loop at half its height, in "
-            "per cent of the height. Beneath: measured minus predicted over the same drive."
+            "% of the height. Below: measured minus predicted over the same drive."
         ),
     )
 
@@ -148,7 +148,7 @@ def loops_by_frequency(comparison: ModelComparison) -> Drawing | None:
         "Loops by frequency",
         (
             "The last full cycle of every sine. The slowest loop shows the hysteresis. With frequency, "
-            "the lag of amplifier, mechanics and sensor opens the loops further. Beneath: measured minus "
+            "the lag of amplifier, mechanics and sensor opens the loops further. Below: measured minus "
             "predicted over the same drive."
         ),
     )
@@ -165,7 +165,7 @@ def _steady(record: Record, cycle: Cycle, frequency: float) -> bool:
 
 
 def _residual_against_drive(axis: Any, u: Array, residual: Array, bound: float) -> None:
-    """Both ways of a loop [V, nm], with ± twice the floor."""
+    """Residual of both branches of a loop [V, nm], with ± twice the noise floor."""
     peak = int(np.argmax(u))
     for way, word, style in ((slice(0, peak + 1), "rising", RESIDUAL), (slice(peak, u.size), "falling", BEFORE)):
         at = thinned(residual[way], 300)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Preview of a recording that was read: drive and displacement against time, and one against the other."""
+"""Preview of a recording: drive and displacement against time, and displacement against drive."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from .style import MEASURED, canvas, styled
 from .thinning import thinned
 
 POINTS = 1500
-"""Points drawn of a record."""
+"""Number of points drawn of a record."""
 
 
 @styled
 def preview(experiment: Experiment) -> Drawing:
-    """Two panels against time with the names of the phases, and the loops beside them.
+    """Two panels against time with the names of the phases, and a panel with the loops.
 
     Parameters
     ----------
     experiment : Experiment
-        As it was read.
+        The recording after reading.
     """
     figure, axes = canvas(2, 2, 4.2, gridspec_kw={"width_ratios": [2.2, 1.0]})
     (drive, loop), (motion, rest) = axes

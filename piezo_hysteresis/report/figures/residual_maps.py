@@ -29,11 +29,11 @@ from .style import canvas, handles_of, legend_above, styled
 Array = NDArray[np.float64]
 
 PER_RECORD = 20_000
-"""Samples of every record that enter, so that no phase drowns the others."""
+"""Number of samples of every record, so that all phases have equal weight."""
 BINS = 24
-"""Bins along an axis."""
+"""Number of bins along an axis."""
 DECADES = 30.0
-"""Rates that span less than this from the slowest to the fastest are drawn on a linear axis."""
+"""Smallest ratio of the fastest to the slowest rate for a logarithmic axis."""
 
 
 @styled
@@ -62,7 +62,7 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
             positive = np.geomspace(slow, max(fast, 2.0 * slow), BINS // 2)
             edges = np.concatenate((-positive[::-1], positive))
         else:
-            axis.xaxis.set_major_locator(MaxNLocator(4, prune="both"))  # the numbers of neighbours are close
+            axis.xaxis.set_major_locator(MaxNLocator(4, prune="both"))  # avoids overlapping labels of neighbouring axes
             edges = np.linspace(values.min(), max(values.max(), values.min() + 1e-9), BINS + 1)
         fine = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b in zip(edges, edges[1:], strict=False)]))
         counts, xs, ys = np.histogram2d(values, e, bins=(fine, np.linspace(-limit, limit, 101)))
@@ -82,7 +82,7 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
         "residual_maps",
         "Residual against drive, displacement and rate",
         (
-            "Grey: how often a residual occurs, on a logarithmic scale, all phases with equal weight, "
+            "Grey: frequency of a residual on a logarithmic scale. All phases have equal weight, "
             "except those that begin in an unknown state. "
             "If the mean differs from zero, something is missing in the model. A mean that bends over "
             "u or y is a static nonlinearity. A mean that differs between rising and falling drive is "
@@ -108,7 +108,7 @@ def _samples(comparison: ModelComparison) -> list[tuple[Array, Array, Array, Arr
 
 
 def _means(values: Array, e: Array, edges: Array, mask: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Mean of e in every bin with at least 30 samples: the centres of the samples, and the means."""
+    """Mean of e in every bin with at least 30 samples: mean positions of the samples, and means of e."""
     place = np.clip(np.digitize(values[mask], edges) - 1, 0, edges.size - 2)
     count = np.bincount(place, minlength=edges.size - 1)
     good = count >= 30

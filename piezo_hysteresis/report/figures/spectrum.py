@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Spectrum of the residual beside the noise."""
+"""Spectrum of the residual and of the noise."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from .style import BEFORE, FLOOR, MEASURED, PREDICTED, canvas, handles_of, legen
 Array = NDArray[np.float64]
 
 PANELS = 3
-"""Most sample periods drawn."""
+"""Largest number of sample periods drawn."""
 
 
 @styled
 def residual_spectrum(comparison: ModelComparison) -> Drawing | None:
-    """Amplitude density of displacement, residual and floor, one panel per sample period of the experiment."""
+    """Amplitude density of displacement, residual and noise floor, one panel per sample period of the experiment."""
     now, before = comparison.now, comparison.before
     if now is None:
         return None

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The averaged step response, near its onset and as a whole, with the delay."""
+"""The averaged step response with the delay, near its onset and complete."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from .drawing import Drawing
 from .style import MEASURED, PREDICTED, canvas, styled
 
 ZOOM = 24
-"""Samples drawn around the onset."""
+"""Number of samples drawn around the onset."""
 
 
 @styled

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How every figure on paper looks: colours of `palette`, line styles that survive a grey print.
+"""Style of all figures on paper: colours of `palette`, and line styles that can be distinguished in a grey print.
 
-What is measured is always the grey solid line, what is predicted the dashed one.
+The measurement is always the solid grey line, the prediction the dashed one.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 MEASURED: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.4}
-"""Line of what was measured."""
+"""Line of the measurement."""
 PREDICTED: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (4, 2)), "linewidth": 1.4}
-"""Line of what the model predicts."""
+"""Line of the prediction."""
 BEFORE: dict[str, Any] = {"color": BLUE, "linestyle": (0, (1, 1.2)), "linewidth": 1.4}
 """Line of the model before."""
 FLOOR: dict[str, Any] = {"color": GREY, "linestyle": (0, (6, 2, 1, 2)), "linewidth": 1.2}
@@ -71,7 +71,7 @@ WIDTH = 9.0
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """Draw with `SETTINGS`, whatever the process has set."""
+    """Draw with `SETTINGS`, independent of the settings of the process."""
 
     @wraps(draw)
     def inside(*args: P.args, **options: P.kwargs) -> R:
@@ -110,19 +110,19 @@ def legend_above(figure: Figure, handles: Mapping[str, Any], columns: int = 4) -
     Parameters
     ----------
     figure : Figure
-        Laid out with constraints; its panels give way.
+        Figure with constrained layout, which makes room for the legend.
     handles : mapping of str to Artist
-        Label to what it stands for.
+        Artists by label.
     columns : int
-        At most so many side by side.
+        Largest number of columns.
     """
     legend = figure.legend(handles.values(), handles.keys(), loc="upper center", ncols=min(columns, len(handles)))
-    # loc="outside upper center" would do, but ROS 2 Jazzy comes with Matplotlib 3.6
+    # loc="outside upper center" does not exist in Matplotlib 3.6 of ROS 2 Jazzy
     taken = legend.get_window_extent().height / figure.bbox.height
     figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - taken - 0.01))
 
 
 def handles_of(axes: Axes) -> dict[str, Any]:
-    """Label to what it stands for, in the order of drawing."""
+    """Artists by label, in the order of drawing."""
     handles, labels = axes.get_legend_handles_labels()
     return dict(zip(labels, handles, strict=True))

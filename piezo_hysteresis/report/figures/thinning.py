@@ -28,7 +28,7 @@ def thinned(values: NDArray[np.float64], points: int = 1200) -> NDArray[np.intp]
     values : (n,) ndarray
         Samples that will be drawn as a line.
     points : int
-        About how many indices to return.
+        Approximate number of indices.
 
     Examples
     --------

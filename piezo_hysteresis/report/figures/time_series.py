@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Every kind of phase against time: measured, predicted, and the residual below."""
+"""Every kind of phase against time: measurement and prediction, and the residual below."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ from .thinning import thinned
 Array = NDArray[np.float64]
 
 COLUMNS = 3
-"""Panels beside one another."""
+"""Number of panels in a row."""
 PANELS = 12
-"""Most phases drawn."""
+"""Largest number of phases drawn."""
 TURNS = 16
-"""Turning points of the drive that one panel can show."""
+"""Largest number of turning points of the drive in one panel."""
 
 BAND = (
-    " The band is what the data leave open of the parameters, 95 %: a residual that leaves the band by more than the "
-    "noise belongs to an effect that the model does not have."
+    " The band is the 95 % uncertainty of the prediction from the parameters. A residual outside the band by more than "
+    "the noise shows an effect that the model does not contain."
 )
-"""Sentence of the caption where a prediction band is drawn."""
+"""Sentence of the caption if a prediction band is drawn."""
 
 
 def window(record: Record, residual: Array | None) -> slice:
     """The part of a record to draw.
 
-    All of it, or as many turning points of the drive as can be distinguished: in the middle half of the record, where
-    the drive is not on its way from or to rest, around the largest residual.
+    The whole record, or as many turning points of the drive as can be distinguished, around the largest residual in the
+    middle half of the record, without the ramps from and to rest.
     """
     quarter = record.size // 4
     middle = slice(quarter, record.size - quarter)
@@ -130,7 +130,7 @@ def time_series(comparison: ModelComparison) -> Drawing:
                 bottom.axhline(sign * 1e9 * comparison.floors[index], **FLOOR)
             data |= {f"predicted_m_{record.phase}": predicted[at], f"residual_time_s_{record.phase}": time[e_at]}
             data[f"residual_m_{record.phase}"] = e[e_at]
-        for axis in {upper, bottom}:  # the numbers of a late window are long
+        for axis in {upper, bottom}:  # labels of a late window are long
             axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         bottom.set_xlabel(f"time in phase [{unit}]")
         if column == 0:

@@ -41,7 +41,7 @@ def tracking(plan: Plan) -> Drawing:
     _line(axes[1, 0], time, plan.voltage, color="#444444")
     axes[1, 0].set_ylabel("drive voltage [V]")
     _line(axes[2, 0], along, 1e9 * error, color="#b03060")
-    axes[2, 0].set_ylabel("error planned [nm]")
+    axes[2, 0].set_ylabel("planned error [nm]")
     axes[2, 0].set_xlabel("time from the start of the path [s]")
     for part in plan.reachability.parts:
         for axis in axes[:, 0]:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The standard residual tests, drawn with their bounds."""
+"""The standard residual tests with their bounds."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from .style import canvas, styled
 from .thinning import thinned
 
 SHARE = 40
-"""The largest lag drawn is one part in so many of the record."""
+"""Ratio of the length of the record to the largest lag drawn."""
 WIDE = 0.1
-"""Bound of the cross-correlation above which nothing found beyond it says little."""
+"""Bound of the cross-correlation above which the test can only exclude a strong dependence."""
 
 
 @styled

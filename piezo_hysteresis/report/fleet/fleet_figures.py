@@ -32,17 +32,17 @@ from .history import FleetHistory
 from .outliers import OutlyingStage
 
 PANELS = 6
-"""Most parameters drawn."""
+"""Largest number of parameters drawn."""
 POINTS = 1500
-"""Most recordings drawn in a panel."""
+"""Largest number of recordings drawn in a panel."""
 STAGES = 30
-"""Most stages drawn, the worst."""
+"""Largest number of stages drawn; the worst ones are drawn."""
 _MARKS = ((ORANGE, "o"), (BLUE, "s"), (GREEN, "^"), (PURPLE, "D"), (SKY, "v"))
-"""Colour and mark of the stages that are drawn apart."""
+"""Colours and marks of the stages with a separate colour."""
 
 
 def apart(history: FleetHistory, outliers: Sequence[OutlyingStage]) -> tuple[str, ...]:
-    """The stages that get a colour: all where they are few, else the farthest."""
+    """The stages with a separate colour: all if there are few, otherwise the most outlying ones."""
     if len(history.stages) <= len(_MARKS):
         return history.stages
     return tuple(dict.fromkeys(o.stage for o in outliers))[: len(_MARKS)]
@@ -91,7 +91,7 @@ def parameters_over_time(history: FleetHistory, outliers: Sequence[OutlyingStage
     return Drawing(
         "parameters_over_time",
         "Parameters over time",
-        "One mark per recording, with its 95 % interval. Stages that lie apart have a colour of their own. The "
+        "One mark per recording, with its 95 % interval. Outlying stages have a separate colour. The "
         f"parameters in which stages differ most come first; at most {PANELS} are drawn.",
         f"{len(names)} parameters against the date of the recording: {', '.join(names)}.",
         figure,
@@ -101,7 +101,7 @@ def parameters_over_time(history: FleetHistory, outliers: Sequence[OutlyingStage
 
 @styled
 def errors_over_time(history: FleetHistory) -> Drawing | None:
-    """The free-run error of every recording, and when recordings had no result."""
+    """The free-run error of every recording, and the times of recordings without a result."""
     dated = ~np.isnat(history.time)
     known = dated & np.isfinite(history.error) & (history.error > 0.0)
     if not known.any():
@@ -128,7 +128,7 @@ def errors_over_time(history: FleetHistory) -> Drawing | None:
     return Drawing(
         "errors_over_time",
         "Error over time",
-        "Free-run error of every recording. Above the line the model class describes a recording poorly. Crosses are "
+        "Free-run error of every recording. Above the line, the model describes a recording poorly. Crosses are "
         "recordings without a result.",
         f"Errors of {int(known.sum())} recordings from {history.error[known].min():.2g} to "
         f"{history.error[known].max():.2g} % of range; {int(np.sum(dated & ~history.is_done))} have no result.",
@@ -168,8 +168,8 @@ def errors_by_stage(history: FleetHistory) -> Drawing | None:
     return Drawing(
         "errors_by_stage",
         "Error by stage",
-        "Median and largest free-run error of the recordings of a stage. A stage whose median is large has something "
-        "that the model class does not hold; a stage with one large error has one bad recording, or has changed.",
+        "Median and largest free-run error of the recordings of a stage. If the median is large, the model does not "
+        "contain an effect of the stage. If one error is large, a recording is bad, or the stage has changed.",
         f"Errors of {order.size} stages; the worst is {stages[order[0]]} with a median of {median[0]:.2g} % of range.",
         figure,
         {"stage": stages[order], "median_percent_of_range": median, "largest_percent_of_range": most},
@@ -177,7 +177,7 @@ def errors_by_stage(history: FleetHistory) -> Drawing | None:
 
 
 def _worst(history: FleetHistory) -> tuple[str, ...]:
-    """The stages with most poor recordings; all where they are few."""
+    """The stages with the most poor recordings; all if there are few."""
     if len(history.stages) <= len(_MARKS):
         return history.stages
     poor = Counter(history.stage[history.error > POOR].tolist())
@@ -198,7 +198,7 @@ def _thinned(chosen: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _dates(axis: Any, time: NDArray[np.datetime64]) -> None:
-    """Label the time axis with dates; it spans two days at least."""
+    """Label the time axis with dates; it covers at least two days."""
     day, known = np.timedelta64(1, "D"), time[~np.isnat(time)]
     first, last = known.min(), known.max()
     margin = np.maximum((last - first) // 30, np.timedelta64(0, "D"))

@@ -34,7 +34,7 @@ FOOTER = (
     "Errors are those of free-run simulation, RMS over the peak-to-peak displacement of the recording. Intervals are "
     "those of one recording; differences between recordings of a stage may be larger."
 )
-"""How the numbers are to be read."""
+"""Explanation of the numbers."""
 
 
 def fleet_page(history: FleetHistory) -> Page:
@@ -43,7 +43,7 @@ def fleet_page(history: FleetHistory) -> Page:
     Parameters
     ----------
     history : FleetHistory
-        Of one task.
+        History of one task.
     """
     outliers = outlying_stages(history)
     candidates = {
@@ -75,12 +75,12 @@ def _sentences(history: FleetHistory, outliers: Sequence[OutlyingStage]) -> Iter
         named = ", ".join(f"{stage} ({count})" for stage, count in poor.most_common(5))
         yield f"Recordings with a larger error are most frequent at {named}; see piezo diagnose."
     elif errors.size:
-        yield "No stage needs another class of models."
+        yield "No stage needs another kind of model."
     if outliers:
         names = list(dict.fromkeys(o.stage for o in outliers))
         first = f"the first in {outliers[0].parameter}"
-        count = "One stage lies" if len(names) == 1 else f"{len(names)} stages lie"
-        yield f"{count} apart from the others: {', '.join(names[:5])}, {first}."
+        count = "One stage differs" if len(names) == 1 else f"{len(names)} stages differ"
+        yield f"{count} from the others: {', '.join(names[:5])}, {first}."
     lost = Counter(history.status[~history.is_done].tolist())
     if lost:
         words = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in lost.most_common())

@@ -28,21 +28,22 @@ from .history import FleetHistory
 from .outliers import FAR, OutlyingStage
 
 ROWS = 40
-"""Most rows of a table."""
+"""Largest number of rows of a table."""
 _NUMBERS = re.compile(r"\d+(\.\d+)?([eE][+-]?\d+)?")
-"""What differs between two messages of one kind."""
+"""Parts that differ between two messages of one kind."""
 
 
 def outlier_table(outliers: Sequence[OutlyingStage]) -> Table | None:
-    """The stages that lie apart, the farthest first."""
+    """The outlying stages, the farthest first."""
     if not outliers:
         return None
     rows = tuple(
         (o.stage, o.parameter, f"{o.value:.5g}", f"{o.typical:.5g}", o.unit, f"{o.distance:.1f}") for o in outliers
     )
     note = (
-        f"Distance of the median of a stage from the median of all stages, in standard deviations: more than {FAR:g}. "
-        "The deviation is that of the stages, from their median absolute deviation, and that of one recording."
+        f"Outlying: the median of the stage is more than {FAR:g} standard deviations from that of all stages. The "
+        "standard deviation combines the spread of the stages (from their median absolute deviation) and the standard "
+        "error of one recording."
     )
     header = ("stage", "parameter", "median", "all stages", "unit", "distance")
     return Table("Outlying stages", header, rows[:ROWS], note + _more(rows), frozenset({2, 3, 5}))
@@ -76,7 +77,7 @@ def stage_table(history: FleetHistory) -> Table:
 
 
 def failure_table(history: FleetHistory) -> Table | None:
-    """Why recordings have no result, the most frequent reason first, with one recording each."""
+    """Reasons of recordings without a result, the most frequent first, with one recording each."""
     groups: dict[tuple[str, str], list[int]] = {}
     for i in np.flatnonzero(~history.is_done):
         said = str(history.reason[i]).replace(str(history.recording[i]), "").strip(" :")
@@ -87,9 +88,9 @@ def failure_table(history: FleetHistory) -> Table | None:
         (status.replace("_", " "), f"{len(found)}", str(history.reason[found[0]]), str(history.recording[found[0]]))
         for (status, _), found in sorted(groups.items(), key=lambda item: -len(item[1]))
     )
-    header = ("status", "recordings", "reason, of one of them", "recording")
+    header = ("status", "recordings", "reason (example)", "recording")
     return Table("Recordings without a result", header, rows[:ROWS], _more(rows).strip(), frozenset({1}))
 
 
 def _more(rows: Sequence[object]) -> str:
-    return f" {len(rows) - ROWS} more rows are left out." if len(rows) > ROWS else ""
+    return f" {len(rows) - ROWS} more rows are not shown." if len(rows) > ROWS else ""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`FleetHistory`: what many recordings of many stages gave, as columns."""
+"""`FleetHistory`: the results of many recordings of many stages, as columns."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ParameterSeries:
-    """One parameter in the recordings that have it.
+    """One parameter in all recordings that contain it.
 
     Parameters
     ----------
     unit : str
         SI unit.
     index : (k,) ndarray of int
-        Which recordings.
+        Indices of the recordings.
     value, lower, upper : (k,) ndarray
-        Estimates and the ends of their 95 % intervals; the ends NaN where there is none.
+        Estimates and the ends of their 95 % intervals; NaN without an interval.
     """
 
     unit: str
@@ -54,17 +54,17 @@ class FleetHistory:
     Parameters
     ----------
     source : str
-        Where the results lie.
+        Location of the results.
     task : str
-        What was done with each recording.
+        Name of the task.
     recording, stage, status, verdict, reason : (n,) ndarray of str
-        Name, stage, what became of it, the verdict and the error text; the last two may be empty.
+        Name, stage, status, verdict and error message; the last two may be empty.
     time : (n,) ndarray of datetime64
-        When it was taken; NaT where that is not known.
+        Time of the recording; NaT if it is not known.
     error, floor : (n,) ndarray
-        Free-run error and its floor [% of range]; NaN where there is none.
+        Free-run error and noise floor [% of range]; NaN if there is none.
     parameters : mapping of str to ParameterSeries
-        By name; numbers of arrays (``arx.a[0]``) are left out, because single ones are not identifiable.
+        Parameters by name; elements of arrays (``arx.a[0]``) are left out, because they are not identifiable.
     """
 
     source: str
@@ -86,7 +86,7 @@ class FleetHistory:
 
     @property
     def is_done(self) -> NDArray[np.bool_]:
-        """Which recordings have a result, shape (n,)."""
+        """True for recordings with a result, shape (n,)."""
         return np.asarray(self.status == "done")
 
     @property

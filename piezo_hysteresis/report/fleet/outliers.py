@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`outlying_stages`: stages one of whose parameters lies far from those of the others."""
+"""`outlying_stages`: stages with a parameter that differs much from those of the other stages."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from .history import FleetHistory, ParameterSeries
 FAR = 3.5
 """Distance from which a stage is outlying, in standard deviations (Iglewicz and Hoaglin 1993, modified z-score)."""
 FEWEST = 4
-"""Stages from which a spread can be told."""
+"""Smallest number of stages for an estimate of their spread."""
 MAD = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
+"""Ratio of the standard deviation of a normal distribution to its median absolute deviation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +37,9 @@ class OutlyingStage:
     Parameters
     ----------
     stage, parameter, unit : str
-        Which, in what.
+        Name of the stage, name of the parameter and its unit.
     value : float
-        Median over its recordings.
+        Median over the recordings of the stage.
     typical : float
         Median over the stages.
     distance : float
@@ -56,7 +56,7 @@ class OutlyingStage:
 
 
 def outlying_stages(history: FleetHistory) -> tuple[OutlyingStage, ...]:
-    """The stages that are far from the others, the farthest first.
+    """The stages that differ from the others, the farthest first.
 
     Parameters
     ----------

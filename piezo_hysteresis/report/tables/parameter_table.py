@@ -24,18 +24,18 @@ from ...model.model import Model
 from .table import Table
 
 ALIKE = 0.95
-"""Correlation from which two numbers are hard to distinguish."""
+"""Correlation from which two parameters are hard to distinguish."""
 
 
 def parameter_table(model: Model, fit: Fit | None = None) -> Table:
-    """Every scalar of the model with its 95 % interval where a fit gave one; arrays in one row each.
+    """Every scalar parameter of the model, with its 95 % interval if it was fitted; arrays in one row each.
 
     Parameters
     ----------
     model : Model
-        Values, units, bounds and meanings.
+        Model with values, units, bounds and meanings.
     fit : Fit, optional
-        Fit of this model, for intervals and bounds hit; default: the intervals that the model file holds.
+        Fit of this model, for intervals and parameters at bounds; default: the intervals in the model file.
     """
     rows = []
     sure = _intervals(model, fit)
@@ -66,7 +66,7 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
 
 
 def _intervals(model: Model, fit: Fit | None) -> dict[str, float]:
-    """Half of the 95 % interval of every number that was fitted."""
+    """Half of the 95 % interval of every fitted parameter."""
     if fit is not None:
         return {n: 1.96 * s for n, s in fit.standard_errors.items()}
     known = model.covariance
@@ -76,7 +76,7 @@ def _intervals(model: Model, fit: Fit | None) -> dict[str, float]:
 
 
 def correlation_table(fit: Fit) -> Table | None:
-    """Pairs of fitted numbers whose estimates move together, the strongest first; ARX coefficients left out."""
+    """Pairs of fitted parameters with strongly correlated estimates, the strongest first; without ARX coefficients."""
     sure = fit.standard_errors
     names = [n for n in fit.names if sure[n] > 0.0 and not n.startswith((f"{Arx.name}.a", f"{Arx.name}.b"))]
     pairs = [(a, b, fit.correlation(a, b)) for i, a in enumerate(names) for b in names[:i]]

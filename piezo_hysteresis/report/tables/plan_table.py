@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A plan in words and for machines: terminal, page and JSON take the same numbers from here."""
+"""A plan as table, notes and JSON: terminal, page and JSON show the same numbers."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from ..words import nanometre
 from .table import Table
 
 MOST_PARTS = 3
-"""Parts of a path that are reported one by one."""
+"""Largest number of unreachable parts that are listed."""
 
 
 def plan_table(found: Plan) -> Table:
-    """Voltage, slew, duration, preview and the errors to expect."""
+    """Voltage, slew, duration, preview and the expected errors."""
     expected, span = found.expected, found.range
 
     def error(value: float | None) -> str:
@@ -84,7 +84,7 @@ def refusal(found: Plan) -> list[str]:
 
 
 def answer(found: Plan) -> dict[str, Any]:
-    """The plan for machines, in SI units."""
+    """The plan for the JSON file, in SI units."""
     nearest = found.reachability.nearest
     return {
         "schema": 1,

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How likely every explanation was after each part of a live diagnosis."""
+"""Probability of every explanation after each decision of a live diagnosis."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from typing import Any
 from .table import Table
 
 MOST = 6
-"""Explanations shown, the likeliest at any time."""
+"""Largest number of explanations shown."""
 
 
 def shown_explanations(live: Mapping[str, Any], most: int = MOST) -> list[str]:
-    """Explanations that were likeliest at any time, best first; `live` as in ``answer.json``."""
+    """Explanations with the largest probabilities at any time, largest first; `live` as in ``answer.json``."""
     highest: dict[str, float] = {}
     for update in live["probabilities"]:
         for name, p in update["probabilities"].items():

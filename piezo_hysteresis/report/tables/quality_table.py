@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Tables of the data: what was recorded, and what was noticed about it."""
+"""Tables of the data: the records, and the findings about them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _NOTE = (
     "Lag is the delay of the displacement at the turning points of the drive (in samples). It "
     "comes from the dynamics or from a delayed channel."
 )
-"""How to read the column of lags."""
+"""Explanation of the column of lags."""
 
 
 def record_table(experiment: Experiment, noise: np.ndarray) -> Table:
@@ -86,7 +86,7 @@ def _lag(record: Record) -> str:
 
 
 def notice_table(experiment: Experiment) -> Table | None:
-    """What was noticed on reading, the severe first."""
+    """Findings about the data, the severe ones first."""
     if not experiment.notices:
         return None
     ordered = sorted(experiment.notices, key=lambda n: not n.severe)

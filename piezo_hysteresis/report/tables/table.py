@@ -21,20 +21,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table whose cells are already words.
+    """A table of text cells.
 
     Parameters
     ----------
     title : str
-        What the table holds.
+        Title of the table.
     header : tuple of str
         Column headings.
     rows : tuple of tuple of str
-        Cells; each row as long as the header.
+        Cells; each row has the length of the header.
     note : str
-        What the reader must know; may be empty.
+        Explanation under the table; may be empty.
     numeric : frozenset of int
-        Columns that are set flush right.
+        Right-aligned columns.
     """
 
     title: str

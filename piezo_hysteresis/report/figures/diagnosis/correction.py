@@ -28,17 +28,17 @@ from ..style import canvas, styled
 LABELS = {"m": (1e6, "µm"), "s": (1.0, "s"), "1": (1.0, "1"), "1/decade": (100.0, "%/decade")}
 """Factor and unit of an axis, by the unit of the values."""
 SMALL = (1e9, "nm")
-"""Those of deviations."""
+"""Factor and unit of deviations, by the unit of the values."""
 
 
 @styled
 def correction(answer: Mapping[str, Any]) -> Drawing | None:
-    """What an accepted correction does; None where there is none.
+    """The shape of an accepted correction; None if there is none.
 
     Parameters
     ----------
     answer : mapping
-        Answer of a diagnosis, as it is written for machines.
+        Answer of a diagnosis, as in the JSON file.
     """
     found = answer.get("unnamed_correction")
     if not found or not found["accepted"]:
@@ -54,8 +54,8 @@ def correction(answer: Mapping[str, Any]) -> Drawing | None:
     return Drawing(
         "correction",
         "Correction without a name",
-        "It describes what no effect of the catalogue explains, and does not say where it comes from. It holds only "
-        "inside of the voltages, frequencies and rates that were recorded.",
+        "The correction describes a residual that no effect of the catalogue explains. It does not state the cause. It "
+        "is valid only for voltages, frequencies and rates inside the recorded range.",
         f"Correction without a name as a function of the {found['depends_on']}. {found['reason']}",
         figure,
         {_column(x["name"], x_unit): along, _column(y["name"], y_unit): up},

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The error of every phase before and after, beside its floor."""
+"""The error of every phase before and after, and its noise floor."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ..style import canvas, handles_of, legend_above, plain_log, styled
 
 @styled
 def gap(comparison: ModelComparison) -> Drawing | None:
-    """Dots on a logarithmic axis: floor, error of the first model, error of the last one."""
+    """Dots on a logarithmic axis: noise floor, error of the first model, error of the last one."""
     now, before = comparison.now, comparison.before
     if now is None:
         return None
@@ -69,9 +69,9 @@ def gap(comparison: ModelComparison) -> Drawing | None:
         "gap",
         "Error by phase",
         (
-            "RMS error of every phase in free run. The floor is the noise of the sensor or 0.03 % of "
-            "the range, whichever is larger. An error inside of the grey bar is at the floor, or below it where "
-            "the sensor is better than 0.03 % of the range: it needs no further explanation."
+            "RMS error of every phase in free run. The noise floor is the noise of the sensor or 0.03 % of "
+            "the range, whichever is larger. An error inside the grey bar is at or below the noise floor and "
+            "needs no further explanation."
         ),
         f"Error by phase: {message}; worst in {worst}.",
         figure,

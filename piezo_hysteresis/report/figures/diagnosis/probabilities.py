@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How likely every explanation was, over the stage time of a live diagnosis."""
+"""Probability of every explanation over the stage time of a live diagnosis."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from ..drawing import Drawing
 from ..style import canvas, handles_of, legend_above, styled
 
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
-"""Of the explanations, the likeliest first."""
+"""Colours of the explanations, the likeliest first."""
 
 
 @styled
 def probabilities(live: Mapping[str, Any]) -> Drawing:
-    """Steps of the probabilities, and the level from which the answer is sure.
+    """Steps of the probabilities, and the level from which the answer is certain.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def probabilities(live: Mapping[str, Any]) -> Drawing:
         axes.plot(time[1:], 100.0 * p, marker="o", color=colour, label=name.replace("_", " "))
         data[name] = p
     sure = 100.0 * (1.0 - live["error_rate"])
-    axes.axhline(sure, color=GREY, linestyle="--", label=f"sure, {sure:g} %")
+    axes.axhline(sure, color=GREY, linestyle="--", label=f"certain, {sure:g} %")
     axes.set(xlabel="stage time [s]", ylabel="probability [%]", title="Probability of each explanation")
     axes.set_xlim(0.0, 1.05 * time[-1])
     axes.set_ylim(-3.0, 103.0)
@@ -57,7 +57,7 @@ def probabilities(live: Mapping[str, Any]) -> Drawing:
     return Drawing(
         "probabilities",
         "Probability of each explanation",
-        "After each part that was played, the gap finder computes how likely every explanation is. It stops when one "
+        "After each group of phases, the gap finder computes the probability of every explanation. It stops when one "
         "of them is above the dashed line.",
         f"Probabilities over {time[-1]:.1f} s of stage time. {live['reason']}",
         figure,
