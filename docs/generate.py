@@ -182,7 +182,7 @@ TABLES: dict[str, Callable[[], str]] = {
 
 
 def filled(text: str) -> str:
-    """A page with the tables between its marks made anew."""
+    """A page with new tables between its marks."""
     return MARKED.sub(lambda mark: mark[1] + TABLES[mark[2]]() + mark[3], text)
 
 

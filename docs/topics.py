@@ -71,7 +71,7 @@ def may(key: str, right: str) -> list[str]:
 
 
 def policy(text: str) -> str:
-    """The policy with the topics of every key made anew."""
+    """The policy with the new topics of every key."""
 
     def profile(found: re.Match[str]) -> str:
         def right(block: re.Match[str]) -> str:

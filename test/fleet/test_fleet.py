@@ -150,7 +150,7 @@ def test_a_run_that_was_broken_off_goes_on(recordings, client, tmp_path):
 def test_the_time_limit_costs_one_row(recordings, run, rows):
     shutil.rmtree(recordings / "stage_b")
     assert run(recordings / "stage_a", Wait(60.0), limit=0.5) == {"timed_out": 2}
-    assert all("0.5 s, the time limit" in row["error"] for row in rows())
+    assert all("the time limit of 0.5 s" in row["error"] for row in rows())
     assert run(recordings / "stage_a", Wait(60.0), limit=0.5) == {}
     assert run(recordings / "stage_a", Wait(60.0), limit=0.6) == {"timed_out": 2}
     assert run(recordings / "stage_a", Wait(60.0), limit=0.6, retry=True) == {"timed_out": 2}

@@ -109,7 +109,7 @@ class KeeperLink:
         if self.is_lost:
             raise StageError(
                 "the keeper of the stage has ended: this driver was silent for too long, or the keeper was killed; "
-                "configure anew"
+                "configure again"
             )
 
     def close(self) -> None:
