@@ -43,6 +43,7 @@ QUALITY = (
     "real_recordings",
     "reading",
     "mirror",
+    "one_process",
 )
 """What takes minutes or needs data, by name only."""
 
