@@ -119,7 +119,7 @@ def test_modules_that_are_named_exist(page):
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "console")], ids=name)
-def test_console_blocks_name_what_exists(page):
+def test_console_blocks_use_existing_commands(page):
     text = "\n".join(text for _, text in blocks(page, "console"))
     targets = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)[1].split()
     for target in re.findall(r"^make (\S+)", text, re.MULTILINE):
@@ -133,7 +133,7 @@ def test_console_blocks_name_what_exists(page):
         assert (ROOT / file).exists(), file
 
 
-def test_what_is_generated_is_that_of_the_code():
+def test_generated_docs_are_up_to_date():
     done = subprocess.run(
         [sys.executable, ROOT / "docs" / "generate.py", "--check"], capture_output=True, text=True, check=False
     )
@@ -163,7 +163,7 @@ def test_every_page_is_in_the_site():
 
 
 @pytest.mark.parametrize("page", sorted((ROOT / "docs" / "notebooks").glob("*.md")), ids=name)
-def test_notebooks_use_what_the_package_has(page):
+def test_notebooks_use_existing_names(page):
     cells = re.findall(r"^```{code-cell} python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
     assert len(cells) > 2
     for cell in cells:

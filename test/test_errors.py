@@ -28,7 +28,7 @@ EVIL = "x\x1b]0;title\x07\r\n[ERROR] forged\u202e\x9b2J\x00"
 
 
 @given(st.text())
-def test_anything_becomes_one_printable_line_and_stays_it(text):
+def test_any_text_becomes_one_printable_line(text):
     line = printable(text)
     assert line.isprintable()
     assert printable(line) == line

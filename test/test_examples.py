@@ -44,7 +44,7 @@ def test_read_experiment(tmp_path, capsys, monkeypatch):
     assert line.endswith("3 samples of 1000 µs, 0.00 to 2.00 V, 0.000 to 2.500 µm")
 
 
-def test_hide_effect_says_nothing_and_writes_the_plant_that_the_seed_draws(tmp_path):
+def test_hide_effect_prints_no_answer_and_writes_the_plant_of_the_seed(tmp_path):
     command = [sys.executable, EXAMPLES / "hide_effect.py", "3", tmp_path / "plant.yaml"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout + done.stderr == ""

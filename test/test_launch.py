@@ -74,7 +74,7 @@ def test_replay_plays_no_command(tmp_path):
     ("name", "value"),
     [("autostart", "maybe"), ("use_sim_time", "yes"), ("params_file", "/nowhere/at_all.yaml"), ("stage", "nothing")],
 )
-def test_words_that_mean_nothing_are_refused(name, value):
+def test_unknown_words_are_refused(name, value):
     """`launch` itself refuses words that are no choice, the launch file the rest; nothing is started."""
     context = launch.LaunchContext()
     context.launch_configurations[name] = value
@@ -91,7 +91,7 @@ def driver_parameters(**values):
     return evaluate_parameters(context, driver._Node__parameters)[-1]
 
 
-def test_an_experiment_is_replayed_at_the_speed_asked_for():
+def test_an_experiment_is_replayed_at_the_requested_speed():
     given = driver_parameters(experiment="/data/run 1", real_time_factor="2")
     assert given == {
         "stage": "replay", "replay.experiment": "/data/run 1", "real_time_factor": 2.0, "autostart": True

@@ -121,7 +121,7 @@ def test_a_node_loads_nothing_heavy(node):
     assert done.stderr.strip() == "0"
 
 
-def test_the_command_says_its_version():
+def test_the_command_prints_its_version():
     command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "--version"]
     said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=60).stdout
     assert said == f"piezo_hysteresis {piezo_hysteresis.__version__}\n"

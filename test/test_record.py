@@ -49,7 +49,7 @@ U, Y = np.linspace(0.0, 5.0, 12), np.linspace(0.0, 1e-5, 12)
         (lambda: Experiment((), "bag"), "'bag' holds no record"),
     ],
 )
-def test_what_is_no_measurement_is_refused_in_one_line(make, message):
+def test_an_invalid_measurement_is_refused_in_one_line(make, message):
     with pytest.raises(RecordError, match=message) as error:
         make()
     assert "\n" not in str(error.value)

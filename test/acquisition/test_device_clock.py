@@ -37,7 +37,7 @@ def test_two_quartz_clocks_that_part_stay_together_within_the_tolerance(drift):
     assert abs(end * PERIOD * drift) > 50 * base.tolerance
 
 
-def test_equal_clocks_move_nothing():
+def test_equal_clocks_need_no_correction():
     rng = np.random.default_rng(2)
     base = TimeBase(PERIOD)
     clock = DeviceClock(base)

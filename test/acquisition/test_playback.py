@@ -40,7 +40,7 @@ def taken(source, *counts):
     return np.concatenate([d.voltage for d in drives]), np.concatenate([d.phase for d in drives]), events
 
 
-def test_idle_holds_the_voltage_in_force():
+def test_idle_keeps_the_present_voltage():
     voltage, phase, events = taken(playback(3.0), 5, 5)
     assert voltage.tolist() == [3.0] * 10
     assert phase.tolist() == [0] * 10
@@ -64,7 +64,7 @@ def test_done_is_reported_with_the_block_that_ends_it():
     assert [str(e.phase) for e in p.take(1).events] == ["2 hold"]
 
 
-def test_a_command_named_hold_is_a_phase_of_its_own():
+def test_a_command_named_hold_is_a_separate_phase():
     p = playback()
     p.play(np.zeros(1), "hold")
     assert taken(p, 2)[1].tolist() == [1, 2]
@@ -123,7 +123,7 @@ def test_hold_timeout_counts_from_the_end_of_the_motion(cut):
     assert np.allclose(voltage[:20], [0.0, 0.2] + [0.2] * 10 + [0.1] + [0.0] * 7, rtol=0, atol=1e-12)
 
 
-def test_preview_takes_nothing():
+def test_preview_does_not_consume_samples():
     p = playback()
     p.play(np.arange(5) / 10, "step")
     ahead = p.preview(7)
@@ -132,7 +132,7 @@ def test_preview_takes_nothing():
     assert ahead.events == again.events
 
 
-def test_jump_ends_what_was_played():
+def test_a_jump_ends_the_present_waveform():
     p = playback()
     p.play(np.full(50, 0.05), "step")
     p.take(5)

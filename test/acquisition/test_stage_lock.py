@@ -46,7 +46,7 @@ def test_the_second_is_refused_until_the_first_releases():
     StageLock(["device A", "namespace /x"]).release()
 
 
-def test_a_killed_holder_holds_nothing():
+def test_a_killed_process_releases_its_lock():
     holder = subprocess.Popen([sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     with holder:
         assert holder.stdout.readline() == b"held\n"

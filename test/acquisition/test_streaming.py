@@ -164,7 +164,7 @@ class OwnClock(Witness):
         return super().exchange(voltage)
 
 
-def test_a_device_with_a_clock_of_its_own_sets_the_pace_and_the_stamps():
+def test_a_device_with_its_own_clock_sets_the_rate_and_the_stamps():
     """At the pace of this computer the buffer of one so fast would run empty within 0.8 s."""
     acquisition, listener = started(OwnClock(1.5, lead=0.4), rate=1.0)
     listener.wait(lambda heard: heard.failures or len(heard.deliveries) > 160)
@@ -187,7 +187,7 @@ def test_after_a_long_stall_stamps_move_and_samples_do_not():
 
 
 @pytest.mark.parametrize("playing", [True, False])
-def test_stop_breaks_off_what_plays_from_memory(playing):
+def test_stop_interrupts_a_waveform_played_from_memory(playing):
     stage = SimulatedMemoryStage(sample_period=PERIOD, longest_block=100_000)
     acquisition, listener = started(stage, MemoryAcquisition, rate=1.0, rest_period=0.01)
     if playing:

@@ -42,7 +42,7 @@ def test_index_at_inverts_due(n, rate):
     assert abs(time.index_at(time.due(100 + n)) - (100 + n)) <= 1
 
 
-def test_lateness_and_small_drift_move_nothing():
+def test_late_blocks_and_small_drift_need_no_correction():
     time = base()
     assert time.follow(600, 50.0 + 0.3, START + 300_000_000) == 0.0
     assert time.follow(600, 50.3, START + 300_000_000 + 900_000) == 0.0
@@ -50,7 +50,7 @@ def test_lateness_and_small_drift_move_nothing():
 
 
 @pytest.mark.parametrize("jump", [0.002, -3600.0, 86400.0])
-def test_a_jump_of_the_clock_anchors_anew_once(jump):
+def test_a_jump_of_the_clock_resets_the_time_base_once(jump):
     time = base()
     moved = round(jump * 1e9)
     assert time.follow(600, 50.01, START + 10_000_000 + moved) == pytest.approx(jump)
@@ -59,7 +59,7 @@ def test_a_jump_of_the_clock_anchors_anew_once(jump):
     assert time.due(1100) == pytest.approx(50.02)
 
 
-def test_a_reading_torn_apart_is_no_jump():
+def test_an_interrupted_reading_is_not_a_jump():
     waits = iter([0.0, 0.01, 0.01, 0.0])
 
     def clock():

@@ -60,7 +60,7 @@ def test_the_delay_that_was_written_is_taken_off(piezo, address, tmp_path):
         (("-o", "/"), "write"),
     ],
 )
-def test_what_cannot_be_measured_is_one_line(piezo, address, tmp_path, words, reason):
+def test_a_failed_calibration_gives_one_line(piezo, address, tmp_path, words, reason):
     arguments = ("--wired-input", "ai2", "-o", str(tmp_path / "card.yaml"))
     done = piezo("calibrate", "Dev1", "--server", address, *arguments, *words)
     assert done.status == 2

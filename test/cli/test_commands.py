@@ -77,7 +77,7 @@ def test_validate_reports_the_one_error_measure(piezo, identified, folder, tmp_p
     assert "cross-correlation" in done.out
 
 
-def test_validate_draws_what_it_says(piezo, identified, folder, tmp_path):
+def test_validate_draws_the_printed_results(piezo, identified, folder, tmp_path):
     triangle = folder / "04_triangle.npz"
     assert piezo("validate", identified / "model.yaml", triangle, "--figures", tmp_path / "figures").status == 0
     written = {p.name for p in (tmp_path / "figures").iterdir()}
@@ -92,7 +92,7 @@ def test_one_zero_for_all_phases_is_the_stricter_measure(piezo, identified, fold
     assert strict >= errors(model, experiment, Nuisance(offset=True)).percent
 
 
-def test_identify_validate_and_python_say_the_same_error(piezo, identified, folder, tmp_path):
+def test_identify_validate_and_python_give_the_same_error(piezo, identified, folder, tmp_path):
     found = json.loads((identified / "model.json").read_text())["phases"]
     piezo("validate", identified / "model.yaml", folder, "--json", tmp_path / "v.json")
     validated = json.loads((tmp_path / "v.json").read_text())["phases"]
@@ -145,7 +145,7 @@ def test_several_recordings_of_one_stage_are_one_experiment(piezo, identified, f
     ]
 
 
-def test_simulate_is_repeatable_and_hides_what_a_seed_draws(piezo, tmp_path):
+def test_simulate_is_repeatable_and_hides_the_effect_of_the_seed(piezo, tmp_path):
     for name in ("one", "two"):
         words = ["--protocol", "paper", "--sample-period", "1e-4", "--seed", 7, "--hidden", 3]
         done = piezo("simulate", "-o", tmp_path / name, *words, "--truth", tmp_path / f"{name}.json")
@@ -175,7 +175,7 @@ def test_json_has_no_number_that_machines_cannot_read(piezo, identified, folder,
     assert "Infinity" not in text
 
 
-def test_diagnose_says_what_too_little_data_cannot_decide(piezo, folder, tmp_path):
+def test_diagnose_reports_effects_that_few_data_cannot_show(piezo, folder, tmp_path):
     part = tmp_path / "part"
     part.mkdir()
     for name in ("01_rest", "02_step", "03_noise", "04_triangle"):

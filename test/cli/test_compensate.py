@@ -61,7 +61,7 @@ def test_the_command_drives_the_model_along_the_path(piezo, model, tmp_path):
     assert "expected error" in done.out and (tmp_path / "figures" / "tracking.png").stat().st_size > 5000
 
 
-def test_terminal_page_and_json_say_the_same_numbers(piezo, model, tmp_path):
+def test_terminal_page_and_json_contain_the_same_numbers(piezo, model, tmp_path):
     write(tmp_path / "path.csv", 1.0, 3.0)
     words = ("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz", "--json", tmp_path / "p.json")
     done = piezo(*words, "--report", tmp_path / "page.html")
@@ -86,7 +86,7 @@ def test_terminal_page_and_json_say_the_same_numbers(piezo, model, tmp_path):
     assert "do not allow the whole path" in page and "below voltage_min" in page
 
 
-def test_out_of_reach_writes_nothing_and_says_what_can_be_had(piezo, model, tmp_path):
+def test_an_unreachable_path_writes_nothing_and_proposes_a_reachable_one(piezo, model, tmp_path):
     write(tmp_path / "path.csv", 0.0, 3.0)
     words = ("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz")
     done = piezo(*words)
@@ -116,7 +116,7 @@ def test_a_slower_path_is_interpolated_and_a_faster_one_refused(piezo, model, tm
         ("", "displacement"),
     ],
 )
-def test_a_file_that_holds_no_path_is_bad_input(piezo, model, tmp_path, text, reason):
+def test_a_file_without_a_path_is_bad_input(piezo, model, tmp_path, text, reason):
     (tmp_path / "path.csv").write_text(text)
     done = piezo("compensate", model, tmp_path / "path.csv")
     assert done.status == 2 and reason in done.err

@@ -56,7 +56,7 @@ def answered(correction: Correction, tmp_path: Path, monkeypatch: pytest.MonkeyP
     return args.run(args), path
 
 
-def test_an_accepted_correction_is_written_and_told(
+def test_an_accepted_correction_is_written_and_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code, path = answered(ACCEPTED, tmp_path, monkeypatch)
@@ -70,7 +70,7 @@ def test_an_accepted_correction_is_written_and_told(
     assert told["unnamed_correction"]["shape"]["y"]["values"] == pytest.approx([0.0, 1e-8, 3e-8, 1e-8, 0.0])
 
 
-def test_a_refused_correction_is_told_and_not_written(
+def test_a_refused_correction_is_reported_and_not_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     refused = replace(ACCEPTED, model=None, refusal="it removes 12 % of the gap on the test records")

@@ -64,7 +64,7 @@ def test_a_stage_is_diagnosed_while_it_is_driven(piezo, tmp_path):
         (("--stage", "plant.yaml", "-o", "out", "--stage-time", "3"), "stage time: got 3 s"),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_one_line(piezo, tmp_path, monkeypatch, words, reason):
+def test_invalid_values_are_refused_in_one_line(piezo, tmp_path, monkeypatch, words, reason):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "plant.yaml").write_text("sensor.noise: 2.0e-4\n")
     done = piezo("diagnose", *words)

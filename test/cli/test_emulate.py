@@ -62,7 +62,7 @@ def test_a_process_that_is_a_device(device):
         ("gcs2", "--servo-time", "0"),
     ],
 )
-def test_what_cannot_be_emulated_is_one_line(piezo, words):
+def test_an_invalid_emulator_option_gives_one_line(piezo, words):
     done = piezo("emulate", *words)
     assert done.status == 2
     assert done.err.count("\n") == 1

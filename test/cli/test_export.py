@@ -50,7 +50,7 @@ def test_the_files_pass_the_check_that_it_prints(piezo, model, tmp_path):
     assert {p.suffix for p in (tmp_path / "c").iterdir()} >= {".h", ".c"}
 
 
-def test_what_exists_is_kept_unless_force_is_given(piezo, model, tmp_path):
+def test_existing_files_are_kept_without_force(piezo, model, tmp_path):
     words = ("export", model, "-o", tmp_path / "c")
     assert piezo(*words).status == 0
     (tmp_path / "c" / "piezo.h").write_text("mine")
@@ -71,7 +71,7 @@ def test_models_that_cannot_be_exported_are_refused_in_one_line(piezo, tmp_path)
     assert refused.status == 2 and "none.yaml" in refused.err
 
 
-def test_a_model_without_an_inverse_is_written_without_it_and_says_so(piezo, tmp_path):
+def test_a_model_without_an_inverse_is_written_without_it_and_this_is_reported(piezo, tmp_path):
     model = model_file.save(MODEL.with_effect(SofteningOfOneMode(k3=0.02)), tmp_path / "soft.yaml")
     done = piezo("export", model, "-o", tmp_path / "c")
     assert done.status == 0 and "no inverse was written: softening_of_one_mode" in done.out
@@ -88,7 +88,7 @@ def test_co_simulation_units_are_written_and_kept(piezo, model, tmp_path):
     assert piezo(*words).status == 2 and piezo(*words, "--force").status == 0
 
 
-def test_a_compiler_that_fails_is_told_in_one_line(piezo, model, tmp_path, monkeypatch):
+def test_a_failing_compiler_is_reported_in_one_line(piezo, model, tmp_path, monkeypatch):
     (tmp_path / "broken").write_text("#!/bin/sh\necho no licence >&2\nexit 1\n")
     (tmp_path / "broken").chmod(0o755)
     monkeypatch.setenv("CC", str(tmp_path / "broken"))
@@ -96,7 +96,7 @@ def test_a_compiler_that_fails_is_told_in_one_line(piezo, model, tmp_path, monke
     assert refused.status == 2 and "no licence" in refused.err and len(refused.err.splitlines()) == 1
 
 
-def test_limits_and_band_of_the_inverse_are_those_that_were_asked_for(piezo, model, tmp_path):
+def test_limits_and_band_of_the_inverse_are_those_of_the_options(piezo, model, tmp_path):
     words = ("export", model, "--voltage-min", "-2", "--voltage-max", "8", "--max-slew-rate", "5e4")
     long, short = (piezo(*words, "-o", tmp_path / name, *more) for name, more in (("a", ()), ("b", ("--no-band",))))
     assert "known 102 samples (0.00204 s) ahead" in long.out and "known 2 samples" in short.out
@@ -106,6 +106,6 @@ def test_limits_and_band_of_the_inverse_are_those_that_were_asked_for(piezo, mod
     assert "inverse" not in (tmp_path / "d" / "piezo.h").read_text()
 
 
-def test_a_name_that_is_no_identifier_is_refused(piezo, model, tmp_path):
+def test_an_invalid_name_is_refused(piezo, model, tmp_path):
     refused = piezo("export", model, "-o", tmp_path / "c", "--name", "My Stage")
     assert refused.status == 2 and "My Stage" in refused.err and not (tmp_path / "c").exists()

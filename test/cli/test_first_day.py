@@ -90,7 +90,7 @@ def test_titles_and_a_row_of_units_above_an_empty_line(tmp_path):
     np.testing.assert_allclose(record.displacement, 12e-6 * VOLTAGE, atol=1e-11)
 
 
-def test_columns_of_volts_are_listed_and_asked_for_by_option(tmp_path):
+def test_ambiguous_columns_are_listed_with_the_option_that_selects_one(tmp_path):
     scope = table(tmp_path / "keysight.csv", KEYSIGHT)
     line = refused("import", scope, "-o", tmp_path / "out")
     assert "1 'x-axis [s]', 2 '1 [V]', 3 '2 [V]'" in line
@@ -167,7 +167,7 @@ def test_preview_shows_what_was_understood_and_writes_no_experiment(tmp_path, pl
     assert sorted(path.name for path in tmp_path.iterdir()) == ["look.png", "plain.csv"]
 
 
-def test_preview_replaces_nothing_and_without_it_an_output_is_needed(tmp_path, plain):
+def test_preview_replaces_no_file_and_without_it_an_output_is_needed(tmp_path, plain):
     (tmp_path / "look.png").write_text("mine")
     assert "--preview: " in refused("import", plain, "--preview", tmp_path / "look.png")
     assert (tmp_path / "look.png").read_text() == "mine"
@@ -212,7 +212,7 @@ def test_the_verdict_is_the_last_line_and_force_replaces(tmp_path, plain):
     assert done.stdout.splitlines()[-1].startswith("Verdict: The model does not describe this stage: its error is ")
 
 
-def test_an_undetermined_fit_says_so_beside_status_1(tmp_path):
+def test_an_undetermined_fit_is_reported_with_status_1(tmp_path):
     from types import SimpleNamespace
 
     from piezo_hysteresis.cli.identify import verdict_line

@@ -56,7 +56,7 @@ def test_a_folder_of_recordings(piezo, folder, tmp_path):
         (("--report", "/nowhere/page.html"), "--report"),
     ],
 )
-def test_what_makes_no_sense_is_refused(piezo, folder, tmp_path, words, message):
+def test_invalid_values_are_refused(piezo, folder, tmp_path, words, message):
     outcome = piezo("fleet", folder, "-o", tmp_path / "results", *words)
     assert outcome.status == 2
     assert message in outcome.err

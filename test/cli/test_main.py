@@ -51,7 +51,7 @@ def test_every_command_explains_itself(piezo, command):
     assert done.out.startswith(f"usage: piezo {command}")
 
 
-def test_a_reader_that_leaves_early_is_no_error():
+def test_a_closed_output_pipe_is_not_an_error():
     done = subprocess.run(
         f"{sys.executable} -m piezo_hysteresis.cli.main effects | head -1",
         shell=True,
@@ -135,7 +135,7 @@ def test_bad_input_is_reported_in_one_line(piezo, files, line, words):
     assert done.err.count("\n") == 1
 
 
-def test_data_that_determine_nothing_exit_with_1(piezo, files, tmp_path):
+def test_data_that_do_not_determine_a_model_exit_with_1(piezo, files, tmp_path):
     done = piezo("identify", files["undriven"], "-o", tmp_path / "m.yaml")
     assert done.status == 1
     (line,) = (line for line in done.err.splitlines() if line.startswith("piezo: "))

@@ -74,7 +74,7 @@ def test_a_file_that_makes_no_sense_is_refused_in_one_line(piezo, tmp_path, text
     assert done.err.count("\n") == 1
 
 
-def test_ctrl_c_leaves_the_stage_safe_says_so_and_writes_nothing(piezo, tmp_path, monkeypatch):
+def test_ctrl_c_brings_the_stage_to_safety_with_a_message_and_writes_nothing(piezo, tmp_path, monkeypatch):
     file, folder = tmp_path / "stage.yaml", tmp_path / "experiment"
     file.write_text(STAGE.format(memory="false"))
     sessions = []

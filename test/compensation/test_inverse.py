@@ -94,7 +94,7 @@ def test_a_lightly_damped_resonance_does_not_ring() -> None:
     assert rms < 1e-3
 
 
-def test_rounding_of_a_path_that_stands_still_does_not_turn_a_backlash_round() -> None:
+def test_rounding_of_a_constant_path_does_not_reverse_a_backlash() -> None:
     model = stage(Backlash(b=0.05), AmplifierBandwidth(tau=1e-5))
     limits = Limits(0.0, 10.0)
     levels = (3e-6, 5e-6, 7e-6, 5e-6, 3e-6)
@@ -108,7 +108,7 @@ def test_rounding_of_a_path_that_stands_still_does_not_turn_a_backlash_round() -
     assert (np.abs(np.diff(chattering)) > 0.05).sum() > jumps.sum()
 
 
-def test_it_goes_on_from_the_middle_of_a_motion() -> None:
+def test_it_continues_from_the_middle_of_a_motion() -> None:
     model = stage(Creep(gamma=0.01), HysteresisMemory(c=(0.05,) * 8))
     drive = np.concatenate((3.0 * (1.0 - np.cos(np.arange(2000) / 60.0)), np.full(3000, 4.0)))
     y0, state = model.run(drive, model.rest(0.0))
@@ -128,7 +128,7 @@ def test_preview_is_reported_in_samples_and_seconds() -> None:
     assert Inverse(stage(), band=Band()).preview == Inverse(stage()).preview + 100
 
 
-def test_what_makes_no_sense_is_refused() -> None:
+def test_invalid_values_are_refused() -> None:
     with pytest.raises(ModelError, match="gain at dc is 0"):
         Inverse(Model((BoucWen(), Arx(b=[1.0, -1.0])), PERIOD))
     with pytest.raises(ModelError, match="static"):

@@ -50,7 +50,7 @@ def learning(noise: float = 0.0, filter: LearningFilter | None = None) -> Iterat
     return IterativeLearning(model, plan(model, WANTED, LIMITS), LIMITS, filter, noise=noise)
 
 
-def test_two_rounds_remove_what_the_model_misses() -> None:
+def test_two_rounds_remove_the_error_of_the_model() -> None:
     got = learn(learning(), stage_with_noise(0.0), rounds=2)
     rms = [r.rms / np.ptp(WANTED) for r in got.rounds]
     assert len(rms) == 3 and rms[0] > 0.02
@@ -132,7 +132,7 @@ def test_the_gain_tapers_to_zero() -> None:
     assert gain[0] == 0.9 and gain[-1] == 0.0 and (np.diff(gain) <= 1e-12).all() and np.abs(np.diff(gain)).max() < 0.01
 
 
-def test_what_makes_no_sense_is_refused() -> None:
+def test_invalid_values_are_refused() -> None:
     with pytest.raises(ModelError, match="gain"):
         LearningFilter(PERIOD, gain=1.5)
     with pytest.raises(ModelError, match="noise"):

@@ -93,7 +93,7 @@ def test_the_way_back_ends_at_the_first_voltage_inside_the_slew_limit() -> None:
         plan(stage(), y, UNIPOLAR, way_back=-1.0)
 
 
-def test_the_error_to_expect_holds_the_covariance() -> None:
+def test_the_expected_error_includes_the_covariance() -> None:
     u = 3.0 * (1.0 - np.cos(np.arange(20_000) / 100.0))
     spread = 0.01
     model = replace(stage(), covariance=ParameterCovariance.of(["bouc_wen.p2"], np.array([[spread**2]])))
@@ -105,7 +105,7 @@ def test_the_error_to_expect_holds_the_covariance() -> None:
     assert found.expected.parameters is not None and found.expected.parameters > 0.0
 
 
-def test_a_model_without_a_stated_error_says_so() -> None:
+def test_a_plan_for_a_model_without_a_known_error_states_this() -> None:
     assert free_run_error(replace(stage(), provenance={})) is None
     assert free_run_error(replace(stage(), provenance={"free_run_error": "good"})) is None
 

@@ -47,7 +47,7 @@ WORST = 1e-12
 
 @needs_compiler
 @pytest.mark.parametrize("kind", CHAIN, ids=lambda kind: kind.name)
-def test_c_code_agrees_or_the_effect_says_why_there_is_none(kind: type[Effect], tmp_path) -> None:
+def test_c_code_agrees_or_the_effect_states_why_there_is_none(kind: type[Effect], tmp_path) -> None:
     model, u = model_with(typical(kind)), drive()
     files, refusal = {}, ""
     try:

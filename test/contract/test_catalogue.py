@@ -71,7 +71,7 @@ def test_file_class_and_identifier_are_one_word() -> None:
         assert effect.__name__ == "".join(part.capitalize() for part in effect.name.split("_"))
 
 
-def test_the_page_is_what_the_classes_say(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_agrees_with_the_classes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(DOCS))
     generated = runpy.run_path(str(DOCS / "generate.py"))["catalogue"]()
     assert (DOCS / "catalogue.md").read_text() == generated, "run make docs"

@@ -277,7 +277,7 @@ def test_sensitivities_equal_finite_differences(kind: type[Effect], period: floa
 
 
 @every_effect
-def test_the_table_says_what_it_is(kind: type[Effect]) -> None:
+def test_the_parameter_table_is_complete(kind: type[Effect]) -> None:
     assert kind.equation and kind.signature and kind.source and kind.family
     doc = kind.__doc__ or ""
     assert "Parameters\n" in doc

@@ -159,7 +159,7 @@ def test_approximate_is_good_in_the_band(kind: type[Effect]) -> None:
 
 
 @pytest.mark.parametrize("kind", kinds(Invertibility.NOT_NEEDED), ids=lambda kind: kind.name)
-def test_what_is_not_on_the_path_changes_no_command(kind: type[Effect]) -> None:
+def test_effects_outside_the_drive_path_do_not_change_the_command(kind: type[Effect]) -> None:
     model = model_with(typical(kind))
     inverse, without = Inverse(model), Inverse(model.without(kind.name))
     y, _ = without.model.run(drive(), without.model.rest(0.0))

@@ -34,7 +34,7 @@ def missing(*records):
     return " ".join(n.message for n in missing_excitation(records))
 
 
-def test_one_triangle_of_one_amplitude_leaves_most_open():
+def test_one_triangle_of_one_amplitude_shows_few_effects():
     said = missing(record(loops(4.0)))
     for name in ("creep", "thermal_drift", "gain_drift", "hysteresis_memory", "hysteresis_exponent", "extra_resonance"):
         assert name in said
@@ -45,25 +45,25 @@ def test_smaller_loops_show_memory():
     assert "hysteresis_memory" not in missing(record(loops(4.0)), record(loops(2.0)))
 
 
-def test_a_level_held_after_a_change_shows_creep_and_one_held_from_the_start_does_not():
+def test_a_hold_after_a_change_shows_creep_and_a_hold_from_the_start_does_not():
     assert "creep" in missing(record(np.full(2000, 3.0)), record(loops(4.0)))
     assert "creep" not in missing(record(np.repeat([0.0, 3.0], 1500)))
     assert "creep" not in missing(record(np.full(2000, 3.0), initial_voltage=0.0))
 
 
-def test_noise_shows_dynamics_and_a_phase_that_comes_again_shows_drift():
+def test_noise_shows_dynamics_and_a_repeated_phase_shows_drift():
     noise = record(np.random.default_rng(1).normal(size=4000), 2e-5, "noise")
     assert "extra_resonance" not in missing(noise)
     assert "drift" not in missing(noise, noise)
 
 
-def test_loops_of_two_sizes_show_memory_at_any_sample_period_and_noise_beside_them_does_not():
+def test_loops_of_two_sizes_show_memory_at_any_sample_period_and_noise_does_not():
     noise = record(np.random.default_rng(1).normal(size=4000), 2e-5, "noise")
     assert "hysteresis_memory" in missing(record(loops(4.0, 4.0)), noise)
     assert "hysteresis_memory" in missing(record(np.sin(3.0 * np.pi * TIME)), noise)
     assert "hysteresis_memory" not in missing(record(loops(4.0, 2.0), 1e-4))
 
 
-def test_slow_loops_that_come_again_show_drift_whatever_they_are_called():
+def test_repeated_slow_loops_show_drift_under_any_name():
     assert "drift" not in missing(record(loops(4.0), phase="run_a"), record(loops(2.0), phase="again"))
     assert "drift" in missing(record(loops(4.0), phase="run_a"))

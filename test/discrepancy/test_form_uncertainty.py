@@ -45,14 +45,14 @@ def errors_of(size, misfit=0.0):
 
 
 @pytest.mark.parametrize("size", [1_000, 100_000])
-def test_the_form_is_known_to_the_adequacy_floor_however_long_the_record(size):
+def test_the_form_uncertainty_does_not_depend_on_the_length_of_the_record(size):
     """p2 moves y by a sine of amplitude 1e-5 m: δ/√PIECES over its rms."""
     alone, wider = errors_of(size)
     expected = ADEQUACY * SPAN / np.sqrt(PIECES) / (1e-5 / np.sqrt(2.0))
     assert np.sqrt(wider**2 - alone**2) == pytest.approx(expected, rel=0.05)
 
 
-def test_a_misfit_that_is_seen_counts_with_its_size():
+def test_a_visible_misfit_counts_with_its_size():
     alone, wider = errors_of(10_000, misfit=1e-7)
     expected = 1e-7 / np.sqrt(PIECES) / (1e-5 / np.sqrt(2.0))
     assert np.sqrt(wider**2 - alone**2) == pytest.approx(expected, rel=0.1)

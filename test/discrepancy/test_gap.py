@@ -45,7 +45,7 @@ def measure(records, models, chosen, nuisances=PLAIN):
     return measure_gap(models, records, chosen, [2e-8] * 3, STROKE, nuisances, True)
 
 
-def test_is_rms_over_range_with_records_alike(records):
+def test_the_gap_is_rms_over_range_with_equal_weights(records):
     gap = measure(records, (MODEL, MODEL), (0, 2))
     assert [p.after for p in gap.per_phase] == pytest.approx([0.1, 0.5])
     assert gap.after == pytest.approx(np.sqrt((0.1**2 + 0.5**2) / 2))
@@ -54,14 +54,14 @@ def test_is_rms_over_range_with_records_alike(records):
     assert gap.interval_95[0] <= gap.after <= gap.interval_95[1]
 
 
-def test_before_and_after_are_of_the_two_models(records):
+def test_before_and_after_belong_to_the_two_models(records):
     shifted = MODEL.with_effect(Offset(y0=2e-8))
     gap = measure(records, (shifted, MODEL), (0,))
     assert gap.before == pytest.approx(np.sqrt(0.1**2 + 0.2**2))
     assert gap.after == pytest.approx(0.1)
 
 
-def test_what_is_free_per_record_is_no_gap(records):
+def test_free_disturbances_are_not_part_of_the_gap(records):
     shifted = MODEL.with_effect(Offset(y0=2e-8))
     gap = measure(records, (shifted, MODEL), (0,), (Nuisance(offset=True), Nuisance()))
     assert gap.before == pytest.approx(gap.after)

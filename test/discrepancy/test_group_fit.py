@@ -74,7 +74,7 @@ def fit(changed, **options):
 @pytest.mark.parametrize(
     ("group", "size"), [("gain", 0.004), ("gain", -0.05), ("loop", 0.03), ("dynamics", 2e-5), ("dynamics", 1.5e-3)]
 )
-def test_a_change_comes_back_within_its_interval_and_the_residual_with_it(group, size):
+def test_a_change_is_fitted_within_its_interval_and_the_residual_recovers(group, size):
     true = np.zeros(5)
     true[GROUPS.index(group)] = size
     found, _ = fit(run(changed_by(MODEL, true)))
@@ -85,7 +85,7 @@ def test_a_change_comes_back_within_its_interval_and_the_residual_with_it(group,
     assert found.after < 1.1 * found.floor < found.before
 
 
-def test_the_new_model_takes_over_with_the_offset_that_was_fitted_beside_it():
+def test_the_new_model_is_used_with_the_offset_that_was_fitted_with_it():
     """A gain also moves the stage where it rested: the zero that was taken there does not fit the new model."""
     changed = 1.01 * run(MODEL)
     found, predictor = fit(changed)
@@ -98,14 +98,14 @@ def test_the_new_model_takes_over_with_the_offset_that_was_fitted_beside_it():
     assert 0.01 * run(MODEL)[0] > 1e-8
 
 
-def test_an_offset_that_moved_beside_a_gain_is_found():
+def test_a_change_of_offset_and_gain_is_found():
     found, _ = fit(1.01 * run(MODEL) + 5e-8)
     assert set(found.groups) == {"offset", "gain"}
     assert found.change[0] == pytest.approx(0.01, rel=0.02)
     assert found.offset == pytest.approx(5e-8, rel=0.02)
 
 
-def test_of_two_groups_that_moved_both_are_fitted():
+def test_two_changed_groups_are_both_fitted():
     true = np.zeros(5)
     true[GROUPS.index("gain")], true[GROUPS.index("dynamics")] = 0.01, 2e-4
     found, _ = fit(run(changed_by(MODEL, true)))
@@ -115,7 +115,7 @@ def test_of_two_groups_that_moved_both_are_fitted():
         assert abs(found.change[k] - true[k]) < 4 * found.deviation[k]
 
 
-def test_intervals_cover_as_often_as_they_say():
+def test_intervals_have_the_stated_coverage():
     true = np.zeros(5)
     true[GROUPS.index("gain")] = 0.004
     changed, errors = run(changed_by(MODEL, true)), []
@@ -140,7 +140,7 @@ def test_another_shape_needs_a_full_identification():
         ((), "nothing to recalibrate"),
     ],
 )
-def test_what_no_number_of_the_model_stands_for_is_refused(groups, reason):
+def test_a_change_without_a_parameter_of_the_model_is_refused(groups, reason):
     with pytest.raises(IdentificationError, match=reason):
         group_to_fit(groups)
 
@@ -162,7 +162,7 @@ def test_right_after_the_change_there_are_too_few_samples():
         fit_groups(MODEL, minute, watch.baseline, "gain", INTERVAL)
 
 
-def test_the_ring_holds_the_newest_samples_in_order_and_begins_anew_after_a_gap():
+def test_the_ring_buffer_keeps_the_newest_samples_and_restarts_after_a_gap():
     recent = RecentDisplacement(1.0)
     values = np.arange(200.0)
     for first in range(0, 200, 7):

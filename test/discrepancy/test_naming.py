@@ -61,20 +61,20 @@ def test_a_hidden_effect_is_named_and_its_gap_closes_on_unseen_records(name):
     assert found.gap.after <= 1.3 * found.gap.floor
 
 
-def test_a_rate_law_is_not_left_in_the_valley_of_another():
+def test_a_rate_law_is_not_left_in_a_local_minimum():
     found = answered(Case("effects", ("rate_dependent_hysteresis",), 2, 5e-4))
     assert found.names == ("rate_dependent_hysteresis",)
     assert found.gap.after <= 1.2 * found.gap.floor
 
 
-def test_what_is_in_no_catalogue_is_unknown():
+def test_an_effect_outside_the_catalogue_is_unknown():
     found = answered(hidden(group="uncatalogued", extra={"unknown": UNKNOWN["line"], "unknown_name": ("line",)}))
     assert found.verdict is Verdict.UNKNOWN
     assert found.effects() == []
     assert "no effect of the catalogue explains" in found.reason
 
 
-def test_what_only_records_set_aside_show_is_not_passed_over():
+def test_an_effect_that_only_test_records_show_is_not_ignored():
     experiment = replace(hidden(plant="independent"), group="effect_free").experiment()
     aside = {p.index for p in answered(replace(hidden(plant="independent"), group="effect_free")).gap.per_phase}
     swing = np.ptp(experiment.named("triangle")[0].displacement)
@@ -87,7 +87,7 @@ def test_what_only_records_set_aside_show_is_not_passed_over():
     assert "test records" in found.reason
 
 
-def test_without_the_true_family_nothing_else_takes_the_blame():
+def test_without_the_true_family_no_other_effect_is_named():
     library = ("thermal_drift", "gain_drift", "extra_delay", "axis_coupling")
     found = diagnose(hidden("creep").experiment(), effects=[BY_NAME[n] for n in library])
     assert found.verdict is Verdict.UNKNOWN
@@ -136,7 +136,7 @@ def triangle(records):
     return tuple(Record(u, 1e-6 * u, 1e-3, phase="triangle") for _ in range(records))
 
 
-def test_one_phase_is_no_ground_for_a_verdict():
+def test_one_phase_is_not_enough_for_a_verdict():
     found = diagnose(Experiment(triangle(1)))
     assert found.verdict is Verdict.UNKNOWN
     assert "one record" in found.reason
@@ -163,7 +163,7 @@ def test_a_stage_that_was_not_driven_is_refused():
         diagnose(Experiment((still,) * 5))
 
 
-def test_no_effect_is_named_where_its_twin_was_no_candidate():
+def test_no_effect_is_named_if_its_twin_was_not_a_candidate():
     library = [e for e in CATALOGUE if e.name != "sensor_nonlinearity"]
     found = diagnose(hidden("softening", plant="independent").experiment(), effects=library)
     assert found.verdict is Verdict.UNKNOWN
@@ -179,7 +179,7 @@ def test_a_search_that_runs_out_of_time_gives_the_best_answer_so_far():
         diagnose(hidden("creep").experiment(), time_limit=0.0)
 
 
-def test_logarithmic_creep_is_saved_as_the_law_that_holds():
+def test_logarithmic_creep_is_saved_as_the_correct_law():
     found = diagnose(Case("effects", ("creep",), 1, 5e-4, extra={"creep": ("logarithmic", 0.015)}).experiment())
     (effect,) = found.effects()
     low, high = effect["parameters"]["gamma"]["interval_95"]
@@ -187,7 +187,7 @@ def test_logarithmic_creep_is_saved_as_the_law_that_holds():
     assert low <= 0.015 <= high
 
 
-def test_creep_goes_on_from_phase_to_phase():
+def test_creep_continues_from_phase_to_phase():
     """Phases that were played in one go last 18 s together: relaxations longer than the longest phase belong to it."""
     stage = SimulatedStage(PlantParameters().with_values({"creep.gamma": 0.015}), seed=1)
     described = stage.description

@@ -53,7 +53,7 @@ def change_of(model, stage):
     return find_change(model, records, range(len(records)), least.tolist())
 
 
-def test_another_day_is_no_change(model, another_day):
+def test_another_day_is_not_a_change(model, another_day):
     assert change_of(model, another_day) is None
 
 
@@ -73,7 +73,7 @@ def test_a_delay_is_found_with_its_size(model, another_day, samples):
         ({"gain": 1.06}, "gain", 0.06),
     ],
 )
-def test_what_changed_is_named(model, another_day, changed, key, size):
+def test_the_changed_parameter_is_named(model, another_day, changed, key, size):
     change = change_of(model, replace(another_day, **changed))
     assert change.key == key
     assert change.size == pytest.approx(size, rel=0.03 if key.startswith("low_pass") else 0.25)
@@ -90,7 +90,7 @@ def test_diagnose_names_a_filter_and_its_model_predicts_better(model, another_da
     assert found.answer()["effects"] == [effect]
 
 
-def test_one_new_record_takes_a_model_to_another_day(model):
+def test_one_new_record_recalibrates_a_model(model):
     rng = np.random.default_rng(11)
     later = replace(STAGE.on_another_day(rng), gain=1.008, loop=0.26, zero=3e-6, filter_delay=3e-4)
     found = recalibrate(model, played(later, (10.0,)))
@@ -102,7 +102,7 @@ def test_one_new_record_takes_a_model_to_another_day(model):
     assert [e.name for e in found.model.effects] == [e.name for e in model.effects]
 
 
-def test_a_model_that_fits_stays(model):
+def test_a_good_model_is_not_changed(model):
     found = recalibrate(model, played(STAGE, (10.0,)))
     assert abs(found.gain) < 2e-3 and abs(found.lag) < 1e-5
     assert found.after <= found.before

@@ -38,7 +38,7 @@ LAG = replace(
 )
 
 
-def test_the_table_grows_in_its_file_and_is_read_back(tmp_path):
+def test_the_table_is_extended_in_its_file_and_read_back(tmp_path):
     Recalibrations(tmp_path / "axis").add([GAIN])
     history = Recalibrations(tmp_path / "axis")
     history.add([LAG])
@@ -47,7 +47,7 @@ def test_the_table_grows_in_its_file_and_is_read_back(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "time,group\n", write_numbers([GAIN]).replace("1.02e-05", "nan"), "\x00"])
-def test_a_file_that_is_no_history_is_refused_in_one_line(text):
+def test_an_invalid_history_is_refused_in_one_line(text):
     with pytest.raises(RecordingError, match="expected") as refused:
         read_numbers(text, "a file")
     assert "\n" not in str(refused.value)

@@ -49,12 +49,12 @@ def selection(explained, leaves):
     ("explained", "leaves", "enough"),
     [(0.65, 2.0, True), (0.55, 2.0, False), (0.65, 100.0, False), (0.8, 100.0, True)],
 )
-def test_of_an_effect_that_leaves_a_large_gap_more_is_asked(explained, leaves, enough):
+def test_an_effect_that_leaves_a_large_gap_must_explain_more(explained, leaves, enough):
     assert is_explained(selection(explained, leaves)) is enough
 
 
 @given(st.floats(0.0, 0.99), st.floats(1.1, 1e4), st.floats(0.0, 0.99), st.floats(1.1, 1e4))
-def test_who_explains_more_and_leaves_less_is_not_asked_for_more(first, leaves, second, leaves_second):
+def test_explaining_more_and_leaving_less_is_never_worse(first, leaves, second, leaves_second):
     if first <= second and leaves >= leaves_second:
         assert is_explained(selection(first, leaves)) <= is_explained(selection(second, leaves_second))
 

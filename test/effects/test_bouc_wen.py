@@ -117,7 +117,7 @@ def test_rate_law_is_continuous_at_the_logarithm() -> None:
     np.testing.assert_allclose(state_of(v, RateDependentHysteresis(k=0.05, a=0.0), **VALUES), near, atol=1e-7)
 
 
-def test_a_remanent_state_is_there_at_rest_and_forgotten_after_a_swing() -> None:
+def test_a_remanent_state_is_present_at_rest_and_lost_after_a_swing() -> None:
     v = np.concatenate((np.zeros(50), polyline(np.array([0.0, 3.0, 0.0]), 100)))
     clean, remanent = state_of(v, **VALUES), state_of(v, InitialState(h0=0.05), **VALUES)
     np.testing.assert_array_equal(remanent[:50], 0.05)
@@ -188,7 +188,7 @@ def test_the_published_form_converges_to_the_exact_one() -> None:
 
 
 @pytest.mark.parametrize("kind", [BoucWen, PublishedBoucWen])
-def test_own_sensitivities_are_those_beside_upstream_ones_bit_for_bit(kind) -> None:
+def test_own_sensitivities_do_not_depend_on_upstream_ones_bit_for_bit(kind) -> None:
     turns = np.random.default_rng(5).normal(scale=0.3, size=40)
     block, v = kind().block(SETTING), np.concatenate((polyline(turns, 8), turns, np.repeat(turns, 2)))
     nothing, held = np.empty((0, v.size)), np.zeros((1, v.size))
@@ -205,7 +205,7 @@ def test_an_unbounded_loop_is_refused(kind) -> None:
         kind(beta=1.0, gamma=-1.5)
 
 
-def test_a_term_has_no_block_of_its_own() -> None:
+def test_a_term_has_no_separate_block() -> None:
     with pytest.raises(ModelError, match="term of 'bouc_wen'"):
         InitialState(h0=0.1).block(SETTING)
 

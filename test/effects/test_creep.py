@@ -75,7 +75,7 @@ def test_exponential_creep_is_the_transfer_function_of_scipy() -> None:
 @pytest.mark.parametrize(
     "effect", [Creep(gamma=0.05, tau_min=1e-4), CreepExponential(c=[0.05], tau=[0.02])], ids=lambda e: e.name
 )
-def test_the_memory_passes_to_another_sample_period(effect: Effect) -> None:
+def test_the_state_can_be_used_at_another_sample_period(effect: Effect) -> None:
     fine, coarse = effect.block(Discretisation(1e-3, 1e-3)), effect.block(Discretisation(5e-3, 1e-3))
     turns = np.interp(np.arange(2001), [0, 500, 900, 2000], [0.0, 1.0, 0.2, 0.7])
     whole, _ = fine.run(turns, fine.rest(0.3, 0.0))
@@ -89,6 +89,6 @@ def test_the_memory_passes_to_another_sample_period(effect: Effect) -> None:
     ("kind", "values"),
     [(Creep, {"tau_min": 1.0, "tau_max": 2.0}), (CreepExponential, {"c": [0.1], "tau": [1.0, 2.0]})],
 )
-def test_times_that_make_no_sense_are_refused(kind: type[Effect], values: dict) -> None:
+def test_invalid_time_constants_are_refused(kind: type[Effect], values: dict) -> None:
     with pytest.raises(ParameterError, match="tau"):
         kind(**values)

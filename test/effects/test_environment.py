@@ -61,7 +61,7 @@ def test_hum_needs_both_parts_of_every_harmonic() -> None:
         MainsHum(cosine=[0.0], sine=[0.0, 0.0])
 
 
-def test_channels_add_what_they_should_and_nothing_where_they_are_missing() -> None:
+def test_channels_add_their_contribution_and_nothing_if_missing() -> None:
     other, temperature = 1e-5 * np.cos(np.arange(300) / 9.0), 293.15 + np.linspace(0.0, 2.0, 300)
     coupling, expansion = AxisCoupling(kappa0=0.01, kappa1=50.0), Expansion(kappa=2e-7)
     np.testing.assert_allclose(

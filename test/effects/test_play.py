@@ -46,7 +46,7 @@ def test_backlash_never_leaves_its_play_and_moves_only_when_pushed(x: list[float
     assert (np.sign(np.diff(y)[moved]) == np.sign(np.diff(drive)[moved])).all()
 
 
-def test_backlash_is_blind_below_its_half_width() -> None:
+def test_backlash_has_no_output_below_its_half_width() -> None:
     x = 2.0 + 0.05 * np.sin(np.arange(200) / 7.0)
     np.testing.assert_array_equal(run(Backlash(b=0.06), x), np.full(200, 2.0))
 
@@ -73,6 +73,6 @@ def test_a_closed_minor_loop_returns_to_the_point_where_it_left(
     np.testing.assert_allclose(y[-2], y[-4], atol=1e-14)
 
 
-def test_one_play_is_no_grid() -> None:
+def test_one_play_is_refused() -> None:
     with pytest.raises(ParameterError, match="expected at least 2"):
         HysteresisMemory(c=[0.1])

@@ -78,7 +78,7 @@ def test_the_prediction_is_valid_and_equals_the_model(tmp_path):
 
 
 @needs_compiler
-def test_a_longer_communication_step_holds_the_inputs(tmp_path):
+def test_inputs_are_constant_during_a_longer_communication_step(tmp_path):
     unit = saved(fmus(MODEL), tmp_path)["piezo.fmu"]
     u = drive(60)
     expected, _ = MODEL.run(np.repeat(u, 5), MODEL.rest(u[0]))
@@ -151,7 +151,7 @@ def test_a_saved_state_is_taken_up_again_bit_for_bit(instance):
 
 
 @needs_compiler
-def test_what_makes_no_sense_is_refused(instance):
+def test_invalid_values_are_refused(instance):
     for step in (0.5 * PERIOD, 1.5 * PERIOD, 0.0, -PERIOD):
         with pytest.raises(FMI_ERROR):
             instance.doStep(0.0, step)
@@ -162,7 +162,7 @@ def test_what_makes_no_sense_is_refused(instance):
         instance.getInt32([2])
 
 
-def test_without_a_compiler_the_unit_holds_its_sources(monkeypatch, tmp_path):
+def test_without_a_compiler_the_unit_contains_only_sources(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     unit = saved(fmus(MODEL), tmp_path)["piezo.fmu"]

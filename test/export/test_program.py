@@ -126,7 +126,7 @@ def test_two_models_and_cpp_share_a_program(tmp_path):
         assert done.returncode == 0, done.stderr
 
 
-def test_the_header_says_which_model_it_is():
+def test_the_header_identifies_the_model():
     header = c_program(MODEL, "stage_x")["stage_x.h"]
     (digest,) = re.findall(r'#define STAGE_X_MODEL_HASH "(sha256:\w+)"', header)
     assert digest in c_program(MODEL)["piezo.h"]
@@ -135,7 +135,7 @@ def test_the_header_says_which_model_it_is():
     assert "gamma = 0.012 [1/decade]" in header and "y0 = 2e-07 [m]" in header
 
 
-def test_there_is_no_memory_but_the_state():
+def test_the_state_is_the_only_memory():
     source = c_program(MODEL)["piezo.c"]
     code = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
     assert not re.search(r"\b(malloc|calloc|realloc|alloca|free)\b", code)

@@ -180,7 +180,7 @@ def test_floods_of_everything_at_once(bench):
     assert len(driver.output) < 200_000
 
 
-def test_a_slow_subscriber_and_a_paused_model_node_cost_others_nothing(bench):
+def test_a_slow_subscriber_and_a_paused_model_node_do_not_affect_others(bench):
     """Four seconds: a subscriber of depth 10 that sleeps, and a model node that is stopped and goes on."""
     lab, samples = bench.lab, bench.samples
     model = lab.start("model_node")

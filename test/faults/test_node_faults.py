@@ -100,7 +100,7 @@ def test_no_date_on_the_clock_ends_a_node_that_follows_it(lab):
     assert all(len(process.output) < 100_000 for process in processes)
 
 
-def test_a_number_outside_its_range_is_refused_and_ends_nothing(lab):
+def test_a_number_outside_its_range_is_refused_and_the_node_runs_on(lab):
     assert lab.start("identification_node", fresh=True, seed=-3).wait() == 2
     process = lab.start("identification_node")
     for name, value in (("seed", -3), ("seed", 2**62), ("seed", "3"), ("protocol", "nonsense")):
@@ -112,7 +112,7 @@ def test_a_number_outside_its_range_is_refused_and_ends_nothing(lab):
 
 
 @pytest.mark.parametrize(("node", "name", "value"), [("compensation_node", "approach", 2.0), ("page_node", "port", 1)])
-def test_what_is_read_at_start_is_not_set_later_without_a_word(lab, node, name, value):
+def test_a_start_parameter_that_is_set_later_is_refused(lab, node, name, value):
     process = lab.start(node, **({"port": 0} if node == "page_node" else {}))
     for odd, given in ((name, value), ("use_sim_time", True)):
         answer = set_parameter(lab, node, odd, given)
@@ -133,7 +133,7 @@ sys.exit(node.main(sys.argv[1:]))
 """
 
 
-def test_a_fault_of_the_program_fails_what_was_asked_and_nothing_else(lab):
+def test_a_fault_of_the_program_fails_only_the_request(lab):
     program = lab.folder / "faulty.py"
     program.write_text(FAULTY)
     lab.driver()

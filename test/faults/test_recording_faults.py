@@ -108,7 +108,7 @@ def test_a_full_disk_ends_the_run_and_not_the_node(running):
     assert read(identification.newest(), include=("idle", "hold")).records
 
 
-def test_where_nothing_may_be_written_nothing_moves(running):
+def test_without_a_writable_folder_nothing_moves(running):
     """A file where the folder was: also root may not write into it."""
     lab, samples, identification = running
     at_rest(lab, samples)

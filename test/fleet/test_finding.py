@@ -70,12 +70,12 @@ def test_the_version_changes_with_the_file(lab):
 
 
 @pytest.mark.parametrize("url", ["missing", "stage_b/*.h5", "stage_b/notes"])
-def test_what_names_nothing_is_refused(lab, url):
+def test_a_url_without_recordings_is_refused(lab, url):
     with pytest.raises(RecordingError, match="expected"):
         find_recordings([f"{lab}/{url}"])
 
 
-def test_a_scheme_that_nobody_knows_is_refused():
+def test_an_unknown_url_scheme_is_refused():
     with pytest.raises(RecordingError, match="expected a local path, s3://"):
         find_recordings(["nowhere://lab/x.npz"])
 

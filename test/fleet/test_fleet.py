@@ -130,7 +130,7 @@ def test_workers_of_a_scheduler_elsewhere(recordings, client, rows, tmp_path):
     assert client.submit(sum, (1, 2)).result(timeout=60) == 3
 
 
-def test_a_run_that_was_broken_off_goes_on(recordings, client, tmp_path):
+def test_an_interrupted_run_continues(recordings, client, tmp_path):
     sources, work = find_recordings([str(recordings)]), Wait(0.01)
 
     def stop(word, fraction):

@@ -100,7 +100,7 @@ def test_an_unknown_bucket_is_refused(bucket):
         find_recordings(["s3://nobody/x"], Storage())
 
 
-def test_without_the_extra_one_line_says_what_to_install(tmp_path, monkeypatch):
+def test_without_the_extra_one_line_states_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "fsspec", None)
     from piezo_hysteresis.fleet.storage import _disk
 

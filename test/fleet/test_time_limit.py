@@ -45,7 +45,7 @@ def test_work_within_the_limit_is_left_alone():
     assert total == 499501
 
 
-def test_a_limit_that_comes_at_the_end_hits_nothing_else():
+def test_a_late_time_limit_does_not_affect_later_work():
     """The limit falls close to the end of the work, before or after it; afterwards the thread is free of it."""
     spent = 0
     for step in range(200):

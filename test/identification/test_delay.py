@@ -46,7 +46,7 @@ def test_three_samples_at_every_noise(noise):
 
 @pytest.mark.parametrize("resonance", [300.0, 700.0, 1900.0])
 @pytest.mark.parametrize("samples", [1, 3])
-def test_edges_before_which_the_stage_still_rings_have_no_say(resonance, samples):
+def test_edges_before_which_the_stage_rings_are_not_used(resonance, samples):
     pole = np.exp(2 * np.pi * resonance * SAMPLE_PERIOD * (-0.01 + 1j))
     mode = np.real(np.poly([pole, np.conj(pole)]))
     quiet = np.repeat([0.0, 1.0], 1000)
@@ -87,7 +87,7 @@ def test_the_deviation_of_the_averaged_response_is_that_of_the_noise():
     assert np.std(errors) == pytest.approx(1.0, abs=0.15)
 
 
-def test_slow_data_give_a_bound_and_say_so():
+def test_slow_data_give_an_upper_bound_with_a_notice():
     voltage = np.repeat([0.0, 5.0, 0.0, 5.0], 60)
     pole = np.exp(-5e-3 / 13e-3)
     y = lfilter([0.0, 1.0 - pole], [1.0, -pole], voltage)
@@ -106,7 +106,7 @@ def test_slow_data_give_a_bound_and_say_so():
         Record(STEP, np.random.default_rng(0).standard_normal(STEP.size), SAMPLE_PERIOD),
     ],
 )
-def test_without_a_visible_step_the_error_says_what_is_missing(record):
+def test_without_a_visible_step_the_error_states_what_is_missing(record):
     with pytest.raises(IdentificationError, match=r"step"):
         identify_delay([record])
 
@@ -124,7 +124,7 @@ def test_percentages_of_noise_refer_to_the_full_stroke():
     assert rise[-1] == pytest.approx(STROKE, rel=1e-3)
 
 
-def test_what_rings_before_the_edges_does_not_bring_the_onset_forward():
+def test_ringing_before_the_edges_does_not_make_the_onset_earlier():
     # 900 Hz, lightly damped: a twentieth of the ringing of each edge is left when the next one comes
     period, delay = 2e-5, 8
     time = period * np.arange(800)

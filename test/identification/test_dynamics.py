@@ -52,7 +52,7 @@ def test_exact_from_exact_data():
     assert model.free_run_error < 1e-10
 
 
-def test_records_of_different_offset_join():
+def test_records_with_different_offsets_are_fitted_together():
     half = W.size // 2
     model = identify_arx([(W[:half], Y[:half] + 0.3), (W[half:], Y[half:] - 5.0)], DELAY, SAMPLE_PERIOD)
     np.testing.assert_allclose(model.response(BAND), PUBLISHED.response(BAND), rtol=1e-5)
@@ -75,7 +75,7 @@ def test_iterations_remove_the_bias_of_the_sensor_noise():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_iterations_come_to_weak_and_lightly_damped_modes_last(seed):
+def test_iterations_find_weak_and_lightly_damped_modes_last(seed):
     random = np.random.default_rng(seed)
     drive = 0.04 * random.standard_normal(30_000)
     y = 5e-4 * random.standard_normal(drive.size)
@@ -121,7 +121,7 @@ def test_the_result_is_stable_even_when_least_squares_is_not(seed, integrations,
     ("signals", "orders"),
     [([(np.zeros(100), np.ones(100))], (2, 2)), ([(np.arange(5.0), np.arange(5.0))], (8, 8)), ([(W, Y)], (2, 0))],
 )
-def test_what_cannot_be_fitted_is_refused(signals, orders):
+def test_data_that_cannot_be_fitted_are_refused(signals, orders):
     with pytest.raises(IdentificationError, match="expected"):
         identify_arx(signals, DELAY, SAMPLE_PERIOD, orders)
 

@@ -66,7 +66,7 @@ def test_the_rich_protocol_fits_the_published_stage():
     assert "V/s" in str(summary)
 
 
-def test_ways_to_and_from_a_waveform_keep_to_the_ramp_rate():
+def test_ramps_around_a_waveform_have_the_ramp_rate():
     phase = LIMITS.from_safe_to_safe(excitation.hold(LIMITS, 0.5, 0.01))
     assert np.max(np.abs(np.diff(phase))) <= LIMITS.ramp_rate * LIMITS.sample_period * (1 + 1e-9)
     assert phase.max() == 5.0
@@ -110,7 +110,7 @@ def test_odd_multisine_leaves_the_even_lines_empty():
     assert np.max(np.abs(wave)) == pytest.approx(2.0)
 
 
-def test_the_seed_decides():
+def test_the_seed_determines_the_waveform():
     first, again, other = (protocol.short(seed=s) for s in (1, 1, 2))
     assert all(np.array_equal(a.voltage, b.voltage) for a, b in zip(first, again, strict=True))
     assert not np.array_equal(first.phases[3].voltage, other.phases[3].voltage)

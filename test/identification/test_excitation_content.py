@@ -37,7 +37,7 @@ def triangle(frequency, duration, period):
 
 
 @pytest.mark.parametrize("period", [1e-2, 5e-3, 1e-3, 2e-5])
-def test_a_jump_in_a_slow_drive_is_no_broadband_excitation(period):
+def test_a_jump_in_a_slow_drive_is_not_broadband(period):
     time = period * np.arange(round(30.0 / period) if period > 1e-4 else 100_000)
     voltage = 1.8 + 1.8 * np.sin(2 * np.pi * time)
     voltage[0] = 0.0
@@ -60,7 +60,7 @@ def test_noise_chirps_and_many_steps_are_broadband(random):
         assert content(voltage, 1e-4).is_broadband
 
 
-def test_a_fast_triangle_behind_a_hold_determines_no_orders_of_dynamics():
+def test_a_fast_triangle_after_a_hold_does_not_determine_the_dynamics():
     drive = growing_sine(60.0, 5e-4, (0.4, 0.7, 1.0), triangle=True)
     record = Record(drive, 1e-6 * drive, 5e-4, "triangle", initial_voltage=0.0)
     assert roles_of(Experiment((record,))).broadband == ()

@@ -64,7 +64,7 @@ def test_the_published_loop_is_found_number_by_number():
         assert found[name] == pytest.approx(value, rel=1e-3)
 
 
-def test_a_loop_that_continues_carries_its_state():
+def test_a_continuing_loop_keeps_its_state():
     truth = BoucWen()
     w = run(truth, V)
     cut = 1700
@@ -86,6 +86,6 @@ def test_the_fit_on_all_samples_is_within_its_uncertainty():
 
 
 @pytest.mark.parametrize("loops_", [[], [Loop(np.ones(50), np.ones(50), start=1.0)], [Loop(V, V, weight=0.0)]])
-def test_without_loops_the_error_says_what_to_record(loops_):
+def test_without_loops_the_error_states_what_to_record(loops_):
     with pytest.raises(IdentificationError, match="triangle"):
         BoucWen().started(loops_)

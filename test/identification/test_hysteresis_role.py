@@ -162,7 +162,7 @@ def test_it_is_identified_by_its_class_alone(experiment):
     assert found.model[Arx.name].dc_gain == pytest.approx(1.0, rel=1e-6)  # the gauge is held for its gains too
 
 
-def test_its_block_brings_its_inverse():
+def test_its_block_defines_its_inverse():
     model = Model((OwnPlays(**TRUTH.values), Arx(a=(-0.6,), b=(0.4,), delay=2.0), Offset()), 2e-4, 10.0, 1e-5)
     inverse = Inverse(model)
     moved = 4.0 * np.sin(np.linspace(0.0, 9.0, 300))
@@ -184,7 +184,7 @@ def test_an_operator_without_inverse_is_refused_by_name():
         Inverse(Model((Silent(**TRUTH.values), Arx(b=(1.0,))), 2e-4, 10.0, 1e-5))
 
 
-def test_a_chain_without_one_says_so():
+def test_a_chain_without_a_hysteresis_is_refused():
     bare = Model((Arx(b=(1.0,)),), 2e-4)
     assert not bare.has_hysteresis
     with pytest.raises(ModelError, match="expected one"):

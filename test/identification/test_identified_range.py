@@ -30,7 +30,7 @@ def sine(amplitude, frequency):
     return Record(drive, 1e-6 * drive, 1e-3, f"sine_{frequency:g}hz")
 
 
-def test_a_drive_inside_is_not_noticed_and_one_outside_is():
+def test_only_a_drive_outside_the_range_is_reported():
     fitted = (sine(2.0, 1.0), sine(3.0, 10.0))
     origin = identified_range(fitted, (0, 1))
     assert (float(origin["voltage_min"]), float(origin["voltage_max"])) == (2.0, 8.0)
@@ -57,7 +57,7 @@ def test_a_stream_is_watched_block_by_block():
         assert [n.kind for n in watch.findings()] == kinds
 
 
-def test_one_swing_of_a_slow_drive_has_no_frequency_yet():
+def test_one_swing_of_a_slow_drive_does_not_show_a_frequency():
     model = Model((BoucWen(),), 1e-3, provenance=identified_range((sine(3.0, 2.0),), (0,)))
     watch = RangeWatch(model, 1e-3)
     watch.add(sine(3.0, 2.0).voltage[:100])

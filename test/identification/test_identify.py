@@ -90,7 +90,7 @@ def test_three_phases_give_the_truth_within_its_uncertainty(complete):
     assert complete.fit.converged
 
 
-def test_the_frequency_response_knows_its_error(complete):
+def test_the_frequency_response_has_the_right_uncertainty(complete):
     frequency = np.geomspace(1.0, 2000.0, 20)
     value, error = complete.response(frequency)
     off = np.abs(value / TRUTH["arx"].response(frequency, 1e-4) - 1.0)
@@ -98,13 +98,13 @@ def test_the_frequency_response_knows_its_error(complete):
     assert error.max() < 1e-3
 
 
-def test_validation_is_held_out_and_predicted_to_the_noise(complete):
+def test_validation_is_not_fitted_and_predicted_to_the_noise(complete):
     assert [p.phase for p in complete.phases if not p.is_fitted] == ["validation"]
     assert complete.free_run_error == pytest.approx(NOISE, rel=0.05)
     assert complete.model.provenance["source"] == "complete"
 
 
-def test_the_diagnostic_gives_that_noise_bleaches_the_loop(complete):
+def test_the_comparison_shows_the_bias_from_noise(complete):
     low, high = complete.comparisons
     assert low.amplitude < high.amplitude
     assert low.from_v > 1.2 * low.from_w
@@ -118,7 +118,7 @@ def test_the_result_can_be_read(complete):
         assert word in text
 
 
-def test_orders_are_chosen_where_asked():
+def test_orders_are_chosen_on_request():
     found = identify(Experiment(tuple(play(step(), noise(), triangle()))), orders=None)
     assert 2 <= found.model["arx"].array("a").size <= 6
     assert percent(found.model, play(mixture(3), seed=4)) < 0.1
@@ -139,7 +139,7 @@ def test_records_with_their_own_sensor_zero_and_bipolar_drive():
     assert percent(found.model, play(mixture(5, bipolar), limits=bipolar, seed=7)) < 0.1
 
 
-def test_records_that_continue_carry_the_state():
+def test_records_that_continue_keep_the_state():
     bodies = (step(), noise(), triangle())
     joined = Experiment(tuple(play(*bodies, continues=True)))
     found = identify(joined, orders=(2, 2))
@@ -147,7 +147,7 @@ def test_records_that_continue_carry_the_state():
     assert percent(found.model, play(mixture(3), seed=4)) < 0.1
 
 
-def test_slow_data_give_loop_and_lag_and_say_so():
+def test_slow_data_give_loop_and_lag_with_a_notice():
     # 1 Hz loops sampled at 200 Hz, with a jump from rest at the beginning that shows dead time and pole
     slow = Model((BoucWen(), Arx(a=(-0.68,), b=(0.32,), delay=1.0)), 5e-3, 10.0, 1e-5)
     time = 5e-3 * np.arange(3000)
@@ -168,7 +168,7 @@ def test_phases_stored_slowly_join_fast_ones():
 
 
 @pytest.mark.parametrize("voltage", [np.zeros(1000), np.full(1000, 5.0)])
-def test_without_motion_the_error_says_what_is_missing(voltage):
+def test_without_motion_the_error_states_what_is_missing(voltage):
     with pytest.raises(IdentificationError, match="does not move"):
         identify(Experiment((Record(voltage, np.zeros(1000), 1e-3),)))
 
@@ -180,7 +180,7 @@ def test_a_dead_sensor_or_a_few_samples_are_named(size, gain, message):
         identify(Experiment((Record(voltage, gain * voltage, 1e-3),)))
 
 
-def test_a_record_that_begins_in_the_middle_counts_from_its_first_full_loop():
+def test_a_truncated_record_is_fitted_from_its_first_full_loop():
     time = 1e-3 * np.arange(6000)
     slow = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=2.0)), 1e-3, 10.0, 1e-5)
     voltage = 5.0 + 4.5 * np.sin(2 * np.pi * time + 1.0)
@@ -217,7 +217,7 @@ def test_a_stage_that_lags_by_less_than_a_sample_is_identified():
     assert any(n.kind == "lag_only" for n in found.notices)
 
 
-def test_phases_that_are_held_out_must_be_there():
+def test_phases_that_are_held_out_must_exist():
     experiment = Experiment(tuple(play(triangle())))
     with pytest.raises(RecordError, match="got phase 'sine', expected some of triangle"):
         identify(experiment, held_out=("sine",))

@@ -81,7 +81,7 @@ def test_two_drives_move_three_displacements():
     assert identify_axes(two, length=10).run(np.zeros((5, 2)), identify_axes(two, length=10).rest())[0].shape == (5, 3)
 
 
-def test_what_does_not_fit_is_refused(model, tmp_path):
+def test_invalid_records_and_files_are_refused(model, tmp_path):
     with pytest.raises(IdentificationError, match="record longer"):
         identify_axes([plant(1, size=100)])
     with pytest.raises(ModelError, match="shape"):

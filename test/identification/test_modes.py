@@ -65,7 +65,7 @@ def test_all_modes_are_found_under_noise(modes):
 
 
 @pytest.mark.parametrize("modes", PLANTS[1:])
-def test_four_modes_are_met_closer_than_by_least_squares_of_the_arx(modes):
+def test_four_modes_are_more_accurate_than_with_least_squares_of_the_arx(modes):
     drive, y = recorded(modes)
     clean = answer(drive, modes)
 
@@ -86,7 +86,7 @@ def test_one_mode_is_known_to_a_hundredth(frequency, damping, seed):
     np.testing.assert_allclose(found.response(band), exact, rtol=0.02)
 
 
-def test_offsets_of_records_do_not_count():
+def test_offsets_of_records_have_no_influence():
     signals = [(u, y + 3.0 * k) for k, (u, y) in enumerate([recorded(PLANTS[0], 0), recorded(PLANTS[0], 1)])]
     assert identify_modes(signals, 1, PERIOD, (8, 8), ITERATIONS).free_run_error == pytest.approx(NOISE, rel=0.1)
 

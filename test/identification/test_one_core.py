@@ -27,13 +27,13 @@ def _threads() -> set[int]:
     return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
 
-def test_threads_of_blas_are_one_inside_and_given_back() -> None:
+def test_blas_uses_one_thread_inside_and_all_afterwards() -> None:
     with threadpool_limits(limits=2, user_api="blas"):
         assert on_one_core(_threads)() == {1}
         assert _threads() == {2}
 
 
-def test_threads_are_given_back_when_a_fit_fails() -> None:
+def test_blas_threads_are_restored_when_a_fit_fails() -> None:
     @on_one_core
     def fails() -> None:
         raise IdentificationError("nothing moves")

@@ -51,7 +51,7 @@ def test_the_wander_has_the_variance_of_a_random_walk():
     assert np.abs(np.diff(rows)).max() < 0.01 * np.abs(rows[1:]).max()  # the cuts between pieces do not show
 
 
-def test_smooth_weights_and_one_rate_cost_nothing_and_others_do():
+def test_smooth_weights_and_one_rate_have_no_cost_and_others_have():
     smooth = 0.02 * np.exp(-0.5 * ((np.arange(16) - 8.0) / 3.0) ** 2)
     model = Model(
         (
@@ -76,7 +76,7 @@ def test_smooth_weights_and_one_rate_cost_nothing_and_others_do():
 
 
 @pytest.mark.parametrize("share", [0.004, -0.004])
-def test_a_drift_of_one_record_is_not_taken_for_creep(share):
+def test_a_drift_of_one_record_is_not_mistaken_for_creep(share):
     drive = growing_sine(1.0, PERIOD, (1.0,), cycles=25, hold=0.0)
     record = STAGE.play(drive, PERIOD)
     drift = share * STAGE.stroke * (1.0 - np.exp(-record.time / 8.0))
@@ -86,7 +86,7 @@ def test_a_drift_of_one_record_is_not_taken_for_creep(share):
     assert slow < 1.5 * STAGE.creep_slow
 
 
-def test_the_interval_of_a_lag_holds_what_one_rate_leaves_open():
+def test_the_interval_of_a_lag_includes_the_uncertainty_of_one_rate():
     """A pole that one slow rate does not show is part of the lag; the interval has to reach it."""
     stage = Nanopositioner(mode=600.0, pole=1e-4, delay=1e-4)
     record = stage.play(growing_sine(10.0, 5e-4, (0.4, 1.0)), 5e-4)

@@ -33,7 +33,7 @@ def test_every_number_of_the_loop_is_found(results):
     assert np.max(np.abs([r.parameters for r in results])) < 0.5
 
 
-def test_errors_are_as_large_as_the_uncertainties_say(results):
+def test_errors_agree_with_the_uncertainties(results):
     deviates = np.concatenate([r.deviates for r in results])
     assert 0.5 < np.sqrt(np.mean(deviates**2)) < 1.6
 
@@ -47,6 +47,6 @@ def test_free_run_matches_the_noise_free_truth(results):
     assert max(r.free_run for r in results) < 0.02
 
 
-def test_noise_bleaches_the_published_three_steps(results):
+def test_noise_biases_the_published_three_steps(results):
     assert min(r.published_gain for r in results) > 20.0
     assert min(r.published_free_run for r in results) > 10 * max(r.free_run for r in results)

@@ -39,7 +39,7 @@ def written_out(signals, na, nb, delay):
 
 
 @given(st.integers(0, 4), st.integers(1, 4), st.integers(1, 5), st.integers(0, 2**32 - 1))
-def test_triangle_holds_the_inner_products_of_all_records(na, nb, delay, seed):
+def test_the_triangular_factor_contains_the_inner_products_of_all_records(na, nb, delay, seed):
     random = np.random.default_rng(seed)
     signals = [(random.normal(3.0, 1.0, n), random.normal(-20.0, 1.0, n)) for n in (30, 47)]
     r = triangle(signals, (na, nb), delay)
@@ -48,7 +48,7 @@ def test_triangle_holds_the_inner_products_of_all_records(na, nb, delay, seed):
     assert np.array_equal(r, np.triu(r))
 
 
-def test_products_that_determine_nothing_give_way_to_a_factorisation():
+def test_singular_products_are_replaced_by_a_factorisation():
     """A sine is a combination of two of its own delays: its products are singular to rounding."""
     time = np.arange(9000.0)
     signals = [(np.sin(0.01 * time), 0.3 * np.sin(0.01 * (time - 4.0)) + 1e-9 * np.cos(time))]

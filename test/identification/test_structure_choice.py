@@ -50,7 +50,7 @@ def test_a_rate_between_two_is_predicted(identified):
     assert max(percents(identified.model, played(STAGE, (1.0, 10.0, 50.0)))) < 0.3
 
 
-def test_a_model_as_it_is_is_scored_on_other_records(identified):
+def test_an_unchanged_model_is_scored_on_other_records(identified):
     """No number of it is free: what `diagnose --model` asks of the given model."""
     again = played(replace(STAGE, noise_seed=1), (1.0, 50.0)).records
     kept = score_left_out(identified.model, again, [STAGE.noise * STAGE.stroke] * 2, (0, 1), adjusts=False)
@@ -58,7 +58,7 @@ def test_a_model_as_it_is_is_scored_on_other_records(identified):
     assert 0.0 <= kept < score_left_out(worse, again, [STAGE.noise * STAGE.stroke] * 2, (0, 1), adjusts=False)
 
 
-def test_what_the_stage_does_is_in_the_model(identified):
+def test_the_effects_of_the_stage_are_in_the_model(identified):
     assert HysteresisMemory.name in identified.model
     assert identified.model[HysteresisMemory.name]["virgin"] == 1.0
     creep = identified.model[CreepTwoRates.name]
@@ -75,7 +75,7 @@ def test_one_rate_predicts_others_and_larger_amplitudes():
     assert max(percents(small.model, played(STAGE, (1.0, 50.0)))) < 0.6
 
 
-def test_a_record_is_cut_by_what_its_drive_does():
+def test_a_record_is_cut_by_its_drive():
     u = np.concatenate((growing_sine(1.0, PERIOD, (0.3, 0.9)), growing_sine(20.0, PERIOD, (0.9,), hold=0.0)))
     record = Nanopositioner().play(u, PERIOD)
     pieces = pieces_of([record], [0])

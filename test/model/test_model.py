@@ -78,7 +78,7 @@ def test_the_scales_are_part_of_the_model() -> None:
     np.testing.assert_allclose(doubled.run(2 * u, doubled.rest(2 * u[0]))[0], 3 * y, rtol=1e-12)
 
 
-def test_a_lag_holds_at_every_period_and_run_takes_it() -> None:
+def test_a_lag_is_the_same_at_every_sample_period() -> None:
     """Samples of 100 µs of a model that has 1 µs only because its fastest record had."""
     lag = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=300.0)), 1e-6, provenance=identified_periods((1e-6, 1e-4)))
     u = 5.0 - 5.0 * np.cos(2 * np.pi * 50.0 * 1e-4 * np.arange(400))
@@ -95,7 +95,7 @@ def test_a_lag_holds_at_every_period_and_run_takes_it() -> None:
         lag.rest(0.0, sample_period=1e-7)
 
 
-def test_a_run_goes_on_at_another_period_with_its_memory() -> None:
+def test_a_run_continues_at_another_sample_period_with_its_state() -> None:
     _, before = MODEL.run(np.linspace(0.0, 8.0, 200), MODEL.rest(0.0))
     settled, _ = MODEL.run(np.full(500, 8.0), before)
     held, state = MODEL.run(np.full(50, 8.0), before, sample_period=1e-2)
@@ -119,7 +119,7 @@ def test_a_run_goes_on_at_another_period_with_its_memory() -> None:
         (lambda: effect_named("crepe"), "unknown effect 'crepe', expected one of"),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_one_line(build, message: str) -> None:
+def test_invalid_values_are_refused_in_one_line(build, message: str) -> None:
     with pytest.raises(ModelError, match=message) as raised:
         build()
     assert "\n" not in str(raised.value)
@@ -134,7 +134,7 @@ def test_unknown_and_impossible_numbers_are_refused() -> None:
         MODEL.with_values({"bouc_wen.q": 1.0})
 
 
-def test_creep_goes_on_between_records_that_continue() -> None:
+def test_creep_continues_between_continuing_records() -> None:
     model = MODEL.with_effect(Creep(gamma=0.02, tau_min=1e-3, tau_max=1e3))
     drive = np.concatenate((np.linspace(0.0, 5.0, 200), np.full(4800, 5.0), np.linspace(5.0, 2.0, 300)))
     whole = Record(drive, drive, PERIOD)
@@ -147,7 +147,7 @@ def test_creep_goes_on_between_records_that_continue() -> None:
     np.testing.assert_allclose(slope, model.sensitivities(whole, ["creep.gamma"])[1]["creep.gamma"][5000:], rtol=1e-3)
 
 
-def test_a_part_of_an_experiment_carries_the_state_or_says_that_it_cannot():
+def test_a_part_of_an_experiment_keeps_the_state_or_warns():
     whole = Record(5.0 - 5.0 * np.cos(np.arange(3000.0) / 300.0), np.zeros(3000), PERIOD, phase="triangle")
     first, second = whole.split(1500)
     second = replace(second, phase="validation")

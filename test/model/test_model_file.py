@@ -76,7 +76,7 @@ def _same(one: Model, other: Model) -> None:
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
 @given(models())
-def test_text_and_parameters_carry_any_model_bit_for_bit(model: Model) -> None:
+def test_text_and_parameters_store_any_model_bit_for_bit(model: Model) -> None:
     _same(loads(dumps(model)), model)
     _same(from_parameters(to_parameters(model)), model)
 
@@ -214,7 +214,7 @@ def test_save_and_load(tmp_path: Path) -> None:
         ("p2: 2.1925", "p2: [[1.0]]", "list of lists"),
     ],
 )
-def test_what_is_no_model_is_refused_in_one_line(old: str, new: str, message: str) -> None:
+def test_an_invalid_model_file_is_refused_in_one_line(old: str, new: str, message: str) -> None:
     text = dumps(MODEL)
     assert old in text
     with pytest.raises(PiezoError, match=message.replace("|", r"\|")) as error:
@@ -245,7 +245,7 @@ def test_a_missing_file_and_a_foreign_one(tmp_path: Path) -> None:
         load(tmp_path / "image.yaml")
 
 
-def test_published_stage_holds_the_figures_of_the_paper() -> None:
+def test_the_published_stage_contains_the_values_of_the_paper() -> None:
     model = load(PUBLISHED)
     assert parameters(dumps(model)) == parameters(PUBLISHED.read_text())
     assert model["arx"]["delay"] == 3.0

@@ -184,7 +184,7 @@ def test_after_an_alarm_the_group_is_recalibrated_and_the_residual_is_back(lab, 
     assert "no change" in reported[-1].message
 
 
-def test_a_change_that_no_few_numbers_explain_asks_for_an_identification(lab, tmp_path):
+def test_a_change_of_shape_needs_a_full_identification(lab, tmp_path):
     save(MODEL, tmp_path / "model.yaml")
     reported = lab.listen(DiagnosticStatus, "change", COMMAND)
     parameters = {"model_file": str(tmp_path / "model.yaml"), "baseline_folder": str(tmp_path), "baseline_time": 20.0}

@@ -112,7 +112,7 @@ def test_the_stage_follows_a_trajectory_and_learning_makes_it_better(lab):
     assert node.samples.voltage.min() >= 0.0 and node.samples.voltage.max() <= 10.0
 
 
-def test_what_cannot_be_followed_is_refused_whole_and_nothing_moves(lab):
+def test_an_unreachable_trajectory_is_refused_and_nothing_moves(lab):
     node = Compensation(lab, longest_trajectory=2.0)
     first = node.samples.newest.voltage[-1]
     for phase, wanted, period, reason in (
@@ -129,7 +129,7 @@ def test_what_cannot_be_followed_is_refused_whole_and_nothing_moves(lab):
     assert not node.ask("plan").success, "the last one that was planned is out of reach"
 
 
-def test_a_displacement_is_set_and_a_slow_integral_removes_what_is_left(lab):
+def test_a_displacement_is_set_and_a_slow_integral_removes_the_remaining_error(lab):
     node = Compensation(lab, integral_time=0.3)
     target = 0.4 * STROKE
     publisher = lab.publisher(Float64, "set_displacement")
@@ -220,7 +220,7 @@ def test_learning_claims_the_stage_and_leaves_it_safe(lab):
     lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
 
 
-def test_what_somebody_else_has_claimed_is_refused_with_the_reason(lab):
+def test_a_stage_claimed_by_another_program_is_refused_with_the_reason(lab):
     node = Compensation(lab)
     holders = lab.listen(String, "claimed_by", LATCHED)
     lab.publisher(KeyValue, "claim").publish(KeyValue(key="another_lab", value="claim"))

@@ -35,7 +35,7 @@ def test_a_job_is_followed_to_its_end(lab):
     assert "aborted" in follow.output.splitlines()[-1]
 
 
-def test_without_a_job_it_goes_on_until_it_is_interrupted(lab):
+def test_without_a_job_it_follows_until_it_is_interrupted(lab):
     Identification(lab).await_state("idle")
     follow = lab.start("piezo", program=[sys.executable, "-m", "piezo_hysteresis.nodes.follow", "/"])
     lab.wait(lambda: "idle" in follow.output, "the state")

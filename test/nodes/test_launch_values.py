@@ -27,7 +27,7 @@ from piezo_hysteresis.nodes.runtime.launch_values import parameter_file, switch,
 @pytest.mark.parametrize(
     ("text", "value"), [("true", True), ("True", True), ("1", True), ("False", False), ("0", False)]
 )
-def test_a_switch_means_what_one_types(text, value):
+def test_a_switch_accepts_the_usual_words(text, value):
     assert switch("autostart", text) is value
 
 

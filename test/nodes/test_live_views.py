@@ -148,7 +148,7 @@ def test_every_panel_of_foxglove_is_in_its_layout():
     assert sorted(leaves(layout["layout"])) == sorted(layout["configById"])
 
 
-def test_a_recorder_that_follows_the_file_hears_every_topic_and_misses_nothing():
+def test_a_recorder_with_the_qos_file_receives_every_message():
     profiles = yaml.safe_load((CONFIG / "record_qos.yaml").read_text())
     assert {name for name, topic in TOPICS.items() if not is_live(topic.quality)} <= {n[1:] for n in profiles}
     assert "/command" in profiles

@@ -28,7 +28,7 @@ VOLTAGE = "qos_overrides./voltage.publisher.reliability"
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-def test_a_driver_publishes_as_its_parameters_say_in_the_frame_of_its_axis(lab):
+def test_a_driver_uses_the_qos_of_its_parameters_and_the_frame_of_its_axis(lab):
     lab.driver("-p", f"{VOLTAGE}:=best_effort", frame_id="lab/mirror", sample_period=1e-4)
     live, samples = lab.listen(JointState, "live"), lab.listen(PointCloud2, "samples")
     voltage = lab.listen(Float64, "voltage", BEST_EFFORT)
@@ -38,7 +38,7 @@ def test_a_driver_publishes_as_its_parameters_say_in_the_frame_of_its_axis(lab):
     assert reported.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
-def test_a_word_that_is_no_quality_is_refused_in_one_line(lab):
+def test_an_unknown_qos_policy_is_refused_in_one_line(lab):
     refused = "qos_overrides./prediction.publisher.reliability:=besteffort"
     node = lab.start("model_node", "-p", refused, fresh=True)
     assert node.wait() == 2

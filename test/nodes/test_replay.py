@@ -61,7 +61,7 @@ def by_index(clouds):
     return rows
 
 
-def test_a_bag_of_everything_predicts_the_same_and_its_commands_move_nothing(lab):
+def test_a_played_bag_gives_the_same_prediction_and_moves_nothing(lab):
     file = str(save(MODEL, lab.folder / "model.yaml"))
     live = lab.start("model_node", model_file=file)
     driver = lab.driver(sample_period=PERIOD, autostart=False)

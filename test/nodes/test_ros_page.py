@@ -107,7 +107,7 @@ def test_quality_of_service_is_as_documented(nodes):
             assert (profile.durability == DurabilityPolicy.TRANSIENT_LOCAL) == ("transient local" in quality), name
 
 
-def test_what_anyone_may_publish_is_subscribed_by_the_one_who_acts_on_it(nodes):
+def test_every_input_topic_has_a_subscriber(nodes):
     for node in ("driver", "compensation"):
         listened = dict(nodes.node.get_subscriber_names_and_types_by_node(NODES[node], "/"))
         open_to_all = {
@@ -150,7 +150,7 @@ def allowed(node):
 
 
 @pytest.mark.parametrize("node", ALL_NODES)
-def test_the_security_policy_allows_what_a_node_uses_and_nothing_more(nodes, node):
+def test_the_security_policy_allows_exactly_the_topics_of_a_node(nodes, node):
     def of(what):
         return {name for name, _ in getattr(nodes.node, f"get_{what}_names_and_types_by_node")(node, "/")}
 
@@ -185,12 +185,12 @@ def test_the_policy_grants_the_actions_to_the_nodes_that_serve_them_and_to_the_p
     assert "request" not in allowed("planner")
 
 
-def test_no_comment_of_the_policy_stands_where_sros2_looks_for_enclaves():
+def test_comments_of_the_policy_do_not_disturb_sros2():
     whole = ElementTree.parse(POLICY, ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True)))
     assert [e.tag for e in whole.getroot().find("enclaves")] == ["enclave"] * 7
 
 
-def test_the_policy_has_a_key_for_who_drives_and_one_for_who_looks():
+def test_the_policy_has_keys_for_operator_and_observer():
     operator, observer = allowed("operator"), allowed("observer")
     assert {"/command", "/set_voltage"} <= operator["publish"]
     assert not {"/command", "/set_voltage", "/samples", "/model"} & observer["publish"]

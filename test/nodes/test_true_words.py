@@ -35,7 +35,7 @@ PERIOD = 1e-4
 EVERY = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def test_abort_of_a_diagnosis_says_that_the_stage_was_left_where_it_is(lab):
+def test_abort_of_a_diagnosis_reports_that_the_stage_was_not_moved(lab):
     driver = lab.driver(sample_period=PERIOD)
     samples, ask = lab.streaming(), lab.publisher(Float64, "set_voltage")
     identification = Identification(lab)
@@ -68,7 +68,7 @@ def test_plan_of_a_driver_that_was_killed_has_no_limits(lab):
     assert answer.message.startswith("no limits")
 
 
-def test_every_phase_is_reported_to_who_comes_later_and_logged(lab):
+def test_every_phase_is_logged_and_reported_to_late_subscribers(lab):
     driver = lab.driver(sample_period=PERIOD, real_time_factor=4.0)
     identification = Identification(lab)
     identification.begin()
@@ -97,7 +97,7 @@ def test_a_remapped_topic_is_recorded_under_its_own_name(lab):
     assert "conditioning" in {record.phase for record in read(path)}
 
 
-def test_simulated_time_that_nobody_publishes_is_reported(lab):
+def test_missing_simulated_time_is_reported(lab):
     lab.start("model_node", use_sim_time=True)
     health = lab.diagnostics()
 

@@ -267,7 +267,7 @@ def test_a_stream_joined_in_motion_is_flagged_until_the_loops_have_forgotten() -
     assert np.abs(residual(answers[:3])).max() > 1e-2 * np.ptp(measured)
 
 
-def test_after_a_gap_nothing_counts_until_the_loops_have_forgotten() -> None:
+def test_after_a_gap_predictions_are_flagged_until_the_memory_is_lost() -> None:
     """What the drive did in the gap is unknown: from the bottom to the top and back, or nothing."""
     voltage = sine(30_000, rest=1000)
     measured = truth(MODEL, voltage)
@@ -291,7 +291,7 @@ def test_a_gap_at_rest_may_hide_a_loop() -> None:
     assert predictor.predict(2500, 50_000_000, rest, rest).warming_up
 
 
-def test_what_was_never_measured_is_known_and_a_stage_driven_before_is_not() -> None:
+def test_a_new_stage_is_at_rest_and_a_stage_driven_before_is_unknown() -> None:
     rest = np.zeros(500)
     for settled in (True, False):
         predictor = Predictor(PERIOD, MODEL)
@@ -299,7 +299,7 @@ def test_what_was_never_measured_is_known_and_a_stage_driven_before_is_not() -> 
         assert predictor.predict(2000, 40_000_000, rest, rest, follows_gap=True).warming_up is not settled
 
 
-def test_noise_of_a_measured_drive_forgets_nothing() -> None:
+def test_noise_of_a_measured_drive_does_not_erase_the_memory() -> None:
     voltage = sine(1000, rest=0)[500:]
     held = voltage[-1] + 1e-3 * np.random.default_rng(1).standard_normal(200_000)
     predictor = Predictor(PERIOD, MODEL)

@@ -90,7 +90,7 @@ def test_delay_and_pole_come_from_the_first_moments(identified):
     assert -period / np.log(-arx.array("a")[0]) == pytest.approx(13e-3, abs=2e-3)
 
 
-def test_drift_beside_creep_does_no_harm(fitted, unseen):
+def test_drift_in_addition_to_creep_does_not_increase_the_error(fitted, unseen):
     found = diagnose(fitted, effects=(ThermalDrift,))
     assert settled_percent(found.model, fitted) <= 0.32
     assert errors(found.model, unseen).percent <= 0.65

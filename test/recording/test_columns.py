@@ -53,7 +53,7 @@ class Frame:
 
 
 @pytest.mark.parametrize("kind", [dict, Frame])
-def test_an_experiment_comes_back_as_it_was(kind: type) -> None:
+def test_an_experiment_is_the_same_after_a_round_trip(kind: type) -> None:
     again = from_columns(kind(to_columns(EXPERIMENT)))
     assert [r.phase for r in again] == ["rest", "triangle", "triangle"]
     assert [r.continues for r in again] == [False, True, False]
@@ -88,6 +88,6 @@ def test_units_and_names_are_read_as_those_of_a_file() -> None:
         ({"time_s": [0.0, 1.0], "voltage_V": [0.0, 1.0]}, "expected a column for displacement"),
     ],
 )
-def test_what_is_no_experiment_is_refused(columns: dict[str, list[float]], message: str) -> None:
+def test_invalid_tables_are_refused(columns: dict[str, list[float]], message: str) -> None:
     with pytest.raises(RecordingError, match=message):
         from_columns(columns)

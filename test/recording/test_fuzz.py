@@ -130,7 +130,7 @@ def test_files_that_end_early_are_refused_or_read(intact, tmp_path, name, share)
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("ending", [".npz", ".csv", ".mat", ".mcap", ".db3", ".dat", ".tsv", ""])
-def test_noise_is_no_recording(tmp_path, ending, seed):
+def test_random_bytes_are_refused(tmp_path, ending, seed):
     path = tmp_path / f"noise{ending}"
     path.write_bytes(random.Random(seed).randbytes(random.Random(seed).choice((0, 1, 20, 5000))))
     read_or_refuse(path)

@@ -155,7 +155,7 @@ def test_a_chunk_never_unpacks_to_more_than_it_declares(tmp_path, compression):
         assert "no readable samples" in refused("import", path, "-o", tmp_path / "out")
 
 
-def test_a_frame_that_declares_more_than_it_holds_takes_no_memory(tmp_path):
+def test_a_frame_with_a_false_size_allocates_no_memory(tmp_path):
     """A frame header of zstd can announce terabytes."""
     frame = bytearray(zstandard.ZstdCompressor(write_content_size=True).compress(b"\0" * 100_000))
     assert frame[4] >> 6 == 2  # the length of the content has four bytes
@@ -187,7 +187,7 @@ def test_compressed_bags_are_still_read(tmp_path):
     "name", ["bag.mcap", "bag.db3", "table.csv", "x.npz", "x.mat", "x.dat", "x", "x.tdms", "x.npy"]
 )
 @pytest.mark.parametrize("kind", ["pipe", "/dev/zero", "/dev/null"])
-def test_pipes_and_devices_are_no_recordings(tmp_path, name, kind):
+def test_pipes_and_devices_are_refused(tmp_path, name, kind):
     path = tmp_path / name
     os.mkfifo(path) if kind == "pipe" else path.symlink_to(kind)
     with pytest.raises(RecordingError, match="pipe or a device"):
@@ -209,7 +209,7 @@ def test_a_pipe_inside_a_folder_is_found(tmp_path, inside):
 
 
 @pytest.mark.parametrize("inside", ["metadata.yaml", "bag_1.mcap", "notes.txt"])
-def test_a_pipe_beside_the_files_of_a_bag_is_passed_over(tmp_path, inside):
+def test_a_pipe_in_the_folder_of_a_bag_is_ignored(tmp_path, inside):
     write(experiment(), tmp_path / "bag.mcap")
     (tmp_path / "bag" / inside).unlink(missing_ok=True)
     os.mkfifo(tmp_path / "bag" / inside)
@@ -218,7 +218,7 @@ def test_a_pipe_beside_the_files_of_a_bag_is_passed_over(tmp_path, inside):
 
 
 @pytest.mark.parametrize("end", ["-wal", "-journal", "-shm"])
-def test_a_pipe_beside_a_database_is_found(tmp_path, end):
+def test_a_pipe_next_to_a_database_is_found(tmp_path, end):
     path = database(tmp_path / "bag.db3", TOPICS, SAMPLES, MESSAGES)
     os.mkfifo(f"{path}{end}")
     assert f"bag.db3{end}" in refused("import", path, "-o", tmp_path / "out")

@@ -196,7 +196,7 @@ def test_changed_bytes_of_a_tdms_file_are_refused_or_read(labview, seed):
     read_or_refuse(labview)
 
 
-def test_what_is_not_known_is_named(tmp_path):
+def test_an_unknown_file_ending_is_refused(tmp_path):
     (tmp_path / "a.xlsx").write_bytes(b"PK\3\4\0\0\0\0")
     done = piezo("import", tmp_path / "a.xlsx", "-o", tmp_path / "out")
     assert done.returncode == 2

@@ -78,7 +78,7 @@ def test_files_come_back_exactly(name, experiment):
         periods=st.sampled_from([2e-6, 2e-5, 1e-4, 5e-3]), names=st.sampled_from(["rest", "step", "sine_50hz"])
     )
 )
-def test_bags_come_back_exactly_as_what_one_driver_would_send(experiment):
+def test_a_written_bag_reads_back_exactly(experiment):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bag"
         write(experiment, path, format="rosbag2")
@@ -118,7 +118,7 @@ def test_optional_channels_and_flags_come_back(tmp_path, name):
         np.testing.assert_array_equal(a.temperature, b.channels["temperature"])
 
 
-def test_phases_are_averaged_on_reading_where_asked(tmp_path):
+def test_phases_are_averaged_on_reading_on_request(tmp_path):
     record = Record(np.arange(100.0), np.arange(100.0), 1e-3, "rest", initial_voltage=7.0)
     write(Experiment((record,)), tmp_path / "e")
     (slow,) = read(tmp_path / "e", decimate={"rest": 10})
@@ -126,7 +126,7 @@ def test_phases_are_averaged_on_reading_where_asked(tmp_path):
     np.testing.assert_array_equal(slow.voltage, np.arange(10) * 10 + 4.5)
 
 
-def test_a_bag_carries_a_third_axis(tmp_path):
+def test_a_bag_can_contain_a_third_axis(tmp_path):
     voltage = 3.5 + 2.5 * np.sin(2 * np.pi * 10 * np.arange(400) * 1e-3)
     third = {"displacement_3": 1e-7 * voltage, "temperature": 293.0 + 0.1 * voltage}
     record = Record(voltage, 1e-6 * voltage, 1e-3, "sine_10hz", channels=third)

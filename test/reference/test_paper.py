@@ -33,7 +33,7 @@ def test_figure_1_classical_loop_is_symmetric_and_the_cubic_alone_makes_it_asymm
     assert numbers["MBW - CBW - p1 v^3, largest [1]"] < 1e-12
 
 
-def test_figure_5_arx_follows_the_measured_response_and_holds_a_part_of_the_hysteresis(exhibit):
+def test_figure_5_arx_follows_the_measured_response_and_absorbs_hysteresis(exhibit):
     numbers = exhibit("figure_5")
     assert numbers["ARX over measured, rms [dB]"] < 0.2
     assert numbers["ARX minus measured, rms [degree]"] < 1.0

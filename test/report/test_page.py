@@ -94,7 +94,7 @@ def test_every_figure_is_there_with_words_and_numbers(drawn, tags):
     assert {"loops_by_amplitude", "time_series", "residual_maps", "residual_spectrum", "bode", "step", "creep"} <= names
 
 
-def test_structure_can_be_heard(tags):
+def test_a_screen_reader_finds_the_structure(tags):
     assert tags.all("html")[0]["lang"] == "en"
     headings = [int(tag[1]) for tag, _ in tags.found if re.fullmatch("h[1-6]", tag)]
     assert headings[0] == 1
@@ -114,13 +114,13 @@ def test_the_verdict_comes_first_and_in_words(drawn, tags):
     assert any("is 0.72 % of the range before and 0.04 % after" in w for w in tags.words)
 
 
-def test_what_was_given_is_text_and_never_markup(drawn, tags):
+def test_input_text_is_escaped(drawn, tags):
     assert "phases <named> by their drive" in tags.words
     assert "loses <0.4> on held-out phases" in tags.words
     assert "A stage & its model" in tags.words
 
 
-def test_a_recording_without_a_model_says_so(bare):
+def test_the_page_of_a_recording_without_a_model_states_this(bare):
     assert verdict(bare).headline == "The recording, without a model"
 
 
@@ -203,7 +203,7 @@ def test_a_correction_without_a_name_is_drawn_and_tabled_only_where_it_is_accept
     assert "A correction." in answer_verdict(refused).sentences
 
 
-def test_tables_of_a_diagnosis_say_what_its_answer_says(answer):
+def test_tables_of_a_diagnosis_agree_with_its_answer(answer):
     (effect,) = effect_table(answer).rows
     assert effect[:3] == ("creep", "creep", "97 %")
     assert effect[-3:] == ("0.0143", "0.0139 … 0.0147", "1/decade")

@@ -65,7 +65,7 @@ def test_so_do_the_methods_and_the_picture_can_be_saved(drawn, tmp_path):
     assert (tmp_path / "look.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_without_a_figure_nothing_imports_matplotlib():
+def test_matplotlib_is_imported_with_the_first_figure_only():
     code = "import sys, piezo_hysteresis as p; [getattr(p, n) for n in p.__all__ if n != 'plot']; "
     code += "r = p.Record([0.0, 1.0], [0.0, 1e-6], 1.0); before = 'matplotlib' in sys.modules; r.plot(); "
     command = [sys.executable, "-c", code + "sys.exit(before or 'matplotlib' not in sys.modules)"]

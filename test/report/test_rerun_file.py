@@ -60,7 +60,7 @@ def values(found, name):
     return time[order], value[order]
 
 
-def test_the_file_holds_every_sample_the_phases_loops_spectra_and_a_blueprint(experiment, tmp_path):
+def test_the_file_contains_samples_phases_loops_spectra_and_a_blueprint(experiment, tmp_path):
     path = tmp_path / "experiment.rrd"
     comparison = compare(experiment, {"model": MODEL})
     write_rerun(comparison, path, "two sines")
@@ -84,7 +84,7 @@ def test_the_file_holds_every_sample_the_phases_loops_spectra_and_a_blueprint(ex
     assert "/spectrum/residual values" in found
 
 
-def test_without_a_model_the_file_holds_no_prediction(experiment, tmp_path):
+def test_without_a_model_the_file_contains_no_prediction(experiment, tmp_path):
     path = tmp_path / "bare.rrd"
     write_rerun(compare(experiment), path, "bare")
     found = columns(chunk.RrdReader(path))
@@ -92,7 +92,7 @@ def test_without_a_model_the_file_holds_no_prediction(experiment, tmp_path):
     assert not [name for name in found if "predicted" in name or "residual" in name]
 
 
-def test_the_command_does_not_replace_a_file_unasked(tmp_path, capsys):
+def test_the_command_does_not_replace_an_existing_file(tmp_path, capsys):
     path = tmp_path / "kept.rrd"
     path.write_bytes(b"kept")
     assert main(["view", str(tmp_path), "--rerun", str(path)]) == 2

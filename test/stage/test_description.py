@@ -77,7 +77,7 @@ def test_other_sample_periods_are_refused(period):
         {"displacement_min": 1.0, "displacement_max": 0.0},
     ],
 )
-def test_crossed_limits_are_no_description(wrong):
+def test_crossed_limits_are_refused_in_a_description(wrong):
     sound = {
         "name": "device", "streaming": True, "sample_period_min": 1e-3, "sample_period_max": 1.0, "voltage_min": 0.0,
         "voltage_max": 1.0,

@@ -79,7 +79,7 @@ def test_everything_at_once_stays_finite_and_within_the_sensor():
     assert WHOLE.voltage.max() <= 10.0
 
 
-def test_time_goes_on_through_a_change_of_sample_period():
+def test_time_continues_through_a_change_of_sample_period():
     plant = Plant(PlantParameters(), TS)
     plant.run(np.full(1000, 2.0))
     plant.configure(1e-3, plant.voltage)

@@ -70,7 +70,7 @@ def test_loading_curve_in_closed_form():
 
 @settings(max_examples=30)
 @given(turning_points, st.booleans())
-def test_without_its_rate_law_hysteresis_does_not_know_time(turns, plays):
+def test_without_its_rate_law_hysteresis_does_not_depend_on_time(turns, plays):
     hysteresis = Hysteresis.prandtl_ishlinskii() if plays else Hysteresis(phi1=0.5, phi2=-0.3, exponent=1.4)
     slow, fast = Clock.cut(100.0, 0.0, 100.0), Clock.cut(1e-6, 0.0, 1e-6)
     np.testing.assert_array_equal(output(hysteresis, turns, clock=slow), output(hysteresis, turns, clock=fast))
@@ -145,7 +145,7 @@ def test_rate_law_scales_the_slope_of_h(rate):
     np.testing.assert_allclose(fast, output(scaled, drive), atol=2e-5)
 
 
-def test_backlash_hides_what_is_smaller_than_itself():
+def test_backlash_hides_motion_smaller_than_its_width():
     p = Hysteresis(backlash=0.05)
     small = output(p, 5.0 + 0.05 * np.sin(np.arange(100)), start=5.0)
     np.testing.assert_array_equal(small, small[0])

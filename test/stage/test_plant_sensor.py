@@ -35,7 +35,7 @@ def difference(changed, plain, drive, period=TS, voltage=0.0):
     )
 
 
-def test_white_noise_has_the_rms_asked_for_and_no_memory(ideal):
+def test_white_noise_has_the_requested_rms_and_no_correlation(ideal):
     parameters = ideal(sensor__noise=5e-4)
     y = Plant(parameters, TS, seed=3).run(np.zeros(200_000)).displacement
     sigma = 5e-4 * parameters.full_stroke

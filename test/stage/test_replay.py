@@ -47,7 +47,7 @@ def test_repetition_begins_again_after_the_last_sample():
     assert not stage.finished
 
 
-def test_the_description_says_what_it_is():
+def test_the_description_identifies_a_replay():
     stage = ReplayStage(Experiment(RECORDS), name="picma")
     promised = {n for part in (Stage, StreamingStage) for n in vars(part) if not n.startswith("_")}
     assert promised <= set(dir(stage))

@@ -41,7 +41,7 @@ def play_from_memory(stage, voltage):
 
 
 @pytest.mark.parametrize(("kind", "protocol"), [(SimulatedStage, StreamingStage), (SimulatedMemoryStage, MemoryStage)])
-def test_each_kind_offers_its_protocol_and_says_which(kind, protocol):
+def test_each_kind_of_stage_declares_its_protocol(kind, protocol):
     stage = kind()
     assert promised(protocol) <= set(dir(stage))
     assert stage.description.streaming is (protocol is StreamingStage)
@@ -57,7 +57,7 @@ def test_streaming_is_the_plant_sample_by_sample():
     assert stage.time == pytest.approx(900 * TS)
 
 
-def test_memory_plays_what_was_uploaded_after_a_dead_time_at_the_voltage_in_force():
+def test_memory_plays_the_uploaded_waveform_after_a_dead_time():
     stage, drive = SimulatedMemoryStage(seed=3, dead_time=0.01), 5 + np.sin(0.01 * np.arange(900))
     got = play_from_memory(stage, drive)
     lived = np.r_[np.zeros(500), drive]
@@ -79,7 +79,7 @@ def test_the_plant_creeps_on_while_the_memory_is_loaded(ideal):
     np.testing.assert_allclose(np.diff(starts) / starts[1], 0.02, atol=1e-3)
 
 
-def test_memory_refuses_what_is_out_of_order():
+def test_memory_refuses_commands_in_the_wrong_order():
     stage = SimulatedMemoryStage(longest_block=100)
     for out_of_order in (stage.arm, stage.start, stage.read, lambda: stage.wait(0.0)):
         with pytest.raises(StageError, match="expected"):
@@ -96,7 +96,7 @@ def test_memory_refuses_what_is_out_of_order():
     assert stage.read().displacement.size == 100
 
 
-def test_a_waveform_takes_its_time_where_that_is_asked_for():
+def test_a_waveform_takes_real_time_on_request():
     """At 1e-4 of real time 20 ms last 200 s: everything but safe() and close() has to wait."""
     stage = SimulatedMemoryStage(real_time_factor=1e-4)
     stage.upload(np.full(1000, 3.0))
@@ -115,7 +115,7 @@ def test_a_waveform_takes_its_time_where_that_is_asked_for():
         stage.read()
 
 
-def test_a_real_time_memory_stage_gives_what_a_fast_one_gives():
+def test_a_real_time_memory_stage_gives_the_result_of_a_fast_one():
     drive = np.linspace(0.0, 5.0, 200)
     fast, paced = (SimulatedMemoryStage(seed=1, real_time_factor=f) for f in (math.inf, 1.0))
     np.testing.assert_array_equal(

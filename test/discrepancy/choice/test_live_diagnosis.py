@@ -63,7 +63,7 @@ def test_a_hidden_effect_is_named_after_the_cheap_phases():
     assert states[-1].time < 40.0
 
 
-def test_nothing_is_said_to_be_missing_once_no_slow_effect_can_show_any_more():
+def test_nothing_missing_is_answered_when_no_slow_effect_can_show():
     states = driven({})
     holds_its_promises(states)
     assert states[-1].end is End.SURE
@@ -90,7 +90,7 @@ def test_effects_that_no_drive_within_the_limits_separates_are_undecidable():
     assert {effect["name"], *effect["confusable_with"]} == {*last.separation.rivals}
 
 
-def test_without_time_for_more_the_answer_says_that_it_is_not_sure():
+def test_without_more_stage_time_the_answer_is_not_certain():
     states = driven({}, longest=15.0)
     holds_its_promises(states)
     assert states[-1].end is End.EXHAUSTED
@@ -98,6 +98,6 @@ def test_without_time_for_more_the_answer_says_that_it_is_not_sure():
 
 
 @pytest.mark.parametrize("choices", [{"error_rate": 0.0}, {"error_rate": 0.5}, {"longest": 5.0}])
-def test_choices_that_make_no_sense_are_refused(choices):
+def test_invalid_options_are_refused(choices):
     with pytest.raises(ParameterError):
         begin(DriveLimits(1e-3), **choices)

@@ -93,11 +93,11 @@ def test_no_record_decides_alone(count, index, ratio):
     assert log_odds(score(np.ones(count)), score(other)) <= ONE_RECORD
 
 
-def test_an_error_below_the_floor_is_no_evidence():
+def test_an_error_below_the_floor_is_not_evidence():
     assert log_odds(score([0.1] * 8), score([0.9] * 8)) == 0.0
 
 
-def test_who_explains_less_than_a_name_may_is_less_likely_than_none_of_these():
+def test_an_effect_that_explains_too_little_is_less_likely_than_none_of_these():
     told = turn_probabilities(turn([10.0] * 8, (Creep, [7.0] * 8), (Backlash, [8.0] * 8)), PRIOR, 1.0)
     assert next(iter(told)) == NONE_OF_THESE
 
@@ -138,7 +138,7 @@ def test_the_chosen_drive_separates_creep_from_drift_in_the_least_time():
     assert separation.needed_z == z_of(5.3)
 
 
-def test_equal_rivals_cannot_be_decided_and_the_number_says_so():
+def test_equal_rivals_have_zero_expected_separation():
     first, second = fitted(Creep(gamma=0.02), Creep(gamma=0.02))
     _, separation = best_drive([first, second], spare_drives(LIMITS)[-2:], missing=5.3, time_left=600.0)
     assert not separation.decides

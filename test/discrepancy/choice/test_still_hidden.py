@@ -61,5 +61,5 @@ def test_fast_phases_exclude_no_drift_of_a_minute() -> None:
 
 
 @pytest.mark.parametrize("gamma", [2e-3, -2e-3])
-def test_creep_that_the_records_hold_is_not_excluded(gamma: float) -> None:
+def test_creep_in_the_records_is_not_excluded(gamma: float) -> None:
     assert hidden_after(3, Creep, stage=STAGE.with_effect(Creep(gamma=gamma, tau_max=1e4))) == {"creep"}

@@ -34,7 +34,7 @@ FIXED = 158.7
     slew=st.floats(10.0, 1e6),
     seed=st.integers(0, 2**16),
 )
-def test_every_sample_holds_voltage_and_slew_limits(low, span, safe, slew, seed):
+def test_every_sample_is_inside_voltage_and_slew_limits(low, span, safe, slew, seed):
     rate = min(slew * span, 5.0 * span)
     limits = DriveLimits(1e-3, low, low + span, low + safe * span, slew * span, rate)
     for phase in (*(p for tier in tiers(limits, seed) for p in tier.phases), *spare_drives(limits, seed)):

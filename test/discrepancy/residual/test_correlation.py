@@ -37,7 +37,7 @@ def test_equals_the_definition():
     assert found.cross_lag[[0, -1]] == pytest.approx([-2.0, 2.0])
 
 
-def test_bounds_hold_for_coloured_noise_that_does_not_know_the_drive():
+def test_bounds_are_valid_for_coloured_noise_independent_of_the_drive():
     alarms = 0
     for _ in range(300):
         e = lfilter([1.0], [1.0, -0.9], RANDOM.normal(size=4000))
@@ -61,7 +61,7 @@ def test_a_missing_lag_of_the_drive_shows_at_that_lag():
     assert abs(found.cross).max() > 5 * found.cross_bound
 
 
-def test_one_frequency_decides_nothing():
+def test_one_frequency_does_not_decide():
     t = np.arange(4000) / 4000
     found = correlate(np.cos(2 * np.pi * 10 * t), np.sin(2 * np.pi * 10 * t), 1 / 4000)
     assert not found.decides

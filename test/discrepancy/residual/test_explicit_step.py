@@ -54,7 +54,7 @@ def training_data(records):
 
 
 @pytest.mark.parametrize("height", [0.01, 0.1, 0.4])
-def test_a_jump_from_rest_changes_by_what_the_closed_solution_says(height):
+def test_a_jump_from_rest_agrees_with_the_closed_solution(height):
     static = Model((BoucWen(**LOOP), Arx(a=(), b=(1.0,), delay=1)), FAST, 10.0, 1e-5)
     jump = Record(10.0 * np.repeat([0.0, height], 10), np.zeros(20), FAST)
     (change,) = step_changes(static, [jump])
@@ -64,7 +64,7 @@ def test_a_jump_from_rest_changes_by_what_the_closed_solution_says(height):
     assert change[-1] == pytest.approx(1e-5 * (LOOP["A"] * height - exact), rel=1e-9)
 
 
-def test_slow_records_have_many_steps_behind_every_sample():
+def test_slow_records_have_no_error_of_the_explicit_step():
     records = answered(BoucWen)
     assert not step_changes(model(BoucWen), records)[0].any()
 
@@ -74,14 +74,14 @@ def test_data_of_an_explicit_step_are_recognised():
     assert explicit_model(model(BoucWen), training_data(answered(BoucWen))) is None
 
 
-def test_without_the_steps_the_exact_loop_answers():
+def test_after_the_subtraction_the_exact_loop_remains():
     freed = without_steps(Experiment(answered(PublishedBoucWen)), model(BoucWen))
     assert [n.kind for n in freed.notices] == [KIND]
     for record, expected in zip(freed, model(BoucWen).simulate(list(freed)), strict=True):
         assert np.std(record.displacement - expected) < 1.1 * NOISE
 
 
-def test_the_changes_hold_every_term_of_the_loop():
+def test_the_changes_include_every_term_of_the_loop():
     terms = (HysteresisExponent(n=1.6), AsymmetricHysteresis(phi1=0.5, phi2=-0.4))
     loop = Model((BoucWen(**LOOP), *terms, Arx(a=(), b=(1.0,), delay=1)), FAST, 10.0, 1e-5)
     jump = Record(10.0 * np.repeat([0.0, 0.05, 0.02], 4), np.zeros(12), FAST)

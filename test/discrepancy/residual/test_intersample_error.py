@@ -50,7 +50,7 @@ def averaged(drive, factor):
     ("drive", "factor"),
     [(triangle(0.003), 100), (triangle(0.0061), 200), (staircase(1e-4), 1000), (staircase(0.05), 1000)],
 )
-def test_most_of_what_averages_miss_is_made_good(drive, factor):
+def test_most_of_the_inter_sample_error_is_corrected(drive, factor):
     slow = averaged(drive, factor)
     (change,), (point,) = intersample_error(STAGE, [slow]), STAGE.simulate([slow])
     missed = np.std(slow.displacement - point)
@@ -58,7 +58,7 @@ def test_most_of_what_averages_miss_is_made_good(drive, factor):
     assert np.std(slow.displacement - point - change) < 0.4 * missed
 
 
-def test_a_curve_loses_nothing_even_by_a_model_of_slow_dynamics():
+def test_a_smooth_drive_needs_no_correction_even_with_slow_dynamics():
     time = PERIOD * np.arange(20_000)
     drive = 5.0 * (1.0 - np.cos(2.0 * np.pi * 10.0 * time))
     slow = averaged(drive, 10)
@@ -73,7 +73,7 @@ RINGING = STAGE.with_effect(Arx(a=(-1.9, 0.95), b=(0.05,), delay=1.0))
 
 @pytest.mark.parametrize("factor", [2, 4, 10])
 @pytest.mark.parametrize("noise", [0.0, 5e-4])
-def test_the_ringing_after_a_kink_is_made_good(factor, noise):
+def test_ringing_after_a_kink_is_corrected(factor, noise):
     time = PERIOD * np.arange(8000)
     drive = 10.0 * (1.0 - np.abs(2.0 * np.mod(8.0 * time, 1.0) - 1.0))
     (displacement,) = RINGING.simulate([Record(drive, np.zeros(drive.size), PERIOD)])
@@ -87,7 +87,7 @@ def test_the_ringing_after_a_kink_is_made_good(factor, noise):
     assert left < 0.4 * missed
 
 
-def test_what_a_residual_does_not_hold_is_not_taken_out():
+def test_no_correction_is_made_that_the_residual_does_not_contain():
     time = PERIOD * np.arange(8000)
     drive = 10.0 * (1.0 - np.abs(2.0 * np.mod(8.0 * time, 1.0) - 1.0))
     (displacement,) = STAGE.simulate([Record(drive, np.zeros(drive.size), PERIOD)])
@@ -95,7 +95,7 @@ def test_what_a_residual_does_not_hold_is_not_taken_out():
     assert np.std(intersample_error(RINGING, [slow])[0]) < 1e-4 * np.ptp(displacement)
 
 
-def test_a_slow_relaxation_of_the_dynamics_is_not_taken_for_what_averages_hide():
+def test_a_slow_relaxation_is_not_mistaken_for_an_inter_sample_error():
     """A fit that lacks creep gives G such a pole beside a zero; slow records do not hold what it says."""
     time = PERIOD * np.arange(40_000)
     drive = 10.0 * (1.0 - np.abs(2.0 * np.mod(time, 1.0) - 1.0))
@@ -107,7 +107,7 @@ def test_a_slow_relaxation_of_the_dynamics_is_not_taken_for_what_averages_hide()
     assert np.std(change - known) < 1e-5 * np.ptp(slow.displacement)
 
 
-def test_records_that_are_not_slow_are_left_alone():
+def test_records_that_are_not_slow_are_not_changed():
     drive = np.random.default_rng(0).normal(size=500)
     record = Record(drive, 1e-6 * drive, PERIOD)
     assert not intersample_error(STAGE, [record])[0].any()

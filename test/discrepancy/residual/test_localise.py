@@ -59,7 +59,7 @@ def since_level(record):
     return PERIOD * (np.arange(record.size) - last)
 
 
-def test_shares_add_up_and_every_axis_answers():
+def test_shares_add_up_on_every_axis():
     by_axis, _ = places(lambda r: RANDOM.normal(size=r.size))
     assert set(by_axis) == AXES
     for place in by_axis.values():
@@ -111,5 +111,5 @@ def test_an_error_just_after_turning_points_shows_there():
     assert nearest > 0.4
 
 
-def test_no_residual_is_nowhere():
+def test_zero_residual_has_no_location():
     assert localise(RECORDS, [np.zeros(r.size) for r in RECORDS], [1e-8] * 4) == ()

@@ -53,7 +53,7 @@ def test_scatter_between_periods_is_the_noise(frequency):
     assert period_scatter(sine(frequency, 2e-5, 0.4)) == pytest.approx(SIGMA, rel=0.03)
 
 
-def test_scatter_holds_noise_that_is_slower_than_the_top_of_the_spectrum():
+def test_scatter_includes_noise_below_the_top_of_the_spectrum():
     found = []
     for _ in range(20):  # the scatter of four hundred levels is known to a tenth
         slow = np.repeat(RANDOM.normal(size=400), 50) * 5 * SIGMA
@@ -64,18 +64,18 @@ def test_scatter_holds_noise_that_is_slower_than_the_top_of_the_spectrum():
 
 
 @pytest.mark.parametrize("mains", [50.0, 60.0])
-def test_mains_hum_is_an_effect_and_no_floor(mains):
+def test_mains_hum_is_not_part_of_the_floor(mains):
     record = sine(70.0, 2e-5, 0.5, added=lambda t: 10 * SIGMA * np.cos(2 * np.pi * mains * t + 1.0))
     assert drive_period(record.voltage) is not None
     assert period_scatter(record) == pytest.approx(SIGMA, rel=0.05)
 
 
-def test_a_resonance_that_still_rings_is_no_noise():
+def test_a_ringing_resonance_is_not_noise():
     record = sine(100.0, 2e-5, 0.4, added=lambda t: 300 * SIGMA * np.exp(-10 * t) * np.cos(2 * np.pi * 730 * t))
     assert period_scatter(record) == pytest.approx(SIGMA, rel=0.1)
 
 
-def test_a_drift_is_no_noise():
+def test_a_drift_is_not_noise():
     record = sine(100.0, 2e-5, 0.4, added=lambda t: 500 * SIGMA * (1 - np.exp(-t)))
     assert period_scatter(record) == pytest.approx(SIGMA, rel=0.05)
 
@@ -110,7 +110,7 @@ def test_no_floor_lies_below_the_adequacy_floor():
     assert stroke(records) == pytest.approx(2e-5, rel=1e-3)
 
 
-def test_jumps_of_a_staircase_are_no_noise():
+def test_jumps_of_a_staircase_are_not_noise():
     levels = np.repeat([0.0, 2.0, 4.0, 6.0, 4.0, 2.0], 500)
     record = Record(levels, 4e-6 * levels + SIGMA * RANDOM.normal(size=levels.size), 1e-2)
     assert white_noise(record) == pytest.approx(SIGMA, rel=0.1)

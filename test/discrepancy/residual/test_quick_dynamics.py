@@ -62,6 +62,6 @@ def test_a_slow_amplifier_and_a_quick_relaxation_stay(frequency: float, share: f
     assert quick_dynamics(model, 1e-3) is model
 
 
-def test_a_model_without_dynamics_is_returned_as_it_is() -> None:
+def test_a_model_without_dynamics_is_returned_unchanged() -> None:
     model = Model((BoucWen(),), PERIOD, 10.0, 1e-5)
     assert quick_dynamics(model, 1e-3) is model

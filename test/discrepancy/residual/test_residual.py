@@ -64,7 +64,7 @@ def test_frequencies_pool_the_repetitions_of_a_sine():
     assert table.percent == pytest.approx(np.sqrt(np.mean([r.percent**2 for r in table.rows])))
 
 
-def test_a_record_that_begins_in_an_unknown_state_is_shown_but_counts_in_no_total():
+def test_a_record_with_unknown_initial_state_is_shown_but_not_in_the_total():
     def added(number, time):
         return 1e-6 if number == 0 else 1e-8 * np.sign(np.sin(2 * np.pi * 50 * time + 0.1))
 
@@ -82,7 +82,7 @@ def test_the_zero_of_the_sensor_does_not_matter(zero):
     assert errors(MODEL, shifted).zero == pytest.approx(zero + errors(MODEL, wave).zero, abs=1e-12)
 
 
-def test_one_zero_serves_the_whole_experiment_unless_it_is_free_per_record():
+def test_one_zero_is_used_for_the_experiment_unless_it_is_free_per_record():
     drifting = measured(lambda n, t: 1e-7 * n)
     assert errors(MODEL, drifting).rms == pytest.approx(1e-7 * np.std(np.arange(4)), rel=1e-6)
     assert errors(MODEL, drifting, Nuisance(offset=True)).rms < 1e-12

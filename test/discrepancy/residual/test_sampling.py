@@ -51,7 +51,7 @@ def test_a_slow_phase_recorded_fast_keeps_its_averages(frequency):
     assert slow.settled_voltage == fast.settled_voltage
 
 
-def test_what_the_drive_does_between_averages_is_never_lost():
+def test_averages_that_do_not_describe_the_drive_are_not_used():
     assert slowed(sine(200.0, FAST, 1.0)).sample_period < 1e-3 / 2
     noise = Record(RANDOM.normal(size=50_000), RANDOM.normal(size=50_000), FAST)
     assert slowed(noise) is noise
@@ -67,14 +67,14 @@ def test_noise_is_cut_and_a_chirp_is_not():
     assert second.size == whole.size
 
 
-def test_a_record_that_goes_on_in_the_next_is_not_cut():
+def test_a_record_that_another_continues_is_not_cut():
     noise = Record(RANDOM.normal(size=20_000), RANDOM.normal(size=20_000), FAST)
     first, second = noise.split(10_000)
     assert [r.size for r in shortened((first, second), 6000)] == [10_000, 6000]
 
 
 @pytest.mark.parametrize("factor", [5, 10])
-def test_a_drive_that_moves_the_dynamics_comes_to_their_period(factor):
+def test_a_drive_that_excites_the_dynamics_is_interpolated_to_their_period(factor):
     slow, fast = sine(200.0, factor * FAST, 0.2), sine(200.0, FAST, 0.2)
     found = at_period(slow, FAST)
     assert found.sample_period == FAST
@@ -90,7 +90,7 @@ def test_slow_loops_and_jumps_stay_at_their_own_period():
     assert at_period(stairs, FAST) is stairs
 
 
-def test_the_dynamics_set_the_period_and_what_is_faster_is_averaged():
+def test_the_dynamics_set_the_period_and_faster_records_are_averaged():
     noise = Record(RANDOM.normal(size=4000), RANDOM.normal(size=4000), 5 * FAST)
     step = Record(np.repeat([0.0, 1.0], 1000), np.repeat([0.0, 1e-6], 1000), FAST)
     assert common_period((step, noise)) == 5 * FAST
@@ -99,7 +99,7 @@ def test_the_dynamics_set_the_period_and_what_is_faster_is_averaged():
 
 
 @pytest.mark.parametrize("noise", [1e-4, 1e-3])
-def test_the_noise_of_a_measured_voltage_is_known_and_a_commanded_one_has_none(noise):
+def test_a_measured_voltage_has_noise_and_a_commanded_one_has_none(noise):
     random = np.random.default_rng(0)
     t = 1e-3 * np.arange(4000)
     drives = (np.zeros(t.size), 8.0 * np.abs(t % 1.0 - 0.5), np.repeat([0.0, 3.0, 6.0, 2.0], 1000), np.sin(300.0 * t))
@@ -112,7 +112,7 @@ def test_the_noise_of_a_measured_voltage_is_known_and_a_commanded_one_has_none(n
     assert voltage_noise(averaged) == pytest.approx([noise, noise / 4.0], rel=0.2)
 
 
-def test_a_drive_is_followed_but_for_its_noise():
+def test_the_noise_of_a_drive_is_removed_and_its_motion_kept():
     noise, t = 1e-3, 1e-4 * np.arange(40_000)
     drive = 8.0 * np.abs(t % 1.0 - 0.5)
     noisy = drive + noise * np.random.default_rng(1).standard_normal(t.size)

@@ -47,7 +47,7 @@ def gain_drift(size, along, across):
     return fitted(GainDrift(g=size, tau=tau), ("gain_drift.g", "gain_drift.tau"), covariance)
 
 
-def test_a_size_that_its_time_constant_blurs_is_a_size_all_the_same():
+def test_a_size_correlated_with_its_time_constant_is_significant():
     blurred = gain_drift(0.05, along=1000.0, across=1e-3)
     assert blurred.fit.standard_errors["gain_drift.g"] > 0.05
     assert not may_be_off(blurred)
@@ -58,13 +58,13 @@ def test_a_size_below_its_error_may_be_off():
 
 
 @pytest.mark.parametrize(("corner", "curve"), [(0.1, False), (4.0, False), (30.0, True)])
-def test_a_limit_whose_bend_is_wider_than_the_drive_is_none(corner, curve):
+def test_a_limit_whose_bend_is_wider_than_the_drive_is_rejected(corner, curve):
     saturation = AmplifierSaturation(upper=9.0, corner=corner)
     assert bends_all_along(fitted(saturation, (), np.empty((0, 0)))) is curve
 
 
 @pytest.mark.parametrize("blind", [1e6, 1e145])
-def test_a_play_that_nothing_moves_decides_nothing(blind):
+def test_a_play_that_does_not_move_has_no_influence(blind):
     memory = HysteresisMemory(c=(0.02, 0.03, 0.0))
     names = tuple(f"hysteresis_memory.c[{j}]" for j in range(3))
     assert not may_be_off(fitted(memory, names, np.diag([1e-3, 1e-3, blind]) ** 2))

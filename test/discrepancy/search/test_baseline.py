@@ -25,7 +25,7 @@ from piezo_hysteresis.record import Record
 PERIOD = 1e-4
 
 
-def test_noise_that_leaves_the_sign_of_the_gain_open_still_gives_a_start():
+def test_noise_that_does_not_determine_the_sign_of_the_gain_gives_a_start():
     stage = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=2.0)), PERIOD, 10.0, 1e-5)
     time = PERIOD * np.arange(20_000)
     voltage = (1.0 + 4.0 * np.floor(time)) * (1.0 - np.abs(2.0 * np.mod(time, 1.0) - 1.0))

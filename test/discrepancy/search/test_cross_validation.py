@@ -61,7 +61,7 @@ def test_the_true_model_lies_at_the_floor(problem):
     np.testing.assert_allclose(score.step, [1.0, -2.0, 0.5], atol=0.05)
 
 
-def test_a_direction_that_the_other_records_do_not_see_stays_where_it_is(problem):
+def test_a_direction_undetermined_by_the_other_records_is_not_changed(problem):
     designs, measured = problem
     only_here = [np.column_stack((x, np.full(len(x), float(i == 0)))) for i, x in enumerate(designs)]
     columns = np.vstack((np.eye(4), np.zeros((1, 4))))
@@ -70,7 +70,7 @@ def test_a_direction_that_the_other_records_do_not_see_stays_where_it_is(problem
     assert with_it.ratios[0] == pytest.approx(without.ratios[0], rel=1e-9)
 
 
-def test_the_one_record_that_gives_a_number_is_indispensable(problem):
+def test_the_only_record_that_determines_a_parameter_is_indispensable(problem):
     designs, measured = problem
     for informative, wanted in ((range(4), ()), ((2, 3), ()), ((2,), (2,))):
         seen = [
@@ -80,7 +80,7 @@ def test_the_one_record_that_gives_a_number_is_indispensable(problem):
         assert indispensable(products(seen, measured), FLOORS, columns) == wanted
 
 
-def test_records_that_only_carry_the_state_do_not_count(problem):
+def test_records_that_only_determine_the_state_do_not_count(problem):
     score = cross_validate(products(*problem), np.array([0.1, np.inf, 0.2, 0.1]), COLUMNS)
     assert score.ratios.size == 3
 

@@ -25,7 +25,7 @@ from piezo_hysteresis.discrepancy.search.selection_result import Selection, expl
 
 
 @given(null=st.floats(0.1, 1.5), gap=st.floats(1.0, 1e4), share=st.floats(0.0, 1.0))
-def test_explained_is_the_share_of_the_rms_error_that_went_away(null, gap, share):
+def test_explained_is_the_removed_share_of_the_rms_error(null, gap, share):
     # the error beyond noise falls to (1 − share) of what it was: its power to (1 − share)²
     after = null + gap * (1 - share) ** 2
     assert explained(null + gap, after, null) == pytest.approx(share, abs=1e-6)

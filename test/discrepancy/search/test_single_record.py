@@ -41,7 +41,7 @@ def percents(model, experiment):
 
 
 @pytest.mark.parametrize("frequencies", [(1.0, 60.0), (1.0, 3.0, 20.0, 60.0, 60.0)])
-def test_what_is_delivered_predicts_a_rate_left_out_as_well_as_the_best_model(frequencies):
+def test_the_saved_model_predicts_a_rate_left_out_as_well_as_the_best_model(frequencies):
     recorded = played(STAGE, frequencies)
     unseen = played(STAGE, (10.0,))
     best = identify(recorded, memory=True).model
@@ -69,7 +69,7 @@ def test_a_stage_of_the_published_form_gets_no_name():
     assert diagnose(Experiment((record(1.0), record(20.0), record(60.0)))).names == ()
 
 
-def test_a_record_that_begins_in_mid_run_is_diagnosed_behind_its_first_full_loop():
+def test_a_truncated_record_is_diagnosed_after_its_first_full_loop():
     whole = played(STAGE, (2.0,), (1.0, 1.0, 1.0)).records[0]
     cut = Record(whole.voltage[1200:], whole.displacement[1200:], PERIOD, "sine_2hz", truncated=True)
     found = diagnose(Experiment((cut,)))

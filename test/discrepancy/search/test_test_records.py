@@ -46,6 +46,6 @@ def test_one_in_three_of_a_kind_and_not_its_extremes():
     assert reporting(records(phases), range(8)) == (1, 4)
 
 
-def test_what_may_not_be_taken_is_not():
+def test_unusable_records_are_not_test_records():
     phases = ["noise"] * 6
     assert set(reporting(records(phases), (0, 2, 4))) <= {0, 2, 4}

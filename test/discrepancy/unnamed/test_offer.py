@@ -116,7 +116,7 @@ def found(of_position: BaselineSetup) -> Correction:
     return offered(of_position.baseline.model, of_position, 1.0)
 
 
-def test_a_deviation_of_the_position_is_offered_and_its_shape_told(found: Correction) -> None:
+def test_a_deviation_of_the_position_is_offered_with_its_shape(found: Correction) -> None:
     assert found.accepted and isinstance(found.effect, UnnamedPositionMap)
     assert found.removed >= 0.5 and found.worst <= 1.05
     shape = found.effect.shape(SCALE)
@@ -125,9 +125,7 @@ def test_a_deviation_of_the_position_is_offered_and_its_shape_told(found: Correc
     assert found.answer()["depends_on"] == "position"
 
 
-def test_the_corrected_model_survives_its_file_and_names_its_envelope(
-    of_position: BaselineSetup, found: Correction
-) -> None:
+def test_the_corrected_model_is_saved_with_its_range(of_position: BaselineSetup, found: Correction) -> None:
     again = model_file.loads(model_file.dumps(found.model))
     record = of_position.records[9]
     np.testing.assert_array_equal(again.simulate(record), found.model.simulate(record))
@@ -136,7 +134,7 @@ def test_the_corrected_model_survives_its_file_and_names_its_envelope(
     assert "correction without a name is not valid there" in told.message
 
 
-def test_nothing_is_changed_beyond_the_positions_that_were_recorded() -> None:
+def test_a_correction_is_zero_outside_the_recorded_positions() -> None:
     far = np.linspace(0.56, 2.0, 50)
     block = hump().block(Discretisation(PERIOD, PERIOD))
     np.testing.assert_array_equal(block.run(far, None)[0], far)
@@ -148,7 +146,7 @@ def test_friction_of_the_position_is_offered_as_plays(of_friction: BaselineSetup
     assert found.removed >= 0.5 and found.worst <= 1.05
 
 
-def test_a_free_filter_bank_learns_well_is_worse_elsewhere_and_is_refused(of_friction: BaselineSetup) -> None:
+def test_a_free_filter_bank_fits_well_but_is_refused_at_other_rates(of_friction: BaselineSetup) -> None:
     model, data = of_friction.baseline.model, of_friction.training_data
     one_rate = replace(data, records=data.records[3:6], floors=data.floors[3:6], alone=())
     learnt = joint(model.with_effect(FreeBank()), one_rate, LAST).model

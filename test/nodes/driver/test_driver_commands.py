@@ -118,7 +118,7 @@ def test_a_second_command_is_refused_and_the_first_played_whole(driven):
     assert samples.played(wave, first, number)
 
 
-def test_set_voltage_ramps_and_holds(driven):
+def test_set_voltage_ramps_to_a_level_and_stays_there(driven):
     samples, statuses, live = driven.streaming(), driven.statuses(), driven.listen(JointState, "live")
     ask = driven.publisher(Float64, "set_voltage")
     ask.publish(Float64(data=4.0))

@@ -56,7 +56,7 @@ def link(shared_lab):
     return link
 
 
-def test_a_waveform_that_is_long_in_packing_keeps_nobody_waiting_and_is_not_too_old(shared_lab, link):
+def test_packing_a_long_waveform_blocks_no_callback_and_keeps_it_valid(shared_lab, link):
     lab = shared_lab
     samples = lab.samples()
     wave = np.linspace(0, 1, 2000)
@@ -77,7 +77,7 @@ def test_eighty_seconds_of_drive_in_one_message(shared_lab, link):
     lab.wait(lambda: "stopped" in lab.states(statuses, "staircase"), "the stop")
 
 
-def test_what_is_called_off_while_it_is_packed_never_leaves(shared_lab, link):
+def test_a_waveform_cancelled_during_packing_is_not_sent(shared_lab, link):
     lab = shared_lab
     statuses = lab.statuses()
     slow = SlowToPack(np.full(2000, 1.0), 0.5)
@@ -110,7 +110,7 @@ def test_a_phase_waits_for_no_confirmation_of_the_one_before_it(shared_lab, link
     assert not waited, "the driver had answered"
 
 
-def test_only_the_driver_counts_a_recorder_plays_nothing(shared_lab, link):
+def test_only_the_driver_counts_as_a_subscriber_of_commands(shared_lab, link):
     lab = shared_lab
     sender = CommandSender(lab.second_node("sender"))
     lab.second_node("recorder").create_subscription(PointCloud2, "command", lambda cloud: None, 10)

@@ -52,7 +52,7 @@ class LiveNode:
         return self.statuses[-1]
 
 
-def test_a_stage_is_driven_until_the_node_knows(lab):
+def test_a_stage_is_driven_until_the_answer_is_certain(lab):
     lab.driver(**DRIVER, real_time_factor=10.0, simulated__environment__hum=2e-7)
     node = LiveNode(lab)
     assert "largest slew" in node.ask("plan").message

@@ -115,7 +115,7 @@ def test_a_stage_that_was_moved_between_two_phases_ends_the_protocol(lab, stage,
     assert "moved by somebody else" in str(ended_with)
 
 
-def test_a_protocol_does_not_begin_while_a_stop_holds(lab, stage):
+def test_a_protocol_does_not_begin_after_a_stop_without_release(lab, stage):
     """Asked for before the release: nothing is recorded or played, and the reason is the stop."""
     ended_with = lab.wait(begun(lab, np.full(200, 1.0), first=lambda: lab.call(Trigger, "driver_node/stop")), "the end")
     assert str(ended_with) == "the driver was stopped and moves nothing; call driver_node/release first"
@@ -139,7 +139,7 @@ def test_a_stop_between_two_phases_ends_the_protocol_with_its_reason(lab, stage)
 
 
 @pytest.mark.soak
-def test_a_driver_that_took_the_place_of_a_killed_one_is_asked_again(lab):
+def test_a_new_driver_is_claimed_again(lab):
     """Killed with a question unanswered: its services are known for a while, and those of the next one are the same."""
     driver = lab.driver(sample_period=PERIOD)
     lab.streaming()

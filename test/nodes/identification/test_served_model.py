@@ -59,7 +59,7 @@ def test_another_chain_replaces_the_whole_model(node):
     assert all(node.describe_parameter(name).description for name in values(node))
 
 
-def test_nobody_else_writes(node):
+def test_served_parameters_are_read_only(node):
     served = ServedModel(node, START)
     served.serve(MODEL)
     for name, value in {"model.bouc_wen.A": 1.0, "model.new": 1.0, "model.valid": False}.items():

@@ -34,7 +34,7 @@ def over_the_wire(message):
 
 
 @given(hnp.arrays(np.float64, st.integers(1, 50), elements=finite))
-def test_waveform_comes_back_bit_for_bit(voltage):
+def test_a_waveform_is_converted_and_back_bit_for_bit(voltage):
     message = over_the_wire(conversions.command_to_cloud(voltage, 2e-5, "triangle"))
     assert np.array_equal(conversions.waveform_from_cloud(message, 2e-5), voltage)
     assert conversions.phase_text_of(message, "") == "triangle"

@@ -77,7 +77,7 @@ def test_samples_come_back_bit_for_bit(displacement, first, gap):
 
 
 @given(st.lists(st.tuples(st.integers(1, 5), st.text(max_size=6), st.integers(0, 2**31 * 10**9 - 1), st.booleans())))
-def test_a_stream_says_what_its_messages_say_one_by_one(changes):
+def test_a_stream_reads_the_same_as_single_messages(changes):
     writer, reader = SampleWriter(), SampleReader()
     for size, stage, stamp, gap in changes:
         block = block_of(size, frame=stage.replace("\0", ""), stamp=stamp, follows_gap=gap)

@@ -148,7 +148,7 @@ def test_predictions_are_those_of_the_core_bit_for_bit(lab, tmp_path):
     assert live[-1].position[1] - live[-1].position[2] == pytest.approx(live[-1].position[3], abs=1e-15)
 
 
-def test_a_drive_outside_of_what_was_identified_is_a_warning(lab, tmp_path):
+def test_a_drive_outside_the_identified_range_gives_a_warning(lab, tmp_path):
     seen = {"voltage_min": "0.0", "voltage_max": "4.0", "slew_rate_max": "1000.0"}
     known = replace(MODEL, provenance={**PROVENANCE, **seen, "frequency_min": "1.0", "frequency_max": "5.0"})
     bench = Bench(lab, model_file=str(save(known, tmp_path / "model.yaml")))

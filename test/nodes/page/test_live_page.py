@@ -155,7 +155,7 @@ def test_a_change_of_the_stage_appears(nodes, browser):
 
 
 @pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGKILL])
-def test_a_page_that_ends_disturbs_nobody(nodes, browser, ending):
+def test_the_end_of_a_page_does_not_affect_other_nodes(nodes, browser, ending):
     if not nodes.page.is_running:
         known = nodes.node.get_subscriptions_info_by_topic
         nodes.page = nodes.start("page_node", port=0)

@@ -50,7 +50,7 @@ def executor(request, lab, monkeypatch):
     importlib.reload(own)
 
 
-def test_callbacks_are_served_until_another_thread_says_stop(executor):
+def test_callbacks_run_until_another_thread_stops_them(executor):
     node, stop, ticks = GuardedNode("served"), Future(), []
 
     def tick():

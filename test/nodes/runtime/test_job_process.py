@@ -38,7 +38,7 @@ def message(job):
     return found
 
 
-def test_a_job_returns_what_it_heard():
+def test_a_job_returns_its_input():
     job = JobProcess("test", ECHO)
     try:
         job.send(6)

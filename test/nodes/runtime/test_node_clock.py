@@ -43,7 +43,7 @@ def test_between_two_looks_at_the_clock_of_the_computer(node):
     assert now(node) <= node.get_clock().now().nanoseconds
 
 
-def test_simulated_time_from_when_it_is_asked_for(node):
+def test_simulated_time_starts_with_its_parameter(node):
     node.set_parameters([Parameter("use_sim_time", value=True)])
     node.get_clock().set_ros_time_override(Time(nanoseconds=123))
     assert now(node) == 123

@@ -141,7 +141,7 @@ def test_the_estimate_of_a_gain_lies_within_its_interval(drive):
     assert abs(watch.change.estimate - 2e-3) < 4 * watch.change.deviation
 
 
-def test_what_the_model_never_had_is_no_change(drive):
+def test_a_misfit_in_the_baseline_is_not_a_change(drive):
     creeping = MODEL.with_effect(Creep(gamma=0.02))
     watch, _ = follow(drive, run(creeping, drive))
     assert watch.alarms == 0
@@ -155,7 +155,7 @@ def test_another_drive_than_those_of_the_baseline_is_not_watched(drive):
     assert largest == 0.0
 
 
-def test_a_held_stage_is_watched_for_its_offset_only():
+def test_at_constant_voltage_only_the_offset_is_watched():
     held = np.full(round((TRAINED + WATCHED) / PERIOD), 3.5)
     watch, _ = follow(held, run(MODEL, held))
     (scatter,) = watch.baseline.scatter.values()

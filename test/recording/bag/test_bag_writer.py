@@ -65,7 +65,7 @@ def test_metadata_are_valid_from_the_first_moment(tmp_path):
     bag.close()
 
 
-def test_a_file_that_grows_while_it_is_read_gives_what_was_there(tmp_path):
+def test_a_growing_file_is_read_up_to_its_length_at_the_start(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         bag.add_topic("/phase", STRING)
         for time_ns in range(3):
@@ -126,7 +126,7 @@ def _written_by(tmp_path, body, expect):
     return process
 
 
-def test_a_killed_recorder_loses_what_came_after_the_last_flush_only(tmp_path):
+def test_a_killed_recorder_loses_only_messages_after_the_last_flush(tmp_path):
     body = """
         for k in range(3000):
             bag.write("/phase", k, message)

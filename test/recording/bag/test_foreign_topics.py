@@ -100,7 +100,7 @@ def test_elements_of_a_joint_state_share_their_stamp(tmp_path, store):
     assert "gap" in {n.kind for n in experiment.notices}
 
 
-def test_types_that_only_the_bag_knows_and_blocks_of_samples(tmp_path, store):
+def test_types_defined_only_in_the_bag_and_blocks_of_samples(tmp_path, store):
     kind = "lab_msgs/msg/Reading"
     gauge = store.types["lab_msgs/msg/Gauge"]
     messages = []
@@ -127,7 +127,7 @@ def test_types_that_only_the_bag_knows_and_blocks_of_samples(tmp_path, store):
         ({}, "map foreign topics"),
     ],
 )
-def test_what_the_bag_does_not_hold_is_said(tmp_path, store, columns, says):
+def test_missing_topics_are_reported(tmp_path, store, columns, says):
     number = store.types["std_msgs/msg/Float64"]
     path = bag_of(tmp_path / "bag", store, [("/sensor", "std_msgs/msg/Float64", k, number(1.0)) for k in range(5)])
     with pytest.raises(RecordingError, match=says):

@@ -101,7 +101,7 @@ def assert_equal(experiment, driver):
         np.testing.assert_array_equal(record.displacement, displacement)
 
 
-def test_phases_come_back_in_order_and_carry_their_state(whole):
+def test_phases_are_read_in_order_with_their_state(whole):
     path, driver = whole
     experiment = read(path)
     assert_equal(experiment, driver)
@@ -176,7 +176,7 @@ def test_a_lost_block_splits_the_phase_also_where_the_index_wraps(tmp_path, inde
 
 
 @pytest.mark.parametrize("always", [False, True])
-def test_a_pause_of_a_device_that_reads_its_memory_is_no_loss(tmp_path, always):
+def test_a_pause_during_read_out_is_not_a_loss(tmp_path, always):
     """Unless every block claims to follow one, as clouds of other software may."""
     with BagWriter(tmp_path / "bag") as bag:
         driver = Driver(bag)
@@ -288,7 +288,7 @@ def test_a_hold_in_which_the_drive_moves_is_part_of_the_history(tmp_path):
     ]
 
 
-def test_a_bag_that_starts_in_a_hold_gives_what_it_does_not_know(tmp_path):
+def test_a_bag_that_starts_in_a_hold_reports_the_unknown_state(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         driver = Driver(bag, index=777)
         driver.phase(8, "hold")
@@ -321,7 +321,7 @@ def test_uneven_times_and_undecodable_blocks_are_reported(tmp_path):
     assert any(n.kind == "gap" and n.severe for n in experiment.notices)
 
 
-def test_the_model_that_a_bag_carries_is_found(whole, tmp_path):
+def test_the_model_in_a_bag_is_found(whole, tmp_path):
     assert recorded_model(whole[0]) is None
     message = get_typestore(Stores.ROS2_KILTED)
     with BagWriter(tmp_path / "carrying") as bag:

@@ -52,7 +52,7 @@ def kinds(voltage, displacement, period=PERIOD, phase="triangle"):
 @pytest.mark.parametrize(
     "terms", [(-0.5, 3.0, 0.5, 0.0, 0.0), (0.35, 2.0, 0.3, 0.0, 0.0), (-0.6, 3.5, 1.0, -1.1, -0.8)]
 )
-def test_loops_that_bend_are_no_shifted_channel(amplitudes, terms):
+def test_curved_loops_are_not_a_shifted_channel(amplitudes, terms):
     voltage = triangle(amplitudes)
     displacement = 1e-5 * (1.2 * voltage + loop(voltage, *terms))
     assert not {"leads", "late"} & kinds(10.0 * voltage, displacement)

@@ -149,7 +149,7 @@ def test_a_voltage_that_its_recorder_cuts_off_is_clipped():
     assert "clipped" in kinds(record)
 
 
-def test_a_drive_that_saturates_is_no_defect():
+def test_a_saturated_drive_is_not_a_defect():
     drive = np.minimum(sine(), 5.5)
     assert "clipped" not in kinds(Record(drive, stage(drive), PERIOD, "x"))
 
@@ -179,7 +179,7 @@ def test_a_sensor_that_hangs_is_stuck():
     assert "stuck" in kinds(Record(drive, y, PERIOD, "sine_5hz"))
 
 
-def test_a_ring_down_holds_no_drop_outs():
+def test_a_ring_down_contains_no_drop_outs():
     y = 1.665e-5 + 5e-9 * np.random.default_rng(1).normal(size=600)
     y[:4] = 1.7256e-5, 1.6750e-5, 1.6473e-5, 1.6803e-5
     assert "dropout" not in kinds(Record(3.5 + 1e-3 * np.arange(600), y, 1e-3, "hold"))
@@ -266,7 +266,7 @@ def test_a_fast_sine_begins_within_its_loop_only_where_it_was_running_before(fre
     slope=st.floats(0.01, 3.0) | st.floats(-3.0, -0.01),
     factor=st.integers(1, 100),
 )
-def test_a_ramp_from_rest_is_known_by_its_first_samples(level, slope, factor):
+def test_a_ramp_from_rest_is_recognised_from_its_first_samples(level, slope, factor):
     ramp = level + slope * np.arange(1, 401)
     slow = replace(Record(ramp, np.zeros(ramp.size), PERIOD).decimate(factor), initial_voltage=None)
     resting = Record(np.full(20, level), np.zeros(20), PERIOD, "rest")
@@ -310,7 +310,7 @@ def test_a_late_channel_is_found_by_where_the_displacement_turns(kind, shift):
     assert ("late" in kinds(record)) == (shift * PERIOD > 3e-3)
 
 
-def test_the_lag_of_a_stage_is_no_late_channel():
+def test_the_lag_of_a_stage_is_not_a_delayed_channel():
     for frequency in (1.0, 5.0, 50.0):
         drive = sine(frequency, 4 / frequency)
         assert not {"late", "leads"} & kinds(Record(drive, stage(drive), PERIOD, f"sine_{frequency:g}hz"))
@@ -358,13 +358,13 @@ def test_a_step_before_the_first_sample_is_found_and_named(tmp_path):
     assert not any(n.kind == "step_before" for n in stated.notices)
 
 
-def test_a_jump_that_no_known_level_explains_is_told():
+def test_a_jump_from_an_unknown_level_is_reported():
     drive, y = ringing()
     assert "not_at_rest" in kinds(Record(drive, y, 1e-4, "x"))
     assert "not_at_rest" not in kinds(Record(drive[2000:], y[2000:], 1e-4, "x"))
 
 
-def test_rows_carry_what_the_rows_before_them_say(tmp_path):
+def test_rows_before_the_selected_ones_determine_the_state(tmp_path):
     drive, y = ringing()
     path = tmp_path / "lab.csv"
     table = np.c_[1e-4 * np.arange(drive.size), drive, 1e6 * y]

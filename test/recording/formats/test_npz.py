@@ -66,7 +66,7 @@ def test_phase_may_be_any_numpy_text(tmp_path, phase):
         ({"phase": 3.0}, "one text"),
     ],
 )
-def test_what_is_no_phase_is_one_line_that_names_the_file(tmp_path, changes, says):
+def test_an_invalid_phase_gives_one_line_with_the_file_name(tmp_path, changes, says):
     np.savez(tmp_path / "01_bad.npz", **{k: v for k, v in keys(**changes).items() if v is not None})
     with pytest.raises((RecordingError, RecordError), match=says) as error:
         read(tmp_path)

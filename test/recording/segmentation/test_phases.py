@@ -129,7 +129,7 @@ def test_levels_with_jumps_are_one_phase(levels, name, measured_noise):
     assert [n for _, n in propose(wave, PERIOD)] == ["rest", name]
 
 
-def test_the_flat_tops_of_a_quantised_sine_are_no_holds():
+def test_the_flat_tops_of_a_quantised_sine_are_not_holds():
     wave = np.round(2.5 * np.sin(2 * np.pi * 0.5 * time(8.0)) * 2**12) / 2**12
     assert propose(wave, PERIOD) == [(0, "sine_0.5hz")]
 

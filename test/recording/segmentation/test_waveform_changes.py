@@ -66,7 +66,7 @@ def chirp(first, last, method="linear"):
     ],
 )
 @pytest.mark.parametrize("noise_level", [0.0, 0.003])
-def test_waveforms_in_a_row_are_told_apart(parts, names, noise_level):
+def test_consecutive_waveforms_are_separated(parts, names, noise_level):
     drive = np.concatenate(parts)
     drive = drive + noise_level * np.random.default_rng(2).normal(size=drive.size)
     found = propose(drive, PERIOD)
@@ -127,5 +127,5 @@ def test_one_waveform_stays_in_one_piece(drive):
     assert waveform_changes(drive) == []
 
 
-def test_a_drive_that_stands_still_has_no_waveforms():
+def test_a_constant_drive_has_no_waveforms():
     assert waveform_changes(np.zeros(100)) == []

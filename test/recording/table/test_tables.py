@@ -135,7 +135,7 @@ def test_rows_are_a_python_slice(tmp_path):
         ({"format": "wav"}, "expected one of"),
     ],
 )
-def test_what_is_missing_or_wrong_is_said(tmp_path, options, says):
+def test_missing_and_invalid_columns_are_reported(tmp_path, options, says):
     (tmp_path / "t.dat").write_text(text(" "))
     with pytest.raises(RecordingError, match=says):
         read(tmp_path / "t.dat", **options)

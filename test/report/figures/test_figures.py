@@ -165,7 +165,7 @@ def test_the_gap_closes_when_the_missing_effect_is_added(comparison, figures):
     assert list(data["phase"]) == [r.phase for r in comparison.experiment]
 
 
-def test_the_residual_test_knows_a_drive_that_is_not_in_the_model(signal):
+def test_the_residual_test_detects_a_dependence_on_the_drive(signal):
     u = signal.normal(size=20_000)
     record = Record(u, 1e-5 * np.roll(u, 1) + 1e-6 * np.roll(u, 9), 1e-3, phase="noise")
     drawing = whiteness(compare(Experiment((record,)), {"model": linear(1e-3)}))
@@ -173,7 +173,7 @@ def test_the_residual_test_knows_a_drive_that_is_not_in_the_model(signal):
     assert drawing.data["cross_lag_s"][np.argmax(np.abs(drawing.data["cross"]))] == pytest.approx(9e-3)
 
 
-def test_a_window_of_a_fast_phase_holds_the_largest_residual():
+def test_a_window_of_a_fast_phase_contains_the_largest_residual():
     u = np.sin(2 * np.pi * np.arange(10_000) / 50)
     residual = np.zeros(u.size)
     residual[6000] = 1.0
@@ -199,7 +199,7 @@ def test_thinning_keeps_ends_and_extremes(values):
     assert np.all(np.diff(kept) > 0)
 
 
-def test_one_frequency_decides_nothing_about_the_residual():
+def test_one_frequency_does_not_decide_the_residual_test():
     u = 5 + 4 * np.sin(2 * np.pi * np.arange(4000) / 200)
     record = Record(u, 1e-5 * np.roll(u, 1) + 1e-7 * np.roll(u, 40), 1e-3, phase="sine_5hz")
     drawing = whiteness(compare(Experiment((record,)), {"model": linear(1e-3)}))

@@ -81,7 +81,7 @@ def test_three_stages_show_no_outlier():
     assert outlying_stages(h) == ()
 
 
-def test_the_page_says_what_the_numbers_say(tmp_path):
+def test_the_sentences_of_the_page_agree_with_the_numbers(tmp_path):
     page = fleet_page(history(shift=0.3, lost=3))
     assert "45 of 48 recordings have a result" in page.html
     assert "s7, the first in bouc_wen.A" in page.html

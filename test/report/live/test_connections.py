@@ -77,7 +77,7 @@ def rest_of(one) -> bytes:
     return read
 
 
-def test_connections_that_send_nothing_keep_no_visitor_out(monkeypatch):
+def test_silent_connections_do_not_block_visitors(monkeypatch):
     monkeypatch.setattr(connections, "MOST_REQUESTS", 4)
     monkeypatch.setattr(connections, "SILENT_REQUEST", 3600.0)
     with page() as server, ExitStack() as stack:

@@ -40,7 +40,7 @@ def test_a_change_has_a_size_and_its_interval(group, unit, change, text):
     assert "statistic 5.2, threshold 1" in shown(WARN, statistic="5.21234", **values)
 
 
-def test_what_has_not_changed_has_no_size_and_what_is_not_watched_no_statistic():
+def test_without_a_change_there_is_no_size_and_without_a_watch_no_statistic():
     values = {"statistic": "0.215539", "group": "loop", "unit": "1", "change": "0.0007"}
     assert "loop" not in shown(OK, **values)
     assert "0.22" in shown(OK, **values)

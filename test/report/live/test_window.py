@@ -50,7 +50,7 @@ def test_the_newest_samples_come_back_in_order_across_the_wrap_of_the_index(size
     np.testing.assert_array_equal(newest.prediction, 3.0 * expected)
 
 
-def test_lost_samples_are_a_gap_and_a_restart_begins_anew():
+def test_lost_samples_are_a_gap_and_a_restart_clears_the_window():
     window = SampleWindow(64)
     add(window, 100, 10)
     add(window, 115, 10, predicted=False)

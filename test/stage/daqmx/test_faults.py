@@ -91,7 +91,7 @@ def test_every_failure_is_reported_clearly_and_ends_safe(rig, streamed, fault, m
 
 
 @pytest.mark.parametrize("step", ["StartTask:1", "ReadAnalogF64:4", "WriteAnalogF64:5"])
-def test_a_link_that_does_not_come_back_leaves_the_voltage_unknown_and_says_so(rig, streamed, step):
+def test_a_lost_link_leaves_the_voltage_unknown_and_is_reported(rig, streamed, step):
     r = rig(f"gone@{step}")
     with pytest.raises(StageError, match=r"voltage of the stage is unknown, last given .* by hand: the card holds"):
         work(r.stage, streamed)
@@ -142,14 +142,14 @@ def test_an_output_left_high_by_another_program_is_seen_where_there_is_a_monitor
     assert r.card.voltage == 0.0
 
 
-def test_nobody_there_or_no_driver_on_this_machine():
+def test_no_device_or_no_driver_on_this_machine():
     with pytest.raises(StageError, match=r"Failed to connect to server|no answer"):
         DaqmxStage(DaqmxSetup("Dev1", server="127.0.0.1:9", timeout=2.0, max_slew_rate=1e3))
     with pytest.raises(StageError, match=r"reading one sample failed: .*NI-DAQmx"):
         DaqmxStage(DaqmxSetup("Dev1", max_slew_rate=1e3))
 
 
-def test_every_fault_can_be_named_and_nothing_else():
+def test_only_known_faults_can_be_injected():
     for kind in FAULTS.meaning:
         assert FAULTS.parse(kind).kind == kind
     with pytest.raises(StageError, match="expected one of"):

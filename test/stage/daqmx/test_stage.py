@@ -44,7 +44,7 @@ def opened(rig):
     return make
 
 
-def test_it_is_a_streaming_stage_that_says_how_late_it_is(opened):
+def test_it_is_a_streaming_stage_with_a_latency(opened):
     card, stage = opened()
     promised = {name for part in (Stage, StreamingStage) for name in vars(part) if not name.startswith("_")}
     assert promised <= set(dir(stage))
@@ -55,7 +55,7 @@ def test_it_is_a_streaming_stage_that_says_how_late_it_is(opened):
 
 
 @pytest.mark.parametrize("monitor", ["ai1", ""])
-def test_a_stream_gives_what_the_simulated_stage_gives(opened, ideal, monitor, streamed):
+def test_a_stream_gives_the_result_of_the_simulated_stage(opened, ideal, monitor, streamed):
     _, stage = opened(plant=ideal(), voltage_input=monitor)
     voltage, displacement = streamed(stage, WAVE, 1, 700, 2000, 2001)
     expected = SimulatedStage(ideal(), sample_period=TS).play(np.r_[np.zeros(LEAD), WAVE], initial_voltage=0.0)
@@ -89,7 +89,7 @@ def test_slow_path_sets_and_reads(opened, ideal):
     stage.close()
 
 
-def test_what_breaks_a_limit_is_not_put_out(opened):
+def test_a_drive_outside_a_limit_is_not_played(opened):
     card, stage = opened()
     for drive in ([10.1], [-0.1], [math.nan], []):
         with pytest.raises(StageError, match="expected"):
@@ -119,14 +119,14 @@ def test_the_delay_of_the_card_is_measured_apart_and_taken_off(opened, streamed)
     corrected.close()
 
 
-def test_an_input_that_hears_nothing_has_no_delay(opened):
+def test_an_unconnected_input_has_no_delay(opened):
     _, stage = opened(displacement_input="ai0", voltage_input="", sensor_gain=1.0)
     with pytest.raises(StageError, match="expected"):
         loop_back_delay(stage)
     stage.close()
 
 
-def test_a_machine_without_the_package_learns_what_to_install(monkeypatch):
+def test_without_the_package_the_error_states_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "nidaqmx", None)
     with pytest.raises(StageError, match=r"pip install 'nidaqmx\[grpc\]'"):
         DaqmxStage(DaqmxSetup("Dev1", max_slew_rate=1e3))

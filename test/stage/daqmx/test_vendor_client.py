@@ -62,7 +62,7 @@ def test_a_second_of_output_and_two_inputs_on_one_clock(task, ideal):
     np.testing.assert_allclose(monitor / 2.0, wave, atol=1e-9)
 
 
-def test_a_continuous_output_without_regeneration_ends_when_nothing_more_comes(task):
+def test_a_continuous_output_without_regeneration_ends_without_new_samples(task):
     output = task()
     output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=0, max_val=10)
     output.timing.cfg_samp_clk_timing(1 / TS, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000)
@@ -73,7 +73,7 @@ def test_a_continuous_output_without_regeneration_ends_when_nothing_more_comes(t
     output.start()
 
 
-def test_single_values_and_what_is_refused(task):
+def test_single_values_and_refused_calls(task):
     output, inputs = task(), task()
     output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=0, max_val=10)
     inputs.ai_channels.add_ai_voltage_chan("Dev1/ai1")

@@ -91,7 +91,7 @@ def test_an_array_is_whole_and_finite_or_refused(header, rows, count, columns):
     ),
     st.floats(1e-6, 1.0),
 )
-def test_an_array_comes_back_as_it_was_written(values, sample_time):
+def test_an_array_reads_back_unchanged(values, sample_time):
     values = np.array(values)
     lines = answer.array(values, sample_time, [f"column {i}" for i in range(values.shape[1])])
     read = ArrayAnswer.parse(lines, *values.shape)

@@ -55,7 +55,7 @@ def test_a_link_reset_in_mid_stream_ends_at_the_safe_voltage(bench, play, step):
 
 
 @pytest.mark.parametrize("step", ["VOL?:2", "WAV?:1", "DRR?:2"])
-def test_a_link_that_does_not_come_back_leaves_the_voltage_unknown_and_says_so(bench, play, step):
+def test_a_lost_link_leaves_the_voltage_unknown_and_is_reported(bench, play, step):
     b = bench(f"gone@{step}", rows_per_answer=500)
     with pytest.raises(StageError, match=r"voltage of the stage is unknown.*switch the amplifier off"):
         work(b.stage, play)
@@ -119,7 +119,7 @@ def test_a_waveform_that_was_not_stored_as_sent_is_not_played(bench, play):
     assert not any(line.startswith("WGO 1 1") for line in b.controller.heard)
 
 
-def test_nobody_there(bench):
+def test_no_device_at_the_address(bench):
     b = bench(opened=False)
     setup = b.setup()
     b.server.close()
@@ -127,7 +127,7 @@ def test_nobody_there(bench):
         Gcs2Stage(setup)
 
 
-def test_every_fault_can_be_named_and_nothing_else():
+def test_only_known_faults_can_be_injected():
     for kind in FAULTS.meaning:
         assert FAULTS.parse(kind).kind == kind
     assert FAULTS.parse("error@sva:3=79") == Fault("error", "SVA", 3, 79.0)
@@ -150,7 +150,7 @@ def test_every_fault_can_be_named_and_nothing_else():
         "TMX?=1e300",
     ],
 )
-def test_an_answer_that_cannot_be_is_refused_while_opening_and_moves_nothing(bench, answer):
+def test_an_impossible_answer_is_refused_while_opening_and_nothing_moves(bench, answer):
     b = bench(f"absurd@{answer}", opened=False)
     with pytest.raises(StageError, match=r"expected (a number from|a range)") as refusal:
         Gcs2Stage(b.setup())

@@ -54,14 +54,14 @@ def test_opening_moves_nothing(bench):
     observer.connection.close()
 
 
-def test_a_waveform_gives_what_the_simulated_stage_gives(bench, play, ideal):
+def test_a_waveform_gives_the_result_of_the_simulated_stage(bench, play, ideal):
     got = play(bench(plant=ideal()).stage, WAVE)
     expected = SimulatedStage(ideal(), sample_period=SERVO_TIME).play(WAVE, initial_voltage=0.0)
     np.testing.assert_allclose(got.displacement, expected.displacement, rtol=1e-7, atol=1e-13)
     np.testing.assert_allclose(got.voltage, WAVE, atol=1e-7)
 
 
-def test_a_multiple_of_the_servo_time_holds_every_point_and_keeps_one_sample_of_each(bench, play, ideal):
+def test_a_multiple_of_the_servo_time_repeats_points_and_keeps_one_sample_each(bench, play, ideal):
     stage = bench(plant=ideal()).stage
     stage.configure(3 * SERVO_TIME)
     assert stage.sample_period == pytest.approx(150e-6)
@@ -82,7 +82,7 @@ def test_blocks_follow_each_other_from_the_voltage_in_force(bench, play):
 
 
 @pytest.mark.parametrize("size", [1, 9, 10, 11, 4097])
-def test_chunks_of_any_size_carry_every_point(bench, play, size):
+def test_chunks_of_any_size_transfer_every_point(bench, play, size):
     drive = 2.0 + np.sin(0.1 * np.arange(size))
     got = play(bench(points_per_command=10, rows_per_answer=1000).stage, drive)
     np.testing.assert_allclose(got.voltage, drive, atol=2e-4)
@@ -103,7 +103,7 @@ def test_slow_path_sets_and_reads_with_the_servo_off(bench, ideal):
     observer.connection.close()
 
 
-def test_what_breaks_a_limit_is_not_sent(bench):
+def test_a_drive_outside_a_limit_is_not_sent(bench):
     b = bench()
     b.controller.heard.clear()
     for drive in ([10.1], [-0.1], [math.nan], []):
@@ -172,7 +172,7 @@ def test_wrong_units_are_seen_at_the_first_move(bench):
     assert b.voltage == 0.0
 
 
-def test_the_error_an_earlier_user_left_is_nobodys_now(bench):
+def test_an_error_of_an_earlier_user_is_ignored(bench):
     b = bench(opened=False)
     client = b.observer()
     client.connection.send("MOV 1 3\n*IDN?\n")
@@ -182,7 +182,7 @@ def test_the_error_an_earlier_user_left_is_nobodys_now(bench):
     b.stage.set_voltage(1.0)
 
 
-def test_a_controller_without_what_is_needed_is_named(bench):
+def test_a_controller_without_a_required_command_is_refused_by_name(bench):
     b = bench(opened=False)
     for word in ("WGO", "DRR?"):
         del b.controller._commands[word]
