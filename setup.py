@@ -56,7 +56,6 @@ setup(
     ],
     python_requires=">=3.11",
     install_requires=[
-        "bokeh",
         "h5py",
         "jinja2",
         "matplotlib",
@@ -69,7 +68,6 @@ setup(
         "rosbags",
         "scipy",
         "threadpoolctl",
-        "tornado",
         "zstandard",
     ],
     extras_require={
@@ -77,6 +75,7 @@ setup(
         "fmu": ["fmpy"],
         "hardware": ["nidaqmx[grpc]"],
         "labview": ["npTDMS"],
+        "live": ["bokeh", "tornado"],
         "notebook": ["jupyterlab", "jupytext", "pandas", "xarray"],
         "rerun": ["rerun-sdk"],
         "ros": [

@@ -25,7 +25,8 @@
     ├── StageError            (OSError)          a stage or its limits, link, state
     │   ├── DeviceError                          the device itself failed
     │   └── StoppedError                         work on a device was interrupted by a stop
-    └── RecordingError        (OSError)          a file that cannot be read or written
+    ├── RecordingError        (OSError)          a file that cannot be read or written
+    └── MissingPackageError   (ImportError)      a Python package of an extra is not installed
 
 `UnknownStateWarning` is the only warning: a simulation starts from rest although its record does not.
 """
@@ -91,6 +92,31 @@ class StoppedError(StageError):
 
 class RecordingError(PiezoError, OSError):
     """A recording that cannot be read or written."""
+
+
+class MissingPackageError(PiezoError, ImportError):
+    """A Python package that only one extra of this package needs is not installed.
+
+    Parameters
+    ----------
+    what : str
+        What needs it.
+    package : str
+        Its name.
+    extra : str
+        The extra that brings it.
+
+    Examples
+    --------
+    >>> print(MissingPackageError("fleet", "dask", "fleet"))
+    fleet: got no Python package 'dask', expected the extra 'fleet'; run: pip install 'piezo_hysteresis[fleet]'
+    """
+
+    def __init__(self, what: str, package: str, extra: str) -> None:
+        super().__init__(
+            f"{what}: got no Python package '{package}', expected the extra '{extra}'; "
+            f"run: pip install 'piezo_hysteresis[{extra}]'"
+        )
 
 
 class DivergenceError(PiezoError, ArithmeticError):

@@ -27,6 +27,8 @@ import pytest
 import yaml
 
 import piezo_hysteresis
+from piezo_hysteresis import recording
+from piezo_hysteresis.record import Experiment, Record
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
@@ -103,7 +105,7 @@ def test_driver_parameters_in_the_file_are_the_defaults_of_the_table():
         assert rows[name].check(value) == rows[name].value, name
 
 
-@pytest.mark.parametrize("node", ["driver_node", "model_node", "identification_node", "compensation_node"])
+@pytest.mark.parametrize("node", ["driver_node", "model_node", "identification_node", "compensation_node", "page_node"])
 def test_a_node_without_ros_ends_in_one_line(node):
     hidden = "import sys; sys.modules['rclpy'] = None; from piezo_hysteresis.nodes import start; "
     command = [sys.executable, "-c", f"{hidden} sys.exit(start.{node}())"]
@@ -111,6 +113,19 @@ def test_a_node_without_ros_ends_in_one_line(node):
     (line,) = done.stderr.splitlines()
     assert done.returncode == 2
     assert line.startswith(f"{node}: got no Python package 'rclpy', expected ROS 2")
+
+
+def test_the_page_without_its_extra_ends_in_one_line(tmp_path):
+    recording.write(Experiment((Record([0.0, 1.0], [0.0, 1e-6], 1e-3),)), tmp_path / "experiment")
+    hidden = "import sys; sys.modules['bokeh'] = None; "
+    view = "from piezo_hysteresis.cli.main import main; sys.exit(main(['view', sys.argv[1]]))"
+    page = "from piezo_hysteresis.nodes import start; sys.exit(start.page_node())"
+    for program in (view, page):
+        command = [sys.executable, "-c", hidden + program, tmp_path / "experiment"]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+        (line,) = done.stderr.splitlines()
+        assert done.returncode == 2
+        assert "got no Python package 'bokeh', expected the extra 'live'" in line
 
 
 @pytest.mark.parametrize("node", ["driver", "model", "identification", "compensation"])

@@ -19,7 +19,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from ..errors import RecordingError
+from ..errors import MissingPackageError
 
 
 def package(name: str) -> Any:
@@ -32,14 +32,10 @@ def package(name: str) -> Any:
 
     Raises
     ------
-    RecordingError
+    MissingPackageError
         If it is not installed.
     """
     try:
         return import_module(name)
     except ImportError:
-        owner = name.partition(".")[0]
-        raise RecordingError(
-            f"fleet: got no Python package '{owner}', expected the extra 'fleet'; "
-            "run: pip install 'piezo_hysteresis[fleet]'"
-        ) from None
+        raise MissingPackageError("fleet", name.partition(".")[0], "fleet") from None

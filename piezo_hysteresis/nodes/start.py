@@ -21,6 +21,7 @@ import signal
 import sys
 from importlib import import_module
 
+from ..errors import MissingPackageError
 from .runtime.interrupt import remember_interrupts
 
 ROS_PACKAGES = (
@@ -28,8 +29,8 @@ ROS_PACKAGES = (
     "rclpy", "sensor_msgs", "std_msgs", "std_srvs",
 )  # fmt: skip
 """Python packages that ROS 2 brings."""
-NO_ROS = 2
-"""Exit status of a node on a computer without ROS 2."""
+NOT_INSTALLED = 2
+"""Exit status of a node without ROS 2, or without a package that it needs."""
 
 
 def axis_node() -> int:
@@ -70,13 +71,16 @@ def _run(module: str) -> int:
     except (KeyboardInterrupt, ImportError) as error:
         if _was_interrupted(error):
             return 128 + signal.SIGINT
+        if isinstance(error, MissingPackageError):
+            sys.stderr.write(f"{module.rpartition('.')[2]}: {error}\n")
+            return NOT_INSTALLED
         missing = (error.name or "").partition(".")[0] if isinstance(error, ImportError) else ""
         if missing in ROS_PACKAGES:
             sys.stderr.write(
                 f"{module.rpartition('.')[2]}: got no Python package '{missing}', expected ROS 2; load its setup.bash, "
                 "or on Linux x86-64 type pip install '.[ros]' in the source folder\n"
             )
-            return NO_ROS
+            return NOT_INSTALLED
         raise
 
 

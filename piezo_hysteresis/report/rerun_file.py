@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordingError
+from ..errors import MissingPackageError
 from ..record import Record
 from .density import density
 from .figures.comparison import ModelComparison
@@ -65,16 +65,13 @@ def write_rerun(comparison: ModelComparison, path: str | Path, title: str) -> No
 
     Raises
     ------
-    RecordingError
+    MissingPackageError
         If the package rerun-sdk is not installed.
     """
     try:
         import rerun as rr
     except ImportError:
-        raise RecordingError(
-            "Rerun file: got no Python package 'rerun-sdk', expected the extra 'rerun'; "
-            "run: pip install 'piezo_hysteresis[rerun]'"
-        ) from None
+        raise MissingPackageError("Rerun file", "rerun-sdk", "rerun") from None
     stream: Any = rr.RecordingStream(APPLICATION)
     stream.save(path, default_blueprint=blueprint(comparison))
     stream.send_recording_name(title)

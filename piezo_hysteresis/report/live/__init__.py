@@ -13,3 +13,11 @@
 # limitations under the License.
 
 """The page in the browser: a running axis, or a recording, drawn with Bokeh. No ROS."""
+
+from importlib.util import find_spec
+
+from ...errors import MissingPackageError
+
+for _package in ("bokeh", "tornado"):
+    if find_spec(_package) is None:
+        raise MissingPackageError("page", _package, "live")
