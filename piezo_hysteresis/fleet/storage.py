@@ -56,8 +56,9 @@ class Storage:
             return _s3(bucket, self.endpoint, self.anonymous), url[5:].rstrip("/")
         if not scheme:
             return _disk(), str(Path(url).expanduser().absolute())
+        fsspec = package("fsspec")
         try:
-            fs, path = package("fsspec").core.url_to_fs(url)
+            fs, path = fsspec.core.url_to_fs(url)
         except (ValueError, ImportError) as error:
             raise RecordingError(
                 f"{url}: {printable(str(error))}; expected a local path, s3://, http:// or https://"

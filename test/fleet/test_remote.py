@@ -24,7 +24,7 @@ pytest.importorskip("distributed")
 pytest.importorskip("pyarrow")
 
 from piezo_hysteresis import recording
-from piezo_hysteresis.errors import RecordingError
+from piezo_hysteresis.errors import MissingPackageError, RecordingError
 from piezo_hysteresis.fleet.finding import find_recordings
 from piezo_hysteresis.fleet.fleet import open_orders, run_fleet
 from piezo_hysteresis.fleet.storage import Storage
@@ -105,5 +105,5 @@ def test_without_the_extra_one_line_states_what_to_install(tmp_path, monkeypatch
     from piezo_hysteresis.fleet.storage import _disk
 
     _disk.cache_clear()
-    with pytest.raises(RecordingError, match=r"pip install 'piezo_hysteresis\[fleet\]'"):
+    with pytest.raises(MissingPackageError, match=r"pip install 'piezo_hysteresis\[fleet\]'"):
         find_recordings([str(tmp_path)])
