@@ -61,7 +61,10 @@ def changes(day: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanop
         yield f"pole {samples:g} samples", "lag", samples * PERIOD, slow
     for samples in (0.5, 2.0, 10.0):
         twice = replace(day, filter_twice=samples * PERIOD)
-        yield f"second order {samples:g} samples", "lag", None, twice
+        yield f"second order {samples:g} samples", "lag", 2.0**0.5 * samples * PERIOD, twice
+    for samples in (1.0, 6.0):
+        mean = replace(day, filter_mean=samples * PERIOD)
+        yield f"moving average, later by {samples:g} samples", "lag", samples * PERIOD, mean
     yield "gain + 4 %", "static", None, replace(day, gain=1.04 * day.gain)
     yield "gain - 6 %", "static", None, replace(day, gain=0.94 * day.gain)
     yield "loop + 20 %", "hysteresis", None, replace(day, loop=1.2 * day.loop)
@@ -80,7 +83,10 @@ def named(model: Model, stage: Nanopositioner, triangles: bool) -> tuple[str, fl
     records = played(stage, triangles).records
     least = np.maximum(floors(records), float(model.provenance["free_run_error"]))
     change = find_change(model, records, range(len(records)), least.tolist())
-    return None if change is None else (change.kind.family, change.size, change.interval_95)
+    if change is None:
+        return None
+    size, *interval = change.lag if change.kind.family == "lag" else (change.size, *change.interval_95)
+    return change.kind.family, size, (interval[0], interval[1])
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -90,6 +90,7 @@ class Nanopositioner:
     filter_delay: float = 0.0
     filter_pole: float = 0.0
     filter_twice: float = 0.0
+    filter_mean: float = 0.0
     softening: float = 0.0
     drift: float = 0.0
     plays: int = 30
@@ -166,6 +167,9 @@ class Nanopositioner:
         return self._late(np.asarray(lfilter(np.poly(a - b @ c) - den, den, w)), self.delay, self.pole, dt)
 
     def _filtered(self, x: Array, dt: float) -> Array:
+        if self.filter_mean:  # the mean of the last samples, which is so much later
+            taps = 1 + round(2.0 * self.filter_mean / dt)
+            x = lfilter(np.full(taps, 1.0 / taps), [1.0], x)
         if self.filter_twice:
             x = lfilter(*butter(2, 0.5 / (np.pi * self.filter_twice), fs=1.0 / dt), x)
         return self._late(x, self.filter_delay, self.filter_pole, dt)

@@ -23,6 +23,7 @@ from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import Verdict, diagnose
 from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change
 from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
+from piezo_hysteresis.discrepancy.changes.same_stage import sentence_of
 from piezo_hysteresis.discrepancy.residual.noise_floor import floors
 from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.identification.identify import identify
@@ -78,6 +79,41 @@ def test_the_changed_parameter_is_named(model, another_day, changed, key, size):
     assert change.key == key
     assert change.size == pytest.approx(size, rel=0.03 if key.startswith("low_pass") else 0.25)
     assert change.interval_95[0] <= size <= change.interval_95[1] or not key.startswith("low_pass")
+
+
+@pytest.mark.parametrize("late", [5e-4, 1e-3, 4e-3])
+def test_the_lag_of_a_moving_average_is_said(model, another_day, late):
+    change = change_of(model, replace(another_day, filter_mean=late))
+    assert change.kind.name == "second_order_low_pass" and change.kind.family == "lag"
+    lag = change.row()["parameters"]["lag"]
+    assert lag["value"] == pytest.approx(late, rel=0.06)
+    assert lag["interval_95"][0] <= late <= lag["interval_95"][1]
+    assert "It delays slow signals by" in sentence_of(change)
+
+
+def test_a_bessel_filter_is_told_from_a_butterworth_filter():
+    stage = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
+    drives = [growing_sine(f, 1e-4, (0.5, 1.0)) for f in (2.0, 40.0)]
+    fine = identify(Experiment(tuple(stage.play(u, 1e-4) for u in drives)), memory=True).model
+    records = [replace(stage, filter_mean=4e-4).play(u, 1e-4) for u in drives]
+    least = np.maximum(floors(records), float(fine.provenance["free_run_error"]))
+    change = find_change(fine, records, range(len(records)), least.tolist())
+    assert change.key == "low_pass_bessel" and change.member_certain
+    assert change.lag[0] == pytest.approx(4e-4, rel=0.02)
+    assert "Bessel, or a moving average" in sentence_of(change)
+
+
+def test_what_the_records_tell_apart_is_no_rival(model, another_day):
+    change = change_of(model, replace(another_day, filter_pole=2e-3))
+    assert not change.rivals
+
+
+def test_what_is_within_the_known_error_is_no_change(model):
+    records = played(STAGE).records
+    drift = 0.5 * float(model.provenance["free_run_error"])
+    slow = [replace(r, displacement=r.displacement + drift * np.sin(r.time / r.duration)) for r in records]
+    least = np.maximum(floors(slow), float(model.provenance["free_run_error"]))
+    assert find_change(model, slow, range(len(slow)), least.tolist()) is None
 
 
 def test_diagnose_names_a_filter_and_its_model_predicts_better(model, another_day):

@@ -22,7 +22,10 @@ from typing import Any
 import numpy as np
 
 from ...effects import Creep, ExtraDelay, ExtraResonance, SecondOrderLowPass, SensorBandwidth, Softening, ThermalDrift
+from ...effects.sensor.second_order_low_pass import BUTTERWORTH
 
+BESSEL = 0.75**0.5
+"""Damping ratio of a Bessel filter, whose delay is flat; a moving average of the same delay begins like it."""
 LEAVES = 6.0
 """Largest V that a change may leave. If more remains, something else has changed too, or the form is different."""
 
@@ -45,6 +48,8 @@ class ChangeKind:
         Linear changes; empty if the change acts on the whole prediction.
     words : str
         Part of the sentence about the stage, with a place for the size.
+    damping : float
+        Damping ratio of a filter of second order.
     """
 
     name: str
@@ -53,14 +58,32 @@ class ChangeKind:
     unit: str
     rows: tuple[str, ...]
     words: str
+    damping: float = 0.0
+
+    @property
+    def lag(self) -> float:
+        """Time by which slow signals are later, in units of the size; 0 where it is no lag."""
+        return 0.0 if self.family != "lag" else 2.0 * self.damping or 1.0
+
+    @property
+    def is_filter(self) -> bool:
+        """Whether the size is the time constant of a filter."""
+        return self.name in (SensorBandwidth.name, SecondOrderLowPass.name)
 
 
 KINDS: dict[str, ChangeKind] = {
     "delay": ChangeKind(ExtraDelay.name, "lag", "tau", "s", (), "{how} by {size}"),
     "low_pass": ChangeKind(SensorBandwidth.name, "lag", "tau", "s", (), "behind a low-pass of time constant {size}"),
-    "low_pass_2": ChangeKind(
-        SecondOrderLowPass.name, "lag", "tau", "s", (), "behind a low-pass of second order with time constant {size}"
-    ),
+    **{
+        key: ChangeKind(
+            SecondOrderLowPass.name, "lag", "tau", "s", (), f"behind a {words} with time constant {{size}}", damping
+        )
+        for key, words, damping in (
+            ("low_pass_2", "low-pass of second order (Butterworth)", BUTTERWORTH),
+            ("low_pass_bessel", "low-pass of second order (Bessel, or a moving average)", BESSEL),
+            ("low_pass_poles", "low-pass of second order (two equal poles)", 1.0),
+        )
+    },
     Creep.name: ChangeKind(Creep.name, Creep.family, "relative", "1", (Creep.name,), "with creep changed by {size}"),
     "resonance": ChangeKind(
         ExtraResonance.name, "dynamics", "f0", "Hz", ("resonance",), "with a resonance moved by {size}"
@@ -86,7 +109,7 @@ class ParameterChange:
     size : float
         Size in the unit of its kind.
     interval_95 : (float, float)
-        95 % interval of the size, with pieces of the records as independent units; it includes rivals.
+        95 % interval of the size, with pieces of the records as independent units.
     rivals : tuple of str
         Keys of the changes that explain as much.
     before, after : float
@@ -109,22 +132,51 @@ class ParameterChange:
         return KINDS[self.key]
 
     @property
+    def others(self) -> tuple[str, ...]:
+        """Names of the effects that explain as much."""
+        return tuple(n for n in dict.fromkeys(KINDS[r].name for r in self.rivals) if n != self.kind.name)
+
+    @property
     def member_certain(self) -> bool:
         """False if another member of the family explains as much, or if a large residual remains."""
-        return self.after < LEAVES and all(KINDS[r].family != self.kind.family for r in self.rivals)
+        families = {KINDS[r].family for r in self.rivals if KINDS[r].name in self.others}
+        return self.after < LEAVES and self.kind.family not in families
+
+    @property
+    def lag(self) -> tuple[float, float, float]:
+        """Time by which slow signals are later, and its 95 % interval [s]; zeros where the change is no lag."""
+        size, (low, high) = self.size, self.interval_95
+        factor = self.kind.lag
+        return factor * size, factor * low, factor * high
+
+    @property
+    def time_constants(self) -> tuple[float, float]:
+        """95 % interval of the size, with filters of another damping that explain as much [unit of the kind]."""
+        low, high = self.interval_95
+        alike = [KINDS[r].lag for r in self.rivals if KINDS[r].damping] if self.kind.damping else []
+        sizes = [self.kind.lag * self.size / lag for lag in alike]
+        return min(low, *sizes, high), max(high, *sizes, low)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Value, interval and unit of the parameter that changed; of a filter of second order also its lag."""
+        kind, lag = self.kind, self.lag
+        rows = {kind.parameter: {"value": self.size, "interval_95": list(self.time_constants), "unit": kind.unit}}
+        if kind.damping:
+            rows["lag"] = {"value": lag[0], "interval_95": list(lag[1:]), "unit": "s"}
+        return rows
 
     def row(self) -> dict[str, Any]:
         """The change as an effect of ``answer.json``."""
-        kind, rivals = self.kind, [KINDS[r] for r in self.rivals]
-        low, high = self.interval_95
+        kind = self.kind
         return {
             "name": kind.name,
             "law": kind.name,
             "family": kind.family,
             "member_certain": self.member_certain,
             "explained_fraction": round(float(1.0 - np.sqrt(self.after / self.before)), 4),
-            "parameters": {kind.parameter: {"value": self.size, "interval_95": [low, high], "unit": kind.unit}},
-            "confusable_with": [r.name for r in rivals],
+            "parameters": self.parameters,
+            "confusable_with": list(self.others),
             "held_out_gain": round(float(np.log(self.before / max(self.after, 1e-12))), 4),
             "changed_parameter": True,
         }

@@ -30,9 +30,10 @@ from numpy.typing import NDArray
 from ...effects import ExtraResonance
 from ...model.model import Model
 from ...record import Record
+from ..search.cross_validation import ADEQUATE
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .change_search import Account, ChangeSearch
-from .signatures import SHAPES, shaped_model
+from .signatures import SECOND_ORDER, SHAPES, shaped_model
 
 Array = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ MOVED = (0.9, 0.95, 0.98, 1.02, 1.05, 1.1)
 TURNS = 4
 """Number of linearisations of that search."""
 UNCERTAIN = 0.6
-"""Error of the given model that can resemble a change, in floors of the records."""
+"""Share of the remaining error, at least of the floors of the records, that can resemble a change."""
 SURE = 2.5
 """Smallest significant change, in standard errors."""
 
@@ -79,13 +80,17 @@ def find_change(
     """
     search = ChangeSearch(model, records, used, floors)
     day = search.account("none")
+    if day.cost <= ADEQUATE:
+        return None
     keys = [k for k, kind in KINDS.items() if k in SHAPES or (kind.rows and kind.rows[0] in search.predicted[0].rows)]
-    found = [_Explanation(search, search.best(k)) for k in (*search.sides, *keys)]
+    accounts = [search.best(k) for k in (*search.sides, *keys) if k not in SECOND_ORDER]
+    accounts += _filters_of_second_order(search)
+    found = [_Explanation(search, a) for a in accounts]
     if "resonance" in keys and min(e.account.cost for e in found) > LEAVES:
         found.append(_moved_resonance(model, records, used, floors))
-    found.sort(
-        key=lambda e: e.account.cost * (RIVAL if e.account.key == "low_pass_2" else 1.0)
-    )  # the simpler lag first
+    # the simpler lag first
+    found.sort(key=lambda e: e.account.cost * (RIVAL if e.account.key in SECOND_ORDER else 1.0))
+    alike = RIVAL * max(1.0, found[0].account.cost)
     found[0] = _simulated(found[0], model, records, used, floors)
     best = found[0].account
     leaves = best.cost < LEAVES or best.cost < NEARLY_ALL * day.cost
@@ -96,9 +101,16 @@ def find_change(
     size = found[0].size
     if not _differs(size, interval) or abs(size) < least:
         return None
-    near = (e.account.key for e in found[1:] if e.account.cost < RIVAL * best.cost + 0.02 * day.cost)
+    near = (e.account.key for e in found[1:] if e.account.cost < alike)
     rivals = tuple(k for k in dict.fromkeys(near) if k != best.key)
     return ParameterChange(best.key, size, interval, rivals, day.cost, best.cost, found[0].search.session(best))
+
+
+def _filters_of_second_order(search: ChangeSearch) -> list[Account]:
+    """The best filter of every damping; slow signals are about equally late behind all of them."""
+    (first, zeta), *others = SECOND_ORDER.items()
+    best = search.best(first)
+    return [best, *(search.best(key, near=best.size * zeta / other) for key, other in others)]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -117,7 +129,8 @@ class _Explanation:
     def interval(self, before: float) -> tuple[float, float]:
         """95 % interval of the size; `before` is V without the change."""
         low, high = self.search.interval(self.account)
-        alike = UNCERTAIN * abs(self.size) / float(np.sqrt(max(before - self.account.cost, 1e-12)))
+        left = max(1.0, self.account.cost)
+        alike = UNCERTAIN * abs(self.size) * float(np.sqrt(left / max(before - self.account.cost, 1e-12)))
         half = float(np.hypot(0.5 * (high - low), alike))
         return self.size - half, self.size + half
 

@@ -31,7 +31,7 @@ from ..diagnosis import Diagnosis, Verdict
 from ..gap import measure_gap
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
-from .change_kinds import KINDS, LEAVES, ParameterChange
+from .change_kinds import LEAVES, ParameterChange
 from .parameter_changes import find_change
 from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_model
 
@@ -87,27 +87,32 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
 
 
 def sentence_of(change: ParameterChange) -> str:
-    """The change in one sentence, with its size and interval."""
+    """The change in a few sentences, with its size and interval."""
     kind = change.kind
-    sure = change.size, *change.interval_95
-    if kind.unit == "s":
-        factor, unit = next((f, u) for f, u in UNITS if abs(change.size) >= f or u == "ns")
-        numbers = [abs(n) / factor if kind.words.startswith("{how}") else n / factor for n in sure]
-    elif kind.unit == "1":
-        factor, unit = 0.01, "%"
-        numbers = [n / factor for n in sure]
-    elif kind.unit == "m":
-        factor, unit = 1e-9, "nm"
-        numbers = [n / factor for n in sure]
-    else:
-        numbers, unit = list(sure), kind.unit
-    low, high = sorted(numbers[1:])
-    size = f"{numbers[0]:.4g} {unit} (95 %: {low:.4g} to {high:.4g} {unit})"
+    numbers = change.size, *change.time_constants
+    size = _with_interval([abs(n) for n in numbers] if change.key == "delay" else numbers, kind.unit)
+    if kind.is_filter:
+        size += f", cut-off frequency {0.5 / np.pi / change.size:.4g} Hz"
     words = kind.words.format(how="later" if change.size > 0.0 else "earlier", size=size)
-    rivals = ", ".join(KINDS[r].name for r in change.rivals)
-    alike = f"; {rivals} explains as much" if rivals else ""
+    late = f" It delays slow signals by {_with_interval(change.lag, 's')}." if kind.damping else ""
+    names = change.others
+    alike = f" It cannot be distinguished from {' and '.join(names)} in these records." if names else ""
     left = "" if change.after < LEAVES else " The remaining error is above the known error: the form is not certain."
-    return f"The stage is the same, but {words}: {kind.name} ({kind.family}){alike}.{left}"
+    return f"The stage is the same, but {words}: {kind.name} ({kind.family}).{late}{alike}{left}"
+
+
+def _with_interval(numbers: Sequence[float], unit: str) -> str:
+    """A value and its 95 % interval in a readable unit."""
+    factor = 1.0
+    if unit == "s":
+        factor, unit = next((f, u) for f, u in UNITS if abs(numbers[0]) >= f or f == UNITS[-1][0])
+    elif unit == "1":
+        factor, unit = 0.01, "%"
+    elif unit == "m":
+        factor, unit = 1e-9, "nm"
+    value, *ends = (n / factor for n in numbers)
+    low, high = sorted(ends)
+    return f"{value:.4g} {unit} (95 %: {low:.4g} to {high:.4g} {unit})"
 
 
 def changed_model(model: Model, change: ParameterChange, records: Sequence[Record]) -> Model:

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
@@ -41,6 +42,7 @@ from ...effects import (
 )
 from ...model.model import Model
 from ...record import Record
+from .change_kinds import KINDS
 
 Array = NDArray[np.float64]
 
@@ -181,28 +183,36 @@ def filtered(prediction: ChangeablePrediction, signal: Array, before: float, tau
     return np.asarray(scipy.signal.lfilter(num, den, signal, zi=state)[0])
 
 
-def filtered_twice(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
-    """A signal of the record, filtered with a second-order Butterworth filter of time constant `tau` [s]."""
+def filtered_twice(prediction: ChangeablePrediction, signal: Array, before: float, tau: float, *, zeta: float) -> Array:
+    """A signal of the record behind a filter of second order with time constant `tau` [s] and damping ratio `zeta`."""
     if tau <= 0.0:
         return signal
     period = prediction.record.sample_period
-    block = SecondOrderLowPass(tau=tau).block(Discretisation(period, period))
+    block = SecondOrderLowPass(tau=tau, zeta=zeta).block(Discretisation(period, period))
     return np.asarray(block.run(signal, block.rest(before, 0.0))[0])
 
 
 Shaped = Callable[[ChangeablePrediction, Array, float, float], Array]
 """(prediction, signal, value before, size) → the changed signal."""
 
-SHAPES: dict[str, Shaped] = {"delay": delayed, "low_pass": filtered, "low_pass_2": filtered_twice}
+SECOND_ORDER = {key: kind.damping for key, kind in KINDS.items() if kind.damping}
+"""Damping ratio of every filter of second order, by the key of the change."""
+
+SHAPES: dict[str, Shaped] = {
+    "delay": delayed,
+    "low_pass": filtered,
+    **{key: partial(filtered_twice, zeta=zeta) for key, zeta in SECOND_ORDER.items()},
+}
 """Changes that act on the whole prediction, by name."""
 
 
 def shaped_model(model: Model, key: str, size: float) -> Model:
-    """The model with a change of `SHAPES`: delayed by `size` [s], or with a low-pass of that time constant [s]."""
-    for name, effect in (("low_pass", SensorBandwidth), ("low_pass_2", SecondOrderLowPass)):
-        if key == name:
-            present = model[effect.name]["tau"] if effect.name in model else 0.0
-            return model.with_effect(effect(tau=present + size))
+    """The model with a change of `SHAPES`: later by `size` [s], or behind a low-pass of that time constant [s]."""
+    if KINDS[key].is_filter:
+        name = KINDS[key].name
+        tau = size + (model[name]["tau"] if name in model else 0.0)
+        zeta = SECOND_ORDER.get(key)
+        return model.with_effect(SensorBandwidth(tau=tau) if zeta is None else SecondOrderLowPass(tau=tau, zeta=zeta))
     if Arx.name in model and ExtraDelay.name not in model:
         name = f"{Arx.name}.delay"
         return model.with_values({name: max(0.0, model.values()[name] + size / model.sample_period)})
