@@ -71,7 +71,7 @@ setup(
         "zstandard",
     ],
     extras_require={
-        "fleet": ["aiohttp", "dask", "distributed", "fsspec", "pyarrow"],
+        "fleet": ["aiohttp", "bokeh", "dask", "distributed", "fsspec", "pyarrow"],
         "fmu": ["fmpy"],
         "hardware": ["nidaqmx[grpc]"],
         "labview": ["npTDMS"],
