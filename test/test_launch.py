@@ -15,6 +15,11 @@
 """Launch files on a ROS 2 installation: their arguments, and what they start."""
 
 import importlib.util
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -68,6 +73,33 @@ def test_replay_plays_no_command(tmp_path):
     assert words[words.index("--remap") + 1 :] == [
         "/stage_x/samples:=/replay/samples", "/stage_x/phase:=/replay/phase", "/stage_x/model:=/replay/model",
     ]  # fmt: skip
+
+
+RUN = """
+import sys
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+service = LaunchService()
+source = PythonLaunchDescriptionSource(sys.argv[1])
+values = [value.split(":=") for value in sys.argv[2:]]
+service.include_launch_description(LaunchDescription([IncludeLaunchDescription(source, launch_arguments=values)]))
+sys.exit(service.run())
+"""
+
+
+@pytest.mark.nodes
+def test_watch_opens_a_page_that_ends_with_the_launch():
+    command = [sys.executable, "-c", RUN, str(FOLDER / "watch.launch.py"), "port:=0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as running:
+        lines = []
+        for line in running.stdout:
+            lines.append(line)
+            if found := re.search(r"http://127\.0\.0\.1:\d+/", line):
+                assert urllib.request.urlopen(found.group()).status == 200
+                running.send_signal(signal.SIGINT)
+        assert running.wait(60.0) == 0, "".join(lines)
+    assert any("process has finished cleanly" in line for line in lines), "".join(lines)
 
 
 @pytest.mark.parametrize(
