@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`make bench`: the figures of docs/performance, each beside a peer measured in the same run.
+"""`make bench`: the figures of docs/performance, each compared with another implementation in the same run.
 
-Without a name: those of speed, some minutes in all. Options of one benchmark belong to its own command line, as in
-`python -m benchmarks.streaming --rate 2e5`.
+Without a name, the benchmarks of speed run, which takes some minutes. The options of one benchmark are given on its own
+command line, e.g. `python -m benchmarks.streaming --rate 2e5`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from pathlib import Path
 from benchmarks.figures import Figures, console, machine, show, write
 
 SPEED = ("kernels", "simulation", "identification", "growth", "start", "streaming", "diagnosis")
-"""What runs where nothing is named."""
+"""Benchmarks that run by default."""
 QUALITY = (
     "change",
     "changes",
@@ -45,11 +45,11 @@ QUALITY = (
     "mirror",
     "one_process",
 )
-"""What takes minutes or needs data, by name only."""
+"""Benchmarks that take minutes or need data; they run by name only."""
 
 
 def main() -> int:
-    """Run benchmarks with their defaults; 1 where a promise was not kept."""
+    """Run benchmarks with their defaults; returns 1 if a promise was not kept."""
     parser = argparse.ArgumentParser(
         prog="benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

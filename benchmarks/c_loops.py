@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`CLoops`: the loops of loops.c, compiled where they are measured, as the peer that kernels have to stand beside."""
+"""`CLoops`: the loops of loops.c, compiled on the measured machine, for comparison with the kernels."""
 
 from __future__ import annotations
 

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The change watch: false alarms over hours of simulated stream, memory meanwhile, what it finds, and what it costs.
+"""The change watch: false alarms and memory over hours of simulated stream, detected changes, and cost.
 
-Residuals of four kinds, 0.05 % of range rms each, on a stage that is driven with a 20 Hz sine at 5 kHz, and white ones
-on a slow scan of 1 Hz. The model is exact, so that all of the residual is noise; every stream has a baseline of its
-own. The cost is that of a model node beside a driver at 50 kHz, with a baseline and without.
+Residuals of four kinds, each 0.05 % of the range RMS, on a stage that is driven with a 20 Hz sine at 5 kHz, and white
+residuals with a slow scan of 1 Hz. The model is exact, so the residual is only noise; every stream has its own
+baseline. The cost is that of a model node with a driver at 50 kHz, with a baseline and without.
 
     scripts/run python -m benchmarks.change --hours 1 --changes 3
 """
@@ -70,7 +70,7 @@ def drive(first: int, size: int, frequency: float = 20.0) -> np.ndarray:
 
 
 def changed(change: str, span: float) -> tuple[Model, float, float]:
-    """Model, gain and offset [m] of a stage in which one group has moved."""
+    """Model, gain and offset [m] of a stage in which one group has changed."""
     if change == "loop":
         return MODEL.with_values({"bouc_wen.A": 1.01 * MODEL.values()["bouc_wen.A"]}), 1.0, 0.0
     if change == "dynamics":
@@ -133,7 +133,7 @@ def alarms(hours: float) -> Figures:
         "95 % interval of it, s",
         "growth, MB",
     )
-    return Figures(f"Nothing changes, {hours:g} h each", heads, rows, tuple(failures))
+    return Figures(f"Unchanged stages, {hours:g} h each", heads, rows, tuple(failures))
 
 
 def _poisson(count: int) -> tuple[float, float]:
@@ -160,7 +160,7 @@ def found(changes: int) -> Figures:
             rows.append((kind, change, f"{len(times)} of {changes}", median, f"{right} of {len(times)}"))
             all_right, every = all_right + right, every + changes
             if change == "gain" and (median is None or median > 1.0):
-                failures.append(f"{kind}: a gain that changed by 0.05 % of range was not found within 1 s")
+                failures.append(f"{kind}: a change of gain by 0.05 % of range was not found within 1 s")
     if all_right < RIGHT * every:
         failures.append(f"the group is right in {all_right} of {every}, promised {RIGHT:.0%}")
     heads = ("residual", "change", "found", "median time, s", "group right after 1 s")

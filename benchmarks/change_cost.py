@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the change watch costs a model node at 50 kHz: processor time with a baseline and without one."""
+"""Cost of the change watch in a model node at 50 kHz: processor time with and without a baseline."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ ROOT = Path(__file__).parents[1]
 PERIOD = 2e-5
 """Sample period of the stage [s]."""
 MOST = 10.0
-"""What the watch may cost beside the model [% of a core]."""
+"""Largest cost of the watch in addition to the model [% of a core]."""
 BASELINE = 30.0
 """Time over which the baseline is taken [s]."""
 PATIENCE = 120.0

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What changed between two recordings of one stage: is it named, with its size, and is an unchanged stage left alone.
+"""Changes between two recordings of one stage: are they named with their size, and does an unchanged stage get no name?
 
-Every stage of `benchmarks.nanopositioner` is recorded and identified, then recorded on another day with one thing
-changed, or nothing. Sizes go from a tenth of a sample to tens of samples.
+Every stage of `benchmarks.nanopositioner` is recorded and identified, then recorded on another day with one change, or
+without a change. Delays and time constants go from a tenth of a sample to tens of samples.
 
     python -m benchmarks.changes --stages 8
 """
@@ -132,7 +132,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
         failures.append(f"family right in {right} of {len(every)}, promised {LEAST:.0%}")
     if false:
         failures.append(f"{false} unchanged stages got a name, promised 0")
-    columns = ("change", "family right", "else", "error of the size, median [%]", "interval holds the size")
+    columns = ("change", "family right", "else", "error of the size, median [%]", "interval contains the size")
     return [Figures("Changes between two recordings", columns, rows, tuple(failures))]
 
 

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Benchmark of the live diagnosis: how long does the stage move, and how often is a name wrong?
+"""Benchmark of the live diagnosis: stage time, and number of wrong names.
 
-Stages that share no code with the catalogue are driven tier by tier until the answer is sure. Where a drive was chosen,
-the same stage is driven in the fixed order too. Prints every case as it ends, then the figures of every group.
+Stages that share no code with the catalogue are driven tier by tier until the answer is certain. If a drive was chosen,
+the same stage is also driven in the fixed order. Prints every case when it ends, then the figures of every group.
 
     python -m benchmarks.choice --seeds 1
     python -m benchmarks.choice --groups twins effects --seeds 2 --json choice.json
@@ -80,12 +80,12 @@ class Outcome:
 
     @property
     def is_wrong(self) -> bool:
-        """Named with certainty what is not in the stage."""
+        """True if an effect was named with certainty that is not in the stage."""
         return self.end == "sure" and not set(self.families) <= set(self.right_families)
 
     @property
     def is_right(self) -> bool:
-        """All that is hidden was named, and nothing else."""
+        """True if exactly the hidden effects were named."""
         return set(self.names) == set(self.truth)
 
 

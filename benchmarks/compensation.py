@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How well a stage follows a path that it is driven along through the inverse of its model.
+"""Tracking error of a stage that is driven through the inverse of its model.
 
 The simulated stages of the package are independent of the models. Each is identified and diagnosed from a recording
 with 0.05 % of noise; then the same paths are driven with every method. The stage is at rest at 0 V before each path.

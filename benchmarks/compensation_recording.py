@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A measured piezo that was driven through another inverse: what ours would have commanded, and the error it predicts.
+"""A measured piezo that was driven through another inverse: the command of our inverse, and its predicted error.
 
-The record Test of picma-p885 holds, in rows 11152 to 12151, a path that was driven through the authors' inverse. Our
-model is identified from the record Model, runs over Test up to that row, and is inverted from the state it is then
-in. No stage is at hand: the error of ours is a prediction, that of theirs a measurement.
+In rows 11152 to 12151 of the record Test of picma-p885, the stage was driven through the authors' inverse. Our model is
+identified from the record Model, simulates Test up to that row, and is inverted from this state. There is no stage for
+a measurement: our error is a prediction, theirs a measurement.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Speed of the inverse, beside a C loop of the same arithmetic, and latency of blocks."""
+"""Speed of the inverse, compared with a C loop of the same arithmetic, and latency of blocks."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def speed(size: int) -> Figures:
 
 
 def blocks() -> Figures:
-    """Time from a block of a path to its drive at 50 kHz: what a node waits for."""
+    """Time from a block of a path to its drive at 50 kHz, for which a node has to wait."""
     (effects, _), rows = CHAINS["the same with 16 plays"], []
     model = Model(effects, PERIOD, 10.0, 1e-5)
     inverse = Inverse(model, LIMITS)

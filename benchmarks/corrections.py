@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Corrections without a name on independent plants: how many are accepted, and what they do to records played later.
+"""Corrections without a name on independent plants: number of accepted ones, and their influence on later records.
 
-Every plant hides one thing that the gap finder cannot name: an effect that is in no catalogue, or one whose family was
-taken out of the library. Where the verdict is "unknown", the correction is judged on a second experiment with the same
-plant, with rates and amplitudes that the first one does not have. It took no part in anything.
+Every plant hides one thing that the gap finder cannot name: an effect that is not in the catalogue, or an effect whose
+family was removed from it. If the verdict is "unknown", the correction is judged on a second experiment with the same
+plant, with other rates and amplitudes, which was not used before.
 
     python -m benchmarks.corrections --seeds 2 --json corrections.json
 """

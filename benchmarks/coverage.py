@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Coverage of the 95 % intervals that `piezo diagnose` gives the parameters of an effect it has named.
+"""Coverage of the 95 % intervals that `piezo diagnose` gives for the parameters of a named effect.
 
-The stage is that of `independent_plant`, which integrates otherwise and has other forms than the catalogue. Compared
-are parameters that mean the same in plant and model, some after a change of unit (`truth_of`); left out are the weights
-of plays, the corner of a limit, springs and polynomials, whose forms differ.
+The stage is `independent_plant`, with another integration and other forms than the catalogue. Parameters with the same
+meaning in plant and model are compared, some after a change of unit (`truth_of`). The weights of plays, the corner of a
+limit, springs and polynomials are left out, because their forms differ.
 
     python -m benchmarks.coverage --seeds 1 2
 """
@@ -50,7 +50,7 @@ COMPARED = (
 
 
 def truth_of(plant: Plant, model: Model) -> dict[str, float]:
-    """What a model of the plant's form would have for the effects hidden in it, by parameter.
+    """True values of the parameters of the hidden effects, in the units of the model, by parameter.
 
     Parameters
     ----------

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Cost of a diagnosis: seconds of one core and memory against samples and against effects in the library.
+"""Cost of a diagnosis: seconds of one core and memory, over the number of samples and of effects in the catalogue.
 
-The stage of the naming benchmark with creep hidden in it; the rich protocol with its slow phases stored slowly, as it
-should be, and at the full rate of 50 kHz, as a recorder may have left it.
+The stage of the naming benchmark with hidden creep; the rich protocol with slowly stored slow phases, as recommended,
+and at the full rate of 50 kHz, as a recorder may store it.
 
     python -m benchmarks.diagnosis --holds 1 5 16
 """
@@ -62,7 +62,7 @@ def stage() -> Plant:
 
 
 def cost(experiment: Experiment, effects: Collection[type[Effect]] = CATALOGUE) -> tuple[float, str]:
-    """Processor time of a diagnosis [s], and what it says."""
+    """Processor time of a diagnosis [s], and its answer."""
     begin = time.process_time()
     found = diagnose(experiment, effects=effects)
     return time.process_time() - begin, " and ".join(found.names) or str(found.verdict)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Exported C code beside the kernels of Python: time per sample, deviation, and memory.
+"""Exported C code compared with the Python kernels: time per sample, deviation, and memory.
 
 Prediction and inverse of three chains, by gcc -O2 with and without the fused multiply-add that the kernels use. The
 functions are called as a block; processor time of one core, warm.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every benchmark hands back, and how it is shown: tables on the terminal, one JSON file for machines.
+"""Results of every benchmark, shown as tables on the terminal and stored in a JSON file.
 
 A benchmark is a module with ``arguments(parser)``, its options with defaults, and ``run(options)``, which returns a
 list of `Figures`.
@@ -48,11 +48,11 @@ class Figures:
     Parameters
     ----------
     title : str
-        What was measured, and how.
+        Quantity and method of the measurement.
     columns : tuple of str
         Heads, with units.
     rows : list of tuple
-        One cell per column: words, or numbers in full.
+        One cell per column: text, or numbers with full precision.
     failures : tuple of str
         Promises that were not kept; any of them makes the exit code 1.
     """
@@ -74,7 +74,7 @@ class Figures:
 
 
 def seconds(*works: Callable[[], object], repeats: int = 5) -> list[float]:
-    """Shortest processor time of every work [s], taken in turns, so that a busy machine is busy for all of them."""
+    """Shortest processor time of every work [s], measured alternately, so that other load affects all of them."""
     best = [np.inf] * len(works)
     for work in works:
         work()

@@ -12,13 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Many recordings: rows under kills, processor time beside the work, and cost per recording from 100 to 10 000.
+"""Many recordings: rows with killed workers, additional processor time, and cost per recording from 100 to 10 000.
 
-In the first two tables the recordings lie in an S3 server on this machine (moto, in .venv-s3), else on disk. The
+In the first two tables the recordings are in an S3 server on this machine (moto, in .venv-s3), otherwise on disk. The
 work of the first two reads a recording and waits for one second. All other processor time of this process and of its
-workers is what a recording costs beside its work: listing, handing over, fetching, writing, and the waiting of the
-workers. The exit code is 1 if a row is lost or doubled, if that time is above 2 % of the second, or if the cost grows
-by half.
+workers is the additional time: listing, dispatch, fetching, writing, and waiting workers. The exit code is 1 if a row
+is lost or doubled, if this time is above 2 % of the second, or if the cost grows by half.
 
     scripts/run python -m benchmarks.fleet --recordings 1000 --flat 100 1000 10000
 """
@@ -139,8 +138,8 @@ def _undisturbed(options: argparse.Namespace, folder: Path, template: bytes, add
     failures = [f"{processor:.4f} s per recording, expected at most {MOST:g} s"] if processor > MOST else []
     cells = (options.undisturbed, options.workers, 1e3 * reading, 1e3 * processor, 100 * processor, 1e3 * share)
     heads = (
-        "recordings", "workers", "reading, ms", "processor time beside it, ms", "of the second, %",
-        "time beside the second, ms",
+        "recordings", "workers", "reading, ms", "additional processor time, ms", "of the second, %",
+        "additional time, ms",
     )  # fmt: skip
     return Figures("One-second tasks, undisturbed", heads, [cells], tuple(failures))
 

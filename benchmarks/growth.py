@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How cost grows with samples, effects, numbers to fit, phases and axes: the exponent fitted on log axes.
+"""Growth of the cost with samples, effects, fitted parameters, phases and axes: exponents fitted on log axes.
 
-1 is proportional, 0 does not matter. Processor time of one core; the figure shows all curves on log axes.
+An exponent of 1 means proportional, 0 means no influence. Processor time of one core; the figure has log axes.
 
     python -m benchmarks.growth --figure growth.svg
 """

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Identification of a million samples, and the joint fit beside scipy's least squares with finite differences.
+"""Identification of a million samples, and the joint fit compared with scipy's least squares and finite differences.
 
-Both fits start from the same numbers, free the same ones, simulate with the same kernels and stop at the same relative
-decrease of the cost; ours holds G(1), which is no information, and scipy is left the redundant direction. Processor
-time.
+Both fits have the same start values, free parameters and kernels, and stop at the same relative decrease of the cost.
+Our fit keeps G(1) constant, because it is not determined; scipy keeps this redundant direction. Times are processor
+times.
 
     python -m benchmarks.identification --seeds 4
 """

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Kernels beside the same loops in C, and beside scipy with plain Python.
+"""Kernels compared with the same loops in C, and with scipy and plain Python.
 
-Ours and C take turns, C by gcc -O3 with and without -march=native: numba compiles for the machine it runs on. The
-results are compared before anything is timed. Processor time of one core, warm.
+Our kernels and C are measured alternately, C with gcc -O3 with and without -march=native, because numba compiles for
+the present machine. The results are compared before the measurement. Processor time of one core, after compilation.
 
     python -m benchmarks.kernels --samples 10000000
 """

@@ -12,16 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A measured mirror with three actuators and three displacements: one model for all levels, beside linear ones.
+"""A measured mirror with three actuators and three displacements: one model for all levels, compared with linear ones.
 
-The first four realisations of every level of fsm-mirror fit, the last two judge; where the folder holds files of an
-official test part (``u_100mV_test.npy``, …), these judge too, by the same model. Errors are RMS of the second period
-in free run from the voltages alone, over the three displacements; one constant is free per record.
+The first four realisations of every level of fsm-mirror are fitted, the last two are test records. If the folder
+contains files of an official test part (``u_100mV_test.npy``, …), these are test records too. Errors are RMS of the
+second period in free run from the voltages alone, over the three displacements; one constant is free per record.
 
     python -m benchmarks mirror
 
-What was promised, in µm: less than 0.087 / 0.131 / 0.169 at 100 / 200 / 300 mV. Without the data the benchmark says so
-and judges nothing.
+Promised errors: less than 0.087 / 0.131 / 0.169 µm at 100 / 200 / 300 mV. Without the data the benchmark only reports
+this.
 """
 
 from __future__ import annotations

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Naming benchmark: does the gap finder name what is hidden, and only that?
+"""Naming benchmark: does the gap finder name exactly the hidden effects?
 
-Prints every case as it ends, then the confusion matrix, the figures of every group, the gaps and the time; writes all
-to a JSON file after every case, so that a run that was stopped is not lost.
+Prints every case when it ends, then the confusion matrix, the figures of every group, the gaps and the time. The
+results are written to a JSON file after every case, so that a stopped run is not lost.
 
     python -m benchmarks.naming --quick
     python -m benchmarks.naming --seeds 5 --jobs 2 --json naming.json
@@ -69,12 +69,12 @@ class Outcome:
 
     @property
     def visible(self) -> bool:
-        """Whether anything can be seen at all."""
+        """Whether the hidden effect is visible."""
         return self.excess_before > VISIBLE
 
     @property
     def rest_invisible(self) -> bool:
-        """Whether what was not named cannot be seen: all that is left, once dynamics were found anew, is noise."""
+        """Whether effects that were not named are invisible: only noise remains with newly estimated dynamics."""
         return self.verdict != "unknown" and set(self.names) < set(self.truth) and self.excess_after <= VISIBLE
 
     @property
@@ -89,7 +89,7 @@ class Outcome:
 
     @property
     def is_false(self) -> bool:
-        """A family named that is not in the stage."""
+        """Whether a family was named that is not in the stage."""
         return not set(self.families) <= set(self.right_families)
 
 
@@ -126,7 +126,7 @@ def answer(case: Case) -> Outcome:
 
 
 def confusion(outcomes: list[Outcome]) -> Table:
-    """What was hidden against what was said, single effects that can be seen."""
+    """Hidden effects and answers, for single visible effects."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for o in outcomes:
         if o.group == "effects":
@@ -160,7 +160,7 @@ def figures(outcomes: list[Outcome]) -> Table:
 
 
 def gaps(outcomes: list[Outcome]) -> Table:
-    """How much of the gap closes once an effect has been named rightly."""
+    """Removed share of the gap if an effect was named right."""
     table = Table("hidden", "cases", "before, %", "after, %", "floor, %", "removed, median %", title="gap, unseen data")
     named: dict[str, list[Outcome]] = defaultdict(list)
     for o in outcomes:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A third simulated stage, made like what measured nanopositioners show; it shares no code with `effects` or `stage`.
+"""A third simulated stage, similar to measured nanopositioners; it shares no code with `effects` or `stage`.
 
 Plays whose weights depend on the level, cubic and square, creep of one rate before and another after about a third of a
 second, a lightly damped mode, a pole and a delay, and what a lab changes between two recordings: a filter, a delay, a

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which effects may still show in phases to come, although the records so far show nothing.
+"""Effects that later phases may still show, although the records so far show nothing.
 
-A slow effect has a size that the records so far bound. It is excluded if, at that bound, the phases to come would stay
-at the floor with it: playing these phases would then tell nothing.
+The records so far give an upper bound of the size of a slow effect. The effect is excluded if, with this size, the
+error of the later phases would stay at the noise floor, so that these phases give no information.
 """
 
 from __future__ import annotations
@@ -49,30 +49,30 @@ def still_hidden(
     clock: float,
     error_rate: float,
 ) -> set[str]:
-    """Public names of the effects that a phase to come may show.
+    """Public names of the effects that a later phase may show.
 
     Parameters
     ----------
     model : Model
-        Fitted to the records so far, which it describes.
+        Model that describes the records so far.
     training_data : TrainingData
-        These records.
+        Records so far.
     effects : iterable of Effect classes
-        In question.
+        Effects to test.
     phases : sequence of ProtocolPhase
-        To come, at least one.
+        Later phases, at least one.
     clock : float
         Stage time at which the first of them begins [s].
     error_rate : float
-        Probability that is accepted of a size beyond its bound.
+        Accepted probability that a size is above its bound.
 
     Notes
     -----
-    The size s of an effect has the estimate ŝ and the covariance Σ of a joint linear fit with all numbers of the model.
-    A record counts as `PIECES` independent values. If the effect has the size s, the model without it has shifted its
-    numbers to imitate it in the records so far. M is the mean product, over the phases to come, of what this leaves of
-    the sensitivities. The error that the effect may make there is R² = tr(M (ŝŝᵀ + z² Σ))/f², f the smallest floor so
-    far. It cannot be seen if R² is at most `ADEQUATE` − 1.
+    The size s of an effect has the estimate ŝ and the covariance Σ of a joint linear fit with all parameters of the
+    model. A record counts as `PIECES` independent values. If the effect has the size s, the parameters of the model
+    without it have changed to imitate it in the records so far. M is the mean product, over the later phases, of the
+    sensitivities that remain after this change. The possible error of the effect there is R² = tr(M (ŝŝᵀ + z² Σ))/f²,
+    with the smallest noise floor f so far. It cannot be seen if R² is at most `ADEQUATE` − 1.
     """
     z = float(scipy.stats.norm.isf(0.5 * error_rate))
     floor = float(np.min(training_data.floors))
@@ -94,7 +94,7 @@ def still_hidden(
 def _may_show(
     extended: Model, effect: str, model: Model, training_data: TrainingData, records: Sequence[Record], z: float
 ) -> float:
-    """Mean square of the error that an effect may make in the records to come, every record counting the same [m²]."""
+    """Mean square of the possible error of an effect in the later records, with equal weights [m²]."""
     base = free_numbers(model, training_data)
     sizes = [
         n
@@ -124,7 +124,7 @@ def _may_show(
 
 
 def _to_come(phases: Sequence[ProtocolPhase], clock: float) -> Iterator[Record]:
-    """The phases as records from rest; what they will measure is not known yet."""
+    """The phases as records from rest; their displacement is not known yet."""
     for phase in phases:
         record = Record(phase.voltage, np.zeros(phase.voltage.size), phase.sample_period, phase.name, start_time=clock)
         every = phase.stored_every

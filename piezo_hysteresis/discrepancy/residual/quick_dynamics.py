@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The dynamics of a model without its slow relaxations, which are no dynamics of the stage.
+"""The dynamics of a model without its slow relaxations, which are not dynamics of the stage.
 
-A fit without creep gives G poles of some hertz, each beside a zero. They imitate creep in fast records. In slow
-records G is a gain and a delay, and they do nothing.
+In a fit without creep, G gets poles at a few hertz, each close to a zero. They imitate creep in fast records. In slow
+records G is a gain and a delay, so these poles have no influence.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ from ...model.model import Model
 Array = NDArray[np.float64]
 
 SMALL = 0.1
-"""Share of the response, at most, of a relaxation that counts as creep: a slow amplifier has a larger one."""
+"""Largest share of the response of a relaxation that counts as creep; that of a slow amplifier is larger."""
 REAL = 1e-9
 """Imaginary part below which a root is real."""
 
 
 def quick_dynamics(model: Model, longest: float) -> Model:
-    """The model without relaxations of G slower than `longest` [s]; the dc gain stays.
+    """The model without relaxations of G slower than `longest` [s], with the same dc gain.
 
     Parameters
     ----------
     model : Model
-        Any; one without `arx` is returned as it is.
+        Any model; without `arx` it is returned unchanged.
     longest : float
         Time constant from which a real pole counts as slow [s].
     """
@@ -67,5 +67,5 @@ def quick_dynamics(model: Model, longest: float) -> Model:
 
 
 def _share(pole: float, zero: float) -> float:
-    """Share of the final response of (1 − zero z⁻¹)/(1 − pole z⁻¹) that comes late."""
+    """Delayed share of the final response of (1 − zero z⁻¹)/(1 − pole z⁻¹)."""
     return abs(1.0 - (1.0 - pole) / (1.0 - zero)) if zero != 1.0 else np.inf
