@@ -52,13 +52,14 @@ def step(comparison: ModelComparison) -> Drawing | None:
         answers = [comparison.now.predicted[i] for i in members]
         predicted = step_response([replace(r, displacement=y) for r, y in zip(records, answers, strict=True)])
     figure, (axes,) = canvas(1, 2, 3.4)
-    _draw(axes[0], measured, predicted, min(measured.mean.size, max(ZOOM, delay.samples + 8)))
+    scale = _draw(axes[0], measured, predicted, min(measured.mean.size, max(ZOOM, delay.samples + 8)))
     _draw(axes[1], measured, predicted, measured.mean.size)
-    axes[0].axvline(1e6 * delay.time, color=BLUE, linestyle=(0, (6, 2, 1, 2)), label=f"delay {delay.samples} samples")
+    label = f"delay {delay.samples} sample{'' if delay.samples == 1 else 's'}"
+    axes[0].axvline(scale * delay.time, color=BLUE, linestyle=(0, (6, 2, 1, 2)), label=label)
     model = comparison.model
     if model is not None and Arx.name in model:
         lag = model[Arx.name]["delay"] * model.sample_period
-        axes[0].axvline(1e6 * lag, color=GREEN, linestyle=(0, (1, 1.4)), label=f"delay of the model {duration(lag)}")
+        axes[0].axvline(scale * lag, color=GREEN, linestyle=(0, (1, 1.4)), label=f"delay of the model {duration(lag)}")
     axes[0].set_title("onset")
     axes[1].set_title("whole response")
     axes[1].set_xscale("log")
@@ -86,7 +87,8 @@ def step(comparison: ModelComparison) -> Drawing | None:
     )
 
 
-def _draw(axis: Axes, measured: StepResponse, predicted: StepResponse | None, end: int) -> None:
+def _draw(axis: Axes, measured: StepResponse, predicted: StepResponse | None, end: int) -> float:
+    """Draw a response and return the unit of its time axis [1/s]."""
     time = 1e6 * measured.sample_period * np.arange(end)
     scale, unit = (1e-3, "ms") if time[-1] > 1e3 else (1.0, "µs")
     style = {**MEASURED, "marker": "o" if end < 64 else "", "markersize": 3}
@@ -96,3 +98,4 @@ def _draw(axis: Axes, measured: StepResponse, predicted: StepResponse | None, en
         upto = min(end, predicted.mean.size)
         axis.plot(scale * time[:upto], 1e6 * predicted.mean[:upto], label="predicted", zorder=3, **PREDICTED)
     axis.set_xlabel(f"time since the edge [{unit}]")
+    return 1e6 * scale

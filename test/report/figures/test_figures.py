@@ -35,6 +35,7 @@ from piezo_hysteresis.report.figures.creep import creep
 from piezo_hysteresis.report.figures.loops import cycles, opening
 from piezo_hysteresis.report.figures.residual_maps import residual_maps
 from piezo_hysteresis.report.figures.spectrum import residual_spectrum
+from piezo_hysteresis.report.figures.step import step
 from piezo_hysteresis.report.figures.thinning import thinned
 from piezo_hysteresis.report.figures.time_series import window
 from piezo_hysteresis.report.figures.whiteness import whiteness
@@ -133,6 +134,17 @@ def test_the_step_shows_the_delay_of_the_stage(figures):
     assert "delay 3 samples of 20 µs" in drawing.alternative
     before = drawing.data["time_s"] < 3 * 2e-5 - 1e-9
     assert np.all(np.abs(drawing.data["predicted_m_per_V"][before]) < 1e-9)
+
+
+def test_the_delay_is_drawn_on_the_axis_of_the_step_whatever_its_unit(signal):
+    period = 1e-4
+    u = np.where(np.arange(20_000) // 2000 % 2, 5.0, 0.0)
+    y = 1e-6 * np.roll(u, 3) + 1e-9 * signal.normal(size=u.size)
+    y[:3] = 0.0
+    (onset, _) = step(compare(Experiment((Record(u, y, period, phase="step"),)))).figure.get_axes()
+    (line,) = [line for line in onset.get_lines() if str(line.get_label()).startswith("delay")]
+    assert onset.get_xlabel() == "time since the edge [ms]"
+    assert line.get_xdata()[0] == pytest.approx(0.3)
 
 
 def test_the_spectrum_of_a_white_residual_is_flat_at_its_density(signal):
