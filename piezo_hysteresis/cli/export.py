@@ -14,12 +14,12 @@
 
 """Write a model as a program that runs without Python.
 
-The C files need a C99 compiler and nothing else: a header, a source, and a self-test that compares the source with the
-model. They hold the prediction and, where the model has one, the inverse with the limits of the drive inside. Every
-effect of the catalogue can be written. The program is valid only at the sample period of the model.
+The C files are a header, a source, and a self-test that compares the source with the model. They need only a C99
+compiler. They contain the prediction and, if the model has one, the inverse with the limits of the drive. Every effect
+of the catalogue can be written. The program is valid only at the sample period of the model.
 
-Co-simulation units (FMI 3.0) hold the same code for Simulink, Dymola, OpenModelica and others, with a library for this
-computer where it has a C compiler.
+Co-simulation units (FMI 3.0) contain the same code for Simulink, Dymola, OpenModelica and others, with a library for
+this computer if it has a C compiler.
 """
 
 from __future__ import annotations
@@ -50,19 +50,21 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--name",
         metavar="NAME",
         default="piezo",
-        help="begins the names of files, functions and types, so that one program can hold several models "
+        help="beginning of the names of files, functions and types; lets one program contain several models "
         "(default: piezo)",
     )
     parser.add_argument("--no-inverse", action="store_true", help="write the prediction only")
-    parser.add_argument("--voltage-min", metavar="V", type=float, default=0.0, help="of the inverse (default: 0)")
-    parser.add_argument("--voltage-max", metavar="V", type=float, default=10.0, help="of the inverse (default: 10)")
+    parser.add_argument("--voltage-min", metavar="V", type=float, default=0.0, help="limit of the inverse (default: 0)")
     parser.add_argument(
-        "--max-slew-rate", metavar="V/S", type=float, default=math.inf, help="of the inverse (default: no limit)"
+        "--voltage-max", metavar="V", type=float, default=10.0, help="limit of the inverse (default: 10)"
+    )
+    parser.add_argument(
+        "--max-slew-rate", metavar="V/S", type=float, default=math.inf, help="limit of the inverse (default: no limit)"
     )
     parser.add_argument(
         "--no-band",
         action="store_true",
-        help="leave out the low-pass of the wanted displacement: less preview, but kinks ask for any voltage",
+        help="leave out the low-pass of the wanted displacement: less preview, but kinks need unlimited voltages",
     )
     add_force(parser)
     parser.set_defaults(run=run)

@@ -14,7 +14,7 @@
 
 """Identify, validate or diagnose many recordings: one row of a Parquet table for each, and a page about them all.
 
-The command can be given again: only recordings whose data, options or code have changed are worked on.
+If the command is repeated, only recordings with changed data, options or code are processed.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "urls",
         metavar="URL",
         nargs="*",
-        help="recordings: files, folders that hold them at any depth, patterns with * and **; local, s3:// or http://; "
-        "none to write only the page",
+        help="recordings: files, folders (searched at any depth), patterns with * and **; local, s3:// or http://; "
+        "without a URL only the page is written",
     )
     parser.add_argument(
-        "-o", "--output", metavar="FOLDER", required=True, help="folder of the results; made, or added to"
+        "-o", "--output", metavar="FOLDER", required=True, help="folder of the results, new or existing"
     )
-    parser.add_argument("--task", choices=TASKS, default=TASKS[0], help=f"what is done with each (default: {TASKS[0]})")
-    parser.add_argument("--model", metavar="FILE", help="model file to validate, or that a diagnosis starts from")
+    parser.add_argument("--task", choices=TASKS, default=TASKS[0], help=f"task (default: {TASKS[0]})")
+    parser.add_argument("--model", metavar="FILE", help="model file to validate, or start of a diagnosis")
     parser.add_argument(
         "--hysteresis",
         metavar="NAME",
@@ -72,8 +72,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--name",
         metavar="REGEX",
         default="",
-        help="where a URL tells stage and date: groups (?P<stage>…) and (?P<date>…); default: the folder "
-        "that holds the recording, and the first date",
+        help="pattern for stage and date in a URL, with groups (?P<stage>…) and (?P<date>…); default: the folder "
+        "of the recording, and the first date",
     )
     parser.add_argument(
         "--workers", metavar="N", type=int, help="processes on this machine (default: one per processor)"

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Show in one line what the identification node of an axis does, until it has finished; needs ROS 2."""
+"""Show the progress of the identification node of an axis in one line, until it has finished; needs ROS 2."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Show what the model node has recalibrated on a stage: every number over time, with its interval."""
+"""Show the recalibrations of a stage by the model node: every parameter over time, with its interval."""
 
 from __future__ import annotations
 

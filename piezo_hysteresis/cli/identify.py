@@ -44,11 +44,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     reading_options.add_arguments(parser)
     parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
     parser.add_argument(
-        "--orders", metavar=("NA", "NB"), nargs=2, type=int, help="orders of the ARX (default: 8 8, as published)"
+        "--orders", metavar=("NA", "NB"), nargs=2, type=int, help="orders of the ARX model (default: 8 8, as published)"
     )
-    parser.add_argument(
-        "--choose-orders", action="store_true", help="choose the lowest orders that predict as well as any"
-    )
+    parser.add_argument("--choose-orders", action="store_true", help="choose the lowest orders with a good prediction")
     parser.add_argument(
         "--taps", metavar="N", type=int, help="several axes: length of every impulse response (default: 250)"
     )
@@ -76,7 +74,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--held-out",
         metavar="PHASE",
         action="append",
-        help=f"phase that is not fitted and judges the model (default: {', '.join(HELD_OUT)})",
+        help=f"phase that is not fitted; the model is tested on it (default: {', '.join(HELD_OUT)})",
     )
     add_results(parser, json="write the result as JSON")
     parser.set_defaults(run=run)

@@ -34,8 +34,8 @@ COMMANDS = {
     "emulate": "emulate a controller behind a TCP port",
     "calibrate": "measure the delay of a card without a stage",
     "identify": "identify a model from an experiment",
-    "recalibrate": "fit gain, offset, loop height and lag of an old model to new records",
-    "history": "show what was recalibrated on a stage, over time",
+    "recalibrate": "fit gain, offset, loop height and lag of an existing model to new records",
+    "history": "show the recalibrations of a stage over time",
     "validate": "compare a model with an experiment in free-run simulation",
     "diagnose": "find where a model is wrong and which effect is missing",
     "compensate": "compute the drive voltage for a wanted displacement",
@@ -44,7 +44,7 @@ COMMANDS = {
     "report": "write one page about an experiment and its models",
     "import": "convert a recording of other software into an experiment",
     "fleet": "identify, validate or diagnose many recordings, one row of a table for each",
-    "follow": "show in one line what a node does, until it has finished; needs ROS 2",
+    "follow": "show the progress of the identification node in one line; needs ROS 2",
     "effects": "list the catalogue of physical effects",
 }
 """Subcommands with a short description; the file of a subcommand is loaded only when it is called."""

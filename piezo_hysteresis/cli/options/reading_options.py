@@ -75,7 +75,7 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
         help="drive voltage at which the stage rested before every phase [V]",
     )
     group.add_argument(
-        "--rows", metavar="FROM:TO", help="range of rows to read, as a Python slice; rows before it carry the state"
+        "--rows", metavar="FROM:TO", help="range of rows to read, as a Python slice; rows before it determine the state"
     )
     group.add_argument(
         "--phase",
@@ -95,8 +95,8 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
         "--average",
         metavar="N",
         type=int,
-        help="average N samples into one while reading; default: none, or as few as a recording of more than 16.8 "
-        "million samples takes; 1 keeps every one, up to 67 million",
+        help="average N samples into one while reading; default: no averaging up to 16.8 million samples, then the "
+        "smallest N that is enough; 1 keeps all samples, up to 67 million",
     )
     group.add_argument(
         "--decimate",

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The page about many recordings: parameters over time, outlying stages, where the model class fails."""
+"""The page about many recordings: parameters over time, outlying stages, poorly described recordings."""
