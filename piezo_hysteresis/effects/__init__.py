@@ -47,6 +47,7 @@ from .hysteresis.operator import HysteresisOperator, Loop
 from .hysteresis.published_bouc_wen import PublishedBoucWen
 from .hysteresis.rate_dependent_hysteresis import RateDependentHysteresis
 from .invertibility import Invertibility
+from .material import LAWS_OF_CREEP
 from .material.creep import Creep
 from .material.creep_exponential import CreepExponential
 from .material.creep_fractional import CreepFractional
@@ -75,10 +76,7 @@ CHAIN: tuple[type[Effect], ...] = (
     HysteresisMemory,
     LevelDependentMemory,
     EvenInputPolynomial,
-    Creep,
-    CreepExponential,
-    CreepFractional,
-    CreepTwoRates,
+    *LAWS_OF_CREEP,
     ExtraDelay,
     Arx,
     Softening,

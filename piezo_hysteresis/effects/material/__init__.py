@@ -12,4 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Effects of the material: laws of creep."""
+"""Effects of the material: laws of creep. Every file of this folder is in the catalogue, without being listed."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+from ..effect import Effect
+
+
+def _laws() -> tuple[type[Effect], ...]:
+    modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__)]
+    classes = [(module, value) for module in modules for value in vars(module).values() if isinstance(value, type)]
+    return tuple(c for module, c in classes if issubclass(c, Effect) and c.__module__ == module.__name__)
+
+
+LAWS_OF_CREEP: tuple[type[Effect], ...] = _laws()
+"""Every law, in the order of the names of the files; they act at the same place of the chain."""
