@@ -25,6 +25,7 @@ from piezo_hysteresis.effects import CreepTwoRates, ExtraResonance, HysteresisMe
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.structure.left_out import score_left_out
+from piezo_hysteresis.identification.structure.piece_fit import best_step, fit_pieces
 from piezo_hysteresis.identification.structure.pieces import Kind, pieces_of
 from piezo_hysteresis.record import Experiment
 
@@ -66,6 +67,18 @@ def test_the_effects_of_the_stage_are_in_the_model(identified):
     mode = identified.model[ExtraResonance.name]
     assert mode["f0"] == pytest.approx(STAGE.mode, rel=0.01)
     assert mode["zeta"] == pytest.approx(STAGE.zeta, abs=0.01)
+
+
+@pytest.mark.parametrize("damping", [1e2, 1e5, 1e8])
+def test_a_damped_step_goes_downhill_however_far_the_zero_of_the_sensor_is(identified, damping):
+    far = [replace(r, displacement=r.displacement + 1e-3) for r in played(STAGE, (1.0, 50.0))]
+    pieces, sizes = pieces_of(far, (0, 1)), [STAGE.noise * STAGE.stroke] * 2
+    model = identified.model.without("offset").with_values({"creep_two_rates.gamma_slow": 0.03})
+    names = ("bouc_wen.p1", "creep_two_rates.gamma_slow", "extra_resonance.zeta")
+    start = fit_pieces(model, pieces, sizes, names, max_iterations=1)
+    step, own = best_step(start, start.total, damping), len(names)
+    downhill = start.total[:own, -1] - start.total[:own, own:-1] @ start.slow
+    assert np.all(np.sign(step[:own]) == np.sign(downhill))
 
 
 def test_one_rate_predicts_others_and_larger_amplitudes():

@@ -198,6 +198,8 @@ def _step(now: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float],
         moved = {n: values[n] + d for n, d in zip(names, step.tolist(), strict=False)}
         rows = {n: now.model.row(n) for n in names}
         model = now.model.with_values({n: min(max(v, rows[n].lower), rows[n].upper) for n, v in moved.items()})
+        if not _cost(model, pieces, floors, names) < now.cost:  # without slopes, which take most of the time
+            return None
         matrices, weights = linearised(model, pieces, floors, names)
     except (DivergenceError, ParameterError):
         return None
@@ -205,12 +207,21 @@ def _step(now: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float],
     return moved_there if moved_there.cost < now.cost else None
 
 
+def _cost(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float], names: Sequence[str]) -> float:
+    """Cost as in `PieceFit`, by a free run without slopes."""
+    matrices, weights = linearised(model, pieces, floors, ())
+    own = at_its_cost(model, (), matrices, weights)
+    return own.cost + float(prior_of(model, names, matrices.shape[1] - 1)[-1, -1])
+
+
 def best_step(now: PieceFit, total: Array, damping: float = 0.0) -> Array:
     """Least-squares change of parameters and zeros for `total`, a sum of matrices of pieces."""
     directions = free_directions(now)
     hessian = directions.T @ total[:-1, :-1] @ directions
     diagonal = np.maximum(np.diag(hessian), 1e-30)
-    hessian = hessian + np.diag((damping + STIFF) * diagonal)
+    # zeros and waves are linear and start at 0: held there by damping, they would turn the step of all other numbers
+    damped = np.any(directions[: len(now.names)] != 0.0, axis=0)
+    hessian = hessian + np.diag((damping * damped + STIFF) * diagonal)
     low, high = now.box()
     single = (directions != 0.0).sum(axis=0) == 1
     rows = directions.argmax(axis=0)
