@@ -75,8 +75,21 @@ def run(args: argparse.Namespace) -> int:
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
     assert comparison.now is not None
-    console().print(f"Verdict: {error_sentence(comparison.now.percent)}{_doubts(experiment)}", style="bold")
+    verdict = f"{error_sentence(comparison.now.percent)}{_left(tests)}{_doubts(experiment)}"
+    console().print(f"Verdict: {verdict}", style="bold")
     return 0
+
+
+def _left(tests: list[dict[str, Any]]) -> str:
+    """What the residual tests say about the model."""
+    decided = [t for t in tests if t["decides"]]
+    dependent = sum(not t["independent_of_drive"] for t in decided)
+    if not dependent:
+        return ""
+    return (
+        f" A part of the residual depends on the drive in {dependent} of {len(decided)} phases, so that the model can "
+        "be improved; see piezo diagnose."
+    )
 
 
 def _doubts(experiment: Experiment) -> str:

@@ -127,6 +127,8 @@ def _headline(answer: Mapping[str, Any]) -> str:
         )
     if answer["verdict"] == "nothing_missing":
         return "Nothing is missing beyond the noise"
+    if str(answer.get("reason", "")).startswith("No effect is named: the time limit"):
+        return "The time limit ended the search before a verdict"
     if str(answer.get("reason", "")).startswith(("No verdict", "No name", "No effect is named")):
         return "The data do not allow a verdict"
     return "Something is missing, but these data do not determine what it is"

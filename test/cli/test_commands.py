@@ -75,6 +75,8 @@ def test_validate_reports_the_one_error_measure(piezo, identified, folder, tmp_p
         assert f"{row.percent:.3f}" in done.out
         assert f"{1e9 * row.rms:.1f}" in done.out
     assert "cross-correlation" in done.out
+    dependent = sum(t["decides"] and not t["independent_of_drive"] for t in answer["residual_tests"])
+    assert (f"depends on the drive in {dependent} of" in done.out) == (dependent > 0)
 
 
 def test_validate_draws_the_printed_results(piezo, identified, folder, tmp_path):

@@ -143,6 +143,10 @@ def test_a_place_that_cannot_be_written_is_reported(drawn, saved):
     [
         ({"verdict": "nothing_missing", "effects": []}, "Nothing is missing beyond the noise"),
         ({"verdict": "unknown", "effects": []}, "Something is missing, but these data do not determine what it is"),
+        (
+            {"verdict": "unknown", "effects": [], "reason": "No effect is named: the time limit ended the search."},
+            "The time limit ended the search before a verdict",
+        ),
     ],
 )
 def test_each_verdict_has_its_headline(comparison, answer, change, headline):
