@@ -52,6 +52,17 @@ def test_a_measured_drive_keeps_its_bandwidth(random, noise):
     assert content(measured, 2e-5).bandwidth == pytest.approx(content(clean, 2e-5).bandwidth, abs=2.0)
 
 
+@pytest.mark.parametrize("cycles", [1, 2, 5])
+@pytest.mark.parametrize("triangle", [False, True], ids=["sines", "triangles"])
+def test_growing_waves_of_three_rates_in_one_record_are_not_broadband(cycles, triangle):
+    period = 1e-4
+    parts = (growing_sine(f, period, cycles=cycles, triangle=triangle, hold=0.0) for f in (1.0, 10.0, 100.0))
+    voltage = np.concatenate((np.full(4000, 5.0), *parts))
+    found = content(voltage, period, initial_voltage=0.0)
+    assert found.lines > 48 and found.bandwidth > 30.0
+    assert not found.is_broadband
+
+
 def test_noise_chirps_and_many_steps_are_broadband(random):
     time = 1e-4 * np.arange(20_000)
     chirp = np.sin(2 * np.pi * 1.0 * np.expm1(np.log(500.0) / 2.0 * time) / np.log(500.0) * 2.0)

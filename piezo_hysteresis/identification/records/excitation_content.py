@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Record, Samples
+from .steady_waves import is_row_of_waves
 
 SLOW = 30.0
 """Frequency below which a drive shows the dynamics of a stage only as a lag [Hz]."""
@@ -58,6 +59,8 @@ class ExcitationContent:
         slow drive has little of the power of dv, but all of the power of d²v.
     noise : float
         Standard deviation of the sensor noise [m].
+    waves : bool
+        Whether the drive consists of sines or triangles of a few rates, one after another.
     """
 
     span: float
@@ -66,11 +69,12 @@ class ExcitationContent:
     lines: int
     moments: float
     noise: float
+    waves: bool = False
 
     @property
     def is_broadband(self) -> bool:
         """True if the drive determines linear dynamics."""
-        return self.bandwidth > SLOW and self.lines >= MANY_LINES and self.moments >= MANY_MOMENTS
+        return self.bandwidth > SLOW and self.lines >= MANY_LINES and self.moments >= MANY_MOMENTS and not self.waves
 
     @property
     def is_slow(self) -> bool:
@@ -93,7 +97,8 @@ def excitation_content(record: Record) -> ExcitationContent:
     slowest = max(float(frequency[np.searchsorted(grown, (1.0 - MARKED) * total)]), 0.5 / record.duration)
     lines = int(np.searchsorted(np.cumsum(np.sort(power)[::-1]), MARKED * total)) + 1
     moments = min(_spread(speed), _spread(np.diff(speed)))
-    return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record))
+    waves = is_row_of_waves(record.voltage, record.sample_period, bandwidth)
+    return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record), waves)
 
 
 def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:

@@ -21,11 +21,10 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...blocks.kernel import kernel
 from ...record import Record, Samples
 from ..records.leading_step import step_length
+from ..records.steady_waves import find_turns
 
 SWING = 0.005
 """A turning point counts if the drive goes back by this share of its range; noise does not."""
@@ -163,28 +162,3 @@ def _with_parts(found: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]
         parts += [(begin + (k + 1) * (end - begin) // count, rate, size) for k in range(count)]
         begin = end
     return parts
-
-
-@kernel
-def find_turns(u: Samples, least: float, turns: NDArray[np.int64]) -> int:
-    """Write the indices at which u (n,) turns back by more than `least` to turns (n,); returns their number."""
-    count = 0
-    low, high, at_low, at_high, direction = u[0], u[0], 0, 0, 0
-    for i in range(u.size):
-        if u[i] > high:
-            high, at_high = u[i], i
-        if u[i] < low:
-            low, at_low = u[i], i
-        if direction >= 0 and high - u[i] > least:
-            if direction > 0:
-                turns[count] = at_high
-                count += 1
-            direction, low, at_low = -1, u[i], i
-            high, at_high = u[i], i
-        elif direction <= 0 and u[i] - low > least:
-            if direction < 0:
-                turns[count] = at_low
-                count += 1
-            direction, high, at_high = 1, u[i], i
-            low, at_low = u[i], i
-    return count

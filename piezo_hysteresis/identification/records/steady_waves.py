@@ -1,0 +1,109 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`is_row_of_waves`: whether a drive consists of sines or triangles of a few rates, one after another."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.kernel import kernel
+from ...record import Samples
+
+SWING = 0.005
+"""A turning point counts if the drive goes back by this share of its range."""
+ALIKE = 0.05
+"""Largest relative difference between the durations of two swings of one rate."""
+FEWEST = 3
+"""Smallest number of swings of one rate."""
+MOST = 8
+"""Largest number of rates; a chirp has more."""
+COVERED = 0.7
+"""Smallest share of the swings that belong to one of the rates."""
+SHORTEST = 8
+"""Smallest number of samples in a swing whose duration is known well enough."""
+HARMONICS = 8.0
+"""Largest ratio of bandwidth and rate of a sine or a triangle; a sequence of steps has a larger one."""
+
+
+def is_row_of_waves(voltage: Samples, sample_period: float, bandwidth: float) -> bool:
+    """True for sines or triangles of a few rates one after another, of any amplitudes.
+
+    The frequencies of a short wave are spread, but they determine the response at its rate only.
+
+    Parameters
+    ----------
+    voltage : (n,) ndarray
+        Drive [V].
+    sample_period : float
+        Time between samples [s].
+    bandwidth : float
+        Bandwidth of the drive [Hz].
+
+    Examples
+    --------
+    >>> t = 1e-3 * np.arange(2000)
+    >>> waves = np.concatenate((np.sin(2 * np.pi * 2 * t), np.sin(2 * np.pi * 20 * t)))
+    >>> is_row_of_waves(waves, 1e-3, 21.0), is_row_of_waves(np.sign(waves), 1e-3, 400.0)
+    (True, False)
+    """
+    turns = np.empty(voltage.size, np.int64)
+    count = find_turns(voltage, SWING * float(np.ptp(voltage)), turns)
+    if count <= FEWEST:
+        return False
+    rates, covered, shortest = _rows(np.diff(turns[:count]))
+    slow_enough = 2.0 * shortest * sample_period * bandwidth <= HARMONICS
+    return bool(0 < rates <= MOST and covered >= COVERED * (count - 1) and shortest >= SHORTEST and slow_enough)
+
+
+@kernel
+def _rows(sizes: NDArray[np.int64]) -> tuple[int, int, int]:
+    """Number of rows of swings that take equally long, swings in them, and samples of the shortest such swing."""
+    rates, covered, shortest = 0, 0, 1 << 60
+    first = 0
+    for i in range(1, sizes.size + 1):
+        if i < sizes.size and abs(sizes[i] - sizes[first]) <= ALIKE * sizes[first] + 1.5:
+            continue
+        if i - first >= FEWEST:
+            rates += 1
+            covered += i - first
+            shortest = min(shortest, sizes[first])
+        first = i
+    return rates, covered, shortest
+
+
+@kernel
+def find_turns(u: Samples, least: float, turns: NDArray[np.int64]) -> int:
+    """Write the indices at which u (n,) turns back by more than `least` to turns (n,); returns their number."""
+    count = 0
+    low, high, at_low, at_high, direction = u[0], u[0], 0, 0, 0
+    for i in range(u.size):
+        if u[i] > high:
+            high, at_high = u[i], i
+        if u[i] < low:
+            low, at_low = u[i], i
+        if direction >= 0 and high - u[i] > least:
+            if direction > 0:
+                turns[count] = at_high
+                count += 1
+            direction, low, at_low = -1, u[i], i
+            high, at_high = u[i], i
+        elif direction <= 0 and u[i] - low > least:
+            if direction < 0:
+                turns[count] = at_low
+                count += 1
+            direction, high, at_high = 1, u[i], i
+            low, at_low = u[i], i
+    return count
