@@ -27,7 +27,7 @@ from ...blocks.kernel import kernel
 
 Array = NDArray[np.float64]
 
-WINDOW = 60
+WINDOW = 120
 """Number of newest scores in which a change is searched for."""
 
 CLEARED = 0.5

@@ -25,6 +25,7 @@ from piezo_hysteresis.online.change.baseline import Baseline, drive_class
 from piezo_hysteresis.online.change.detector import ChangeDetector
 from piezo_hysteresis.online.change.false_alarm_threshold import (
     CLEARED,
+    WINDOW,
     correlate,
     count_alarms,
     echo,
@@ -193,6 +194,12 @@ def test_sums_of_correlated_scores_vary_as_an_autoregressive_series_does():
     correlation = phi ** np.abs(np.subtract.outer(np.arange(k), np.arange(k)))
     assert scatter.inflation(k)[-1, 0] == pytest.approx(correlation.sum() / k)
     assert scatter.inflation(k)[0, 0] == 1.0
+
+
+def test_the_window_is_long_enough_for_a_change_as_large_as_a_residual_that_is_correlated_over_two_blocks():
+    memory = np.full((2, 1), np.exp(-0.5))
+    threshold = false_alarm_threshold(np.eye(1), 6000.0, memory)
+    assert WINDOW / inflation(memory, WINDOW)[-1, 0] > threshold
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.65])
