@@ -32,6 +32,9 @@ from .score import GROUPS, ChangeScore
 
 Array = NDArray[np.float64]
 
+FORMAT = 2
+"""Version of the file. In files without it, directions that a block does not excite count as certain."""
+
 FEWEST_SCORES = 60
 """Fewest scores of one class from which its scatter can be estimated."""
 
@@ -90,7 +93,7 @@ class Baseline:
 
     def save(self, path: Path) -> None:
         """Write the baseline as .npz; the file appears only when it is complete."""
-        arrays: dict[str, Any] = {"model": np.array(self.model)}
+        arrays: dict[str, Any] = {"format": np.array(FORMAT), "model": np.array(self.model)}
         for (span, speed), s in self.scatter.items():
             key = f"{span},{speed}"
             arrays |= {
@@ -124,8 +127,10 @@ class Baseline:
         try:
             with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
                 held: dict[DriveClass, dict[str, Array]] = {}
+                if "format" not in file or int(file["format"]) != FORMAT:
+                    raise ValueError("another version wrote it, whose scatter means something else")
                 for name in file.files:
-                    if name == "model":
+                    if name in ("format", "model"):
                         continue
                     span, speed, field = name.split(",")
                     values = np.asarray(file[name], np.float64)

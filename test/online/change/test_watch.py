@@ -182,6 +182,17 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path, content):
         Baseline.load(path)
 
 
+def test_a_baseline_of_an_earlier_version_is_refused(drive, tmp_path):
+    watch, _ = follow(drive, run(MODEL, drive))
+    path = tmp_path / "baseline.npz"
+    watch.baseline.save(path)
+    with np.load(path) as file:
+        earlier = {name: file[name] for name in file.files if name != "format"}
+    np.savez(path, **earlier)
+    with pytest.raises(ModelError, match=r"another version wrote it.*take a new one"):
+        Baseline.load(path)
+
+
 def test_too_short_a_baseline_is_refused():
     with pytest.raises(ModelError, match="expected at least"):
         Baseline.of([])
