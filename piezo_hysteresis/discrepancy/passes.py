@@ -30,7 +30,7 @@ from ..identification.records.conditioning_split import known_from_within
 from ..identification.records.roles import roles_of
 from ..model.model import Model
 from ..record import CONDITIONING, Experiment, Notice
-from .changes.same_stage import same_stage
+from .changes.same_stage import same_stage, unchanged
 from .conclusion import concluded
 from .diagnosis import Diagnosis, Verdict
 from .residual.explicit_step import KIND, explicit_model, without_steps
@@ -163,11 +163,14 @@ def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
 
 def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosis:
     """Ends with the changed parameter if the given model explains the records apart from this change."""
-    if state.model is None:
+    model = state.model
+    if model is None:
         return state
     state.progress("changes of the given model", 0.0)
-    found = same_stage(state.experiment, state.model, state.moving)
-    return found or replace(state, model=without_corrections(state.model))
+    found = same_stage(state.experiment, model, state.moving)
+    if found is None and (same := unchanged(state.experiment, model, state.moving)):
+        state = replace(state, experiment=state.experiment.noting(same))
+    return found or replace(state, model=without_corrections(model))
 
 
 def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:
@@ -263,8 +266,5 @@ def _moves(experiment: Experiment, index: int) -> bool:
 def _where(setup: BaselineSetup, progress: Progress) -> tuple[ResidualShare, ...]:
     progress("location of the residual", 0.35)
     left = residuals(setup.baseline.model, setup.records, setup.training_data.nuisance)
-    return localise(
-        [setup.records[i] for i in setup.usable],
-        [left[i] for i in setup.usable],
-        [setup.least[i] for i in setup.usable],
-    )
+    used, records, least = setup.usable, setup.records, setup.least
+    return localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])

@@ -127,6 +127,8 @@ def _headline(answer: Mapping[str, Any]) -> str:
         )
     if answer["verdict"] == "nothing_missing":
         return "Nothing is missing beyond the noise"
+    if any(finding["kind"] == "unchanged" for finding in answer.get("data_quality", ())):
+        return "Nothing has changed since the model was identified; what it does not contain is not determined"
     if str(answer.get("reason", "")).startswith("No effect is named: the time limit"):
         return "The time limit ended the search before a verdict"
     if str(answer.get("reason", "")).startswith(("No verdict", "No name", "No effect is named")):

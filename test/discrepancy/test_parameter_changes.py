@@ -126,6 +126,14 @@ def test_diagnose_names_a_filter_and_its_model_predicts_better(model, another_da
     assert found.answer()["effects"] == [effect]
 
 
+def test_diagnose_says_that_nothing_has_changed(model, another_day):
+    def said(stage):
+        return [n for n in diagnose(played(stage), model).experiment.notices if n.kind == "unchanged"]
+
+    assert len(said(another_day)) == 1
+    assert not said(replace(another_day, filter_pole=2e-3))
+
+
 def test_one_new_record_recalibrates_a_model(model):
     rng = np.random.default_rng(11)
     later = replace(STAGE.on_another_day(rng), gain=1.008, loop=0.26, zero=3e-6, filter_delay=3e-4)

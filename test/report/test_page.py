@@ -144,6 +144,10 @@ def test_a_place_that_cannot_be_written_is_reported(drawn, saved):
         ({"verdict": "nothing_missing", "effects": []}, "Nothing is missing beyond the noise"),
         ({"verdict": "unknown", "effects": []}, "Something is missing, but these data do not determine what it is"),
         (
+            {"verdict": "unknown", "effects": [], "data_quality": [{"kind": "unchanged"}]},
+            "Nothing has changed since the model was identified; what it does not contain is not determined",
+        ),
+        (
             {"verdict": "unknown", "effects": [], "reason": "No effect is named: the time limit ended the search."},
             "The time limit ended the search before a verdict",
         ),

@@ -106,6 +106,11 @@ def find_change(
     return ParameterChange(best.key, size, interval, rivals, day.cost, best.cost, found[0].search.session(best))
 
 
+def is_unchanged(model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> bool:
+    """Whether gain and loop height as they differ from day to day explain the residual; arguments as `find_change`."""
+    return ChangeSearch(model, records, used, floors).account("none").cost <= ADEQUATE
+
+
 def _filters_of_second_order(search: ChangeSearch) -> list[Account]:
     """The best filter of every damping; slow signals are about equally late behind all of them."""
     (first, zeta), *others = SECOND_ORDER.items()

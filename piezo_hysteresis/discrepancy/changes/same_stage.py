@@ -20,20 +20,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...effects import ExtraResonance, Softening, ThermalDrift
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.fit.normal_equations import Nuisance, residuals
 from ...model.model import Model
 from ...model.provenance import data_hash
-from ...record import Experiment, Record
+from ...record import Experiment, Notice, Record
 from ..diagnosis import Diagnosis, Verdict
 from ..gap import measure_gap
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
 from .change_kinds import LEAVES, ParameterChange
-from .parameter_changes import find_change
+from .parameter_changes import find_change, is_unchanged
 from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_model
+
+Array = NDArray[np.float64]
 
 ERROR, HASH = "free_run_error", "data_hash"
 """Keys of the provenance."""
@@ -57,9 +60,8 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
     if model.provenance.get(HASH) == data_hash(experiment) or not used:
         return None
     least = floors(records, noise_floors(records))
-    known = float(model.provenance.get(ERROR, "0"))
     try:
-        change = find_change(model, records, used, np.maximum(least, known).tolist())
+        change = find_change(model, records, used, _with_known_error(model, least))
         if change is None:
             return None
         changed = changed_model(model, change, records)
@@ -84,6 +86,29 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
         experiment=experiment,
         change=change,
     )
+
+
+def unchanged(experiment: Experiment, model: Model, used: Sequence[int]) -> Notice | None:
+    """The finding that nothing has changed since `model` was identified; None where more has; as `same_stage`."""
+    records = experiment.records
+    known = float(model.provenance.get(ERROR, "0"))
+    if not known or model.provenance.get(HASH) == data_hash(experiment) or not used:
+        return None
+    try:
+        if not is_unchanged(model, records, used, _with_known_error(model, floors(records, noise_floors(records)))):
+            return None
+    except (DivergenceError, ModelError, ParameterError):
+        return None
+    message = (
+        f"nothing has changed since the model was identified: apart from its zero, gain and loop height, which differ "
+        f"from day to day, its error is within the known error of {1e9 * known:.3g} nm; a gap was there before"
+    )
+    return Notice("unchanged", message)
+
+
+def _with_known_error(model: Model, least: Array) -> list[float]:
+    known = float(model.provenance.get(ERROR, "0"))
+    return [max(float(floor), known) for floor in least]
 
 
 def sentence_of(change: ParameterChange) -> str:
