@@ -53,4 +53,7 @@ def test_numbers_of_something_have_a_range_that_ros_shows_and_python_checks(name
 
 @pytest.mark.parametrize(("file", "rows"), [("model.yaml", MODEL), ("identification.yaml", IDENTIFICATION)])
 def test_config_files_hold_the_defaults(file, rows):
-    assert parameters((CONFIG / file).read_text()) == {"/**": {row.name: row.value for row in rows}}
+    text, defaults = (CONFIG / file).read_text(), {row.name: row.value for row in rows}
+    (held,) = parameters(text).values()
+    assert held == {name: defaults[name] for name in held}
+    assert [name for name in defaults if name not in text] == []
