@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from .card import Card, CardError
+from .card import NOT_RUNNING, Card, CardError
 
 _ANALOG_INPUT, _ANALOG_OUTPUT, _VOLTAGE = 10100, 10102, 10322
 """NI-DAQmx values: kinds of channel, and of measurement."""
@@ -137,6 +137,7 @@ class Calls:
             if task.regenerates and not task.is_finite:
                 raise CardError(*_NO_REGENERATION)
             with self._turn:
+                self._require_server()
                 self._card.start(task.rate, task.is_finite)
         return {}
 
@@ -157,6 +158,7 @@ class Calls:
     def WriteAnalogF64(self, request: Any) -> dict[str, Any]:
         values = np.array(request.write_array)
         with self._turn:
+            self._require_server()
             if self._task(request).rate:
                 self._card.write(values)
             else:
@@ -165,6 +167,7 @@ class Calls:
 
     def WriteAnalogScalarF64(self, request: Any) -> dict[str, Any]:
         with self._turn:
+            self._require_server()
             self._card.set(request.value)
         return {}
 
@@ -208,6 +211,11 @@ class Calls:
 
     def GetChanAttributeInt32(self, request: Any) -> dict[str, Any]:
         return {"value_raw": self._task(request).kind if request.attribute_raw == _KIND_OF_CHANNEL else _VOLTAGE}
+
+    def _require_server(self) -> None:
+        """Refuse what a call in progress would leave in the output buffer behind an ended server; CardError."""
+        if self._ended.is_set():
+            raise CardError(NOT_RUNNING, "The server has ended.")
 
     def _task(self, request: Any) -> Task:
         return self._tasks[request.task.name]

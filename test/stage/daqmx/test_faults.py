@@ -14,10 +14,13 @@
 
 """Whatever fails: one clear error, the safe voltage where the link allows, and what is not known is said."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from piezo_hysteresis.emulators.daqmx.card import Card
+from piezo_hysteresis.emulators.daqmx.calls import Calls
+from piezo_hysteresis.emulators.daqmx.card import Card, CardError
 from piezo_hysteresis.emulators.daqmx.faults import FAULTS
 from piezo_hysteresis.emulators.daqmx.server import DaqmxServer
 from piezo_hysteresis.errors import StageError
@@ -115,6 +118,19 @@ def test_a_server_that_went_away_and_came_back_is_found_again(rig, streamed, ide
         voltage, _ = streamed(r.stage, WAVE, *BLOCKS)
         np.testing.assert_allclose(voltage[500:], WAVE[:-500], atol=1e-9)
         r.stage.close()
+
+
+def test_a_write_in_progress_leaves_nothing_behind_an_ended_server(ideal):
+    card = Card(SimulatedStage(ideal()), speed=float("inf"))
+    calls = Calls(card)
+    task = SimpleNamespace(name=calls.CreateTask(None)["task"]["name"])
+    calls.CreateAOVoltageChan(SimpleNamespace(task=task, physical_channel="Dev1/ao0"))
+    calls.CfgSampClkTiming(SimpleNamespace(task=task, rate=1e4, samps_per_chan=10, sample_mode_raw=0))
+    calls.end()
+    with pytest.raises(CardError, match="server has ended"):
+        calls.WriteAnalogF64(SimpleNamespace(task=task, write_array=[1.0] * 10, num_samps_per_chan=10))
+    card.start(1e4, True)
+    assert card.available == 0
 
 
 def test_without_a_monitor_a_saturated_amplifier_cannot_be_seen(rig, streamed, ideal):
