@@ -130,16 +130,23 @@ class Browser:
         )
 
     def click(self, label: str) -> None:
-        """Press the button with a label, as a mouse does."""
+        """Press the button with a label, as a mouse does; again, if the page has moved it away under the mouse."""
         shown = "e.tagName === 'BUTTON' && e.getBoundingClientRect().width > 0 && !e.disabled"
         place = (
             f"(() => {{ const b = {ALL}.filter(e => {shown} && e.textContent.trim() === {json.dumps(label)})[0];"
             " if (!b) return null; b.scrollIntoView({block: 'center'}); const r = b.getBoundingClientRect();"
+            " globalThis.pressed = false;"
+            " b.addEventListener('click', () => { globalThis.pressed = true; }, {once: true, capture: true});"
             " return [r.x + r.width / 2, r.y + r.height / 2]; })()"
         )
-        x, y = self.wait(lambda: self.value(place), f"a button '{label}'")
-        for kind in ("mousePressed", "mouseReleased"):
-            self.do("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+        def pressed() -> bool:
+            x, y = self.wait(lambda: self.value(place), f"a button '{label}'")
+            for kind in ("mousePressed", "mouseReleased"):
+                self.do("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+            return bool(self.value("globalThis.pressed"))
+
+        self.wait(pressed, f"a press of the button '{label}'")
 
     def wait(self, condition: Callable[[], Any], what: str) -> Any:
         """Value of a condition, once it holds."""
