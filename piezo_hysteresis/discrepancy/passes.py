@@ -30,7 +30,7 @@ from ..identification.records.conditioning_split import known_from_within
 from ..identification.records.roles import roles_of
 from ..model.model import Model
 from ..record import CONDITIONING, Experiment, Notice
-from .changes.same_stage import same_stage, unchanged
+from .changes.same_stage import same_stage
 from .conclusion import concluded
 from .diagnosis import Diagnosis, Verdict
 from .residual.explicit_step import KIND, explicit_model, without_steps
@@ -168,8 +168,8 @@ def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosi
         return state
     state.progress("changes of the given model", 0.0)
     found = same_stage(state.experiment, model, state.moving)
-    if found is None and (same := unchanged(state.experiment, model, state.moving)):
-        state = replace(state, experiment=state.experiment.noting(same))
+    if isinstance(found, Notice):
+        state, found = replace(state, experiment=state.experiment.noting(found)), None
     return found or replace(state, model=without_corrections(model))
 
 

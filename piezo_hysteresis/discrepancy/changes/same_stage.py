@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...effects import ExtraResonance, Softening, ThermalDrift
 from ...errors import DivergenceError, ModelError, ParameterError
@@ -36,16 +35,14 @@ from .change_kinds import LEAVES, ParameterChange
 from .parameter_changes import find_change, is_unchanged
 from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_model
 
-Array = NDArray[np.float64]
-
 ERROR, HASH = "free_run_error", "data_hash"
 """Keys of the provenance."""
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 """Units of time."""
 
 
-def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Diagnosis | None:
-    """Name the parameter that has changed since `model` was identified; None if no change explains the records.
+def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Diagnosis | Notice | None:
+    """Name the parameter that has changed since `model` was identified.
 
     Parameters
     ----------
@@ -55,13 +52,27 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
         Model identified before the change, from other data.
     used : sequence of int
         Indices of the records to explain.
+
+    Returns
+    -------
+    Diagnosis, Notice or None
+        The finding that nothing has changed, if the error is the known one; None if no change explains the records.
     """
     records = experiment.records
     if model.provenance.get(HASH) == data_hash(experiment) or not used:
         return None
     least = floors(records, noise_floors(records))
+    known = float(model.provenance.get(ERROR, "0"))
+    limits = np.maximum(least, known).tolist()
     try:
-        change = find_change(model, records, used, _with_known_error(model, least))
+        if known and is_unchanged(model, records, used, limits):
+            return Notice(
+                "unchanged",
+                "nothing has changed since the model was identified: apart from its zero, gain and loop height, which "
+                f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; a gap was there "
+                "before",
+            )
+        change = find_change(model, records, used, limits)
         if change is None:
             return None
         changed = changed_model(model, change, records)
@@ -86,29 +97,6 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
         experiment=experiment,
         change=change,
     )
-
-
-def unchanged(experiment: Experiment, model: Model, used: Sequence[int]) -> Notice | None:
-    """The finding that nothing has changed since `model` was identified; None where more has; as `same_stage`."""
-    records = experiment.records
-    known = float(model.provenance.get(ERROR, "0"))
-    if not known or model.provenance.get(HASH) == data_hash(experiment) or not used:
-        return None
-    try:
-        if not is_unchanged(model, records, used, _with_known_error(model, floors(records, noise_floors(records)))):
-            return None
-    except (DivergenceError, ModelError, ParameterError):
-        return None
-    message = (
-        f"nothing has changed since the model was identified: apart from its zero, gain and loop height, which differ "
-        f"from day to day, its error is within the known error of {1e9 * known:.3g} nm; a gap was there before"
-    )
-    return Notice("unchanged", message)
-
-
-def _with_known_error(model: Model, least: Array) -> list[float]:
-    known = float(model.provenance.get(ERROR, "0"))
-    return [max(float(floor), known) for floor in least]
 
 
 def sentence_of(change: ParameterChange) -> str:
