@@ -182,7 +182,7 @@ static double plain_step(double h, double dv, double a, double beta, double gamm
     const double r_same = is_above ? r_above : r_below, r_flipped = is_above ? r_below : r_above;
     const double end = h + (drive - r_same * h) * decay(r_same, length);
     if (end * h < 0.0) {
-        return drive * decay(r_flipped, fmax(0.0, length - crossing(h, drive, r_same)));
+        return drive * decay(r_flipped, larger(0.0, length - crossing(h, drive, r_same)));
     }
     return end;
 }
@@ -199,7 +199,7 @@ static double advance(double h, double drive, double length, double r_same, doub
 {
     const double end = h + (drive - r_same * h) * decay(r_same, length);
     if (end * h < 0.0) {
-        return drive * decay(r_flipped, fmax(0.0, length - crossing(h, drive, r_same)));
+        return drive * decay(r_flipped, larger(0.0, length - crossing(h, drive, r_same)));
     }
     return end;
 }
@@ -212,11 +212,11 @@ static double general_step(double h, double dv, const double *p, double sample_p
     double drive = s * p[0], length = fabs(dv);
     int steps = 1, i;
     if (k != 0.0) {
-        const double rate = log(fmax(length / (length > JUMP ? jump_period : sample_period), SLOWEST));
+        const double rate = log(larger(length / (length > JUMP ? jump_period : sample_period), SLOWEST));
         drive = drive * (1.0 + k * (fabs(p[7]) < 1e-9 ? rate : expm1(p[7] * rate) / p[7]));
     }
     if (n != 1.0) {
-        steps = (int)fmax(1.0, ceil(length / SUB_STEP));
+        steps = (int)larger(1.0, ceil(length / SUB_STEP));
     }
     length = length / steps;
     for (i = 0; i < steps; i++) {

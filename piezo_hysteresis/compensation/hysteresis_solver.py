@@ -177,7 +177,7 @@ static double without_loop(const hysteresis_before *b, double v)
     double total = 0.0;
     int j;
     for (j = 0; j < b->plays; j++) {
-        const double p = fmax(v - b->radius[j], fmin(v + b->radius[j], b->play[j]));
+        const double p = larger(v - b->radius[j], smaller(v + b->radius[j], b->play[j]));
         total += b->c[j] * (p + b->bend[j] * p * p);
     }
     return FMA(FMA(poly[0], square, poly[1]), v, FMA(poly[3], square, poly[2]) * square) + total;
@@ -204,7 +204,7 @@ static double solve(
     const hysteresis_before *b, double wanted, double now, double orientation, double low, double high)
 {
     const double last = b->v, gap = wanted - now, enough = ROUNDING * (fabs(wanted) + fabs(now));
-    const double s = copysign(1.0, gap) * orientation, edge = s > 0.0 ? fmax(high, last) : fmin(low, last);
+    const double s = copysign(1.0, gap) * orientation, edge = s > 0.0 ? larger(high, last) : smaller(low, last);
     double slope, x, x0 = last, g, g0 = gap, near_ = last, far_ = edge, best = last, best_gap = fabs(gap);
     int k, closed = 0;
     if (fabs(gap) <= enough || edge == last) {
@@ -212,7 +212,7 @@ static double solve(
     }
     slope = slope_at(b, b->h, last, s);
     if (slope * orientation < 0.02 * fabs(b->poly[1])) {
-        slope = orientation * fmax(fabs(b->poly[1]), 1e-3);
+        slope = orientation * larger(fabs(b->poly[1]), 1e-3);
     }
     x = last + gap / slope;
     for (k = 0; k < NEWTON && s * (x - last) > 0.0 && s * (edge - x) >= 0.0; k++) {

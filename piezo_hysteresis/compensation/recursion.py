@@ -164,10 +164,10 @@ static const double SAME = {SAME!r}, TOUCHING = {TOUCHING!r};
 static double before_saturation(double v, double lower, double upper, double corner)
 {
     if (v > upper - corner) {
-        return upper + corner - 2.0 * sqrt(corner * fmax(upper - v, 0.0));
+        return upper + corner - 2.0 * sqrt(corner * larger(upper - v, 0.0));
     }
     if (v < lower + corner) {
-        return lower - corner + 2.0 * sqrt(corner * fmax(v - lower, 0.0));
+        return lower - corner + 2.0 * sqrt(corner * larger(v - lower, 0.0));
     }
     return v;
 }
@@ -183,7 +183,7 @@ s->slewed = s->pole = s->pushed = s->held = x - ramp(x - upper, corner) + ramp(l
 s->h = h0;
 s->v = s->held * per_volt;
 for (j = 0; j < PLAYS; j++) {
-    s->play[j] = s->v - virgin * fmin(fmax(s->v, -radius[j]), radius[j]);
+    s->play[j] = s->v - virgin * smaller(larger(s->v, -radius[j]), radius[j]);
 }
 {
     const hysteresis_before b = { loop, poly, c, bend, radius, s->play, PLAYS, s->h, s->v };
@@ -200,31 +200,31 @@ u = v;
 if (play > 0.0) {
     const double move = v - s->held, same = SAME * (fabs(v) + play), touching = play * (1.0 - TOUCHING);
     const double side = s->pushed - s->held;
-    const double up = side >= touching ? same : fmax(same, resolution);
-    const double down = side <= -touching ? same : fmax(same, resolution);
+    const double up = side >= touching ? same : larger(same, resolution);
+    const double down = side <= -touching ? same : larger(same, resolution);
     u = move > up ? v + play : move < -down ? v - play : s->pushed;
 }
 if (left != 0.0) {
     u = (u - left * s->pole - back * s->slewed) / lead;
 }
-u = fmin(fmax(u, s->slewed - reach), s->slewed + reach);
+u = smaller(larger(u, s->slewed - reach), s->slewed + reach);
 u = before_saturation(u, lower, upper, corner);
-u = fmin(fmax(u, s->voltage - step), s->voltage + step);
-u = fmin(fmax(u, lowest), highest);
+u = smaller(larger(u, s->voltage - step), s->voltage + step);
+u = smaller(larger(u, lowest), highest);
 /* what the stage makes of it: the states follow what the limits have let through */
 s->voltage = u;
 before = s->slewed;
 s->slewed = u - ramp(u - upper, corner) + ramp(lower - u, corner);
-s->slewed = fmin(fmax(s->slewed, before - reach), before + reach);
+s->slewed = smaller(larger(s->slewed, before - reach), before + reach);
 s->pole = left * s->pole + lead * s->slewed + back * before;
 s->pushed = s->pole;
-s->held = fmax(s->pole - play, fmin(s->pole + play, s->held));
+s->held = larger(s->pole - play, smaller(s->pole + play, s->held));
 v = s->held * per_volt;
 w = without_loop(&b, v);
 s->h = loop_end(&b, v);
 s->v = v;
 for (j = 0; j < PLAYS; j++) {
-    s->play[j] = fmax(v - radius[j], fmin(v + radius[j], s->play[j]));
+    s->play[j] = larger(v - radius[j], smaller(v + radius[j], s->play[j]));
 }
 w = s->w = w + s->h;
 """

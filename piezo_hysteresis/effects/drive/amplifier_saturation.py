@@ -82,7 +82,7 @@ static double ramp(double excess, double c)
     if (fabs(excess) < c) {
         return (excess + c) * (excess + c) / (4.0 * c);
     }
-    return fmax(excess, 0.0);
+    return larger(excess, 0.0);
 }
 """
 """C function of the bend into each limit."""

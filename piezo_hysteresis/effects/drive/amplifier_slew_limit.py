@@ -116,7 +116,7 @@ class AmplifierSlewLimitBlock(HeldBlock):
         linearise_limit(x, dx, self.reach, self.sample_period, state, tangent, y, dy)
 
     def c_form(self) -> CForm:
-        step = "s->y = fmin(fmax(x, s->y - reach), s->y + reach);\nreturn s->y;"
+        step = "s->y = smaller(larger(x, s->y - reach), s->y + reach);\nreturn s->y;"
         return CForm(step, "s->y = x;\nreturn x;", {"reach": self.reach}, ("double y",))
 
     def inverse_terms(self) -> InverseTerms:

@@ -111,7 +111,7 @@ class BacklashBlock(HeldBlock):
         linearise_play(x, dx, self.b, state, tangent, y, dy)
 
     def c_form(self) -> CForm:
-        step = "s->y = fmax(x - b, fmin(x + b, s->y));\nreturn s->y;"
+        step = "s->y = larger(x - b, smaller(x + b, s->y));\nreturn s->y;"
         return CForm(step, "s->y = x;\nreturn x;", {"b": self.b}, ("double y",))
 
     def inverse_terms(self) -> InverseTerms:

@@ -101,7 +101,7 @@ REST = """\
 double total = 0.0;
 int j;
 for (j = 0; j < PLAYS; j++) {
-    const double p = s->p[j] = x - virgin * fmin(fmax(x, -radius[j]), radius[j]);
+    const double p = s->p[j] = x - virgin * smaller(larger(x, -radius[j]), radius[j]);
     total += c[j] * VALUE;
 }
 return total;
@@ -111,7 +111,7 @@ STEP = """\
 double total = 0.0;
 int j;
 for (j = 0; j < PLAYS; j++) {
-    const double p = s->p[j] = fmax(x - radius[j], fmin(x + radius[j], s->p[j]));
+    const double p = s->p[j] = larger(x - radius[j], smaller(x + radius[j], s->p[j]));
     total += c[j] * VALUE;
 }
 return total;
