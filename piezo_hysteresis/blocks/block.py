@@ -28,7 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..c_form import CForm
+from ..errors import ModelError
 from ..inverse_terms import InverseStart, InverseTerms, started_together, summed
+from .inverses.inverted_block import InvertedBlock
 
 Array = NDArray[np.float64]
 State = Any
@@ -95,6 +97,16 @@ class Block(ABC):
     def inverse_start(self, x: float, state: State) -> InverseStart:
         """State of that inverse, from the last input of the block and its state after it."""
         return InverseStart()
+
+    def inverted(self, name: str) -> InvertedBlock | None:
+        """Inverse of a block after the creep that has no `sections`; None if the drive does not influence the block.
+
+        Raises
+        ------
+        ModelError
+            If the block has no inverse; the message begins with `name`.
+        """
+        raise ModelError(f"{name}: {type(self).__name__} has no inverse; expected a block that compensation can invert")
 
 
 class MemorylessBlock(Block):

@@ -63,3 +63,6 @@ class ChannelBlock(Block):
     def added_in_c(self, value: str, **numbers: Number) -> CForm:
         """C form from the C expression `value` of f(c)."""
         return CForm(f"return x + {value};", "return x;", numbers, channel=self.channel)
+
+    def inverted(self, name: str) -> None:
+        return None

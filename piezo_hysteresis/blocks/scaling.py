@@ -21,6 +21,7 @@ import numpy as np
 from ..c_form import CForm
 from ..inverse_terms import InverseTerms
 from .block import Array, MemorylessBlock, State
+from .inverses.inverted_block import InvertedBlock
 from .kernel import kernel
 
 
@@ -68,3 +69,19 @@ class ChangeOfUnit(MemorylessBlock):
 
     def inverse_terms(self) -> InverseTerms:
         return InverseTerms({"per_volt": self.factor})
+
+    def inverted(self, name: str) -> InvertedBlock:
+        return InvertedFactor(self.factor)
+
+
+class InvertedFactor(InvertedBlock):
+    """y = factor · x."""
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        return y / self.factor, None
+
+    def c_form(self, ahead: int) -> CForm:
+        return CForm("return x / factor;", numbers={"factor": self.factor})

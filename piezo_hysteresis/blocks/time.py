@@ -22,6 +22,7 @@ import numpy as np
 
 from ..c_form import CForm, Number
 from .block import Array, Block, State
+from .inverses.inverted_block import InvertedBlock
 
 
 class TimeBlock(Block):
@@ -71,3 +72,28 @@ class TimeBlock(Block):
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         t, state = self._times(x.size, state)
         return self.value(x, t), np.vstack((self.slope(x, t) * dx, self.by_parameter(x, t))), state, None
+
+    def inverted(self, name: str) -> InvertedBlock | None:
+        return InvertedAddition(self)
+
+
+def at_time(step: str, block: TimeBlock, ahead: int) -> CForm | str:
+    """C form that calls the forward function of a block as part `forward`, `ahead` samples later."""
+    forward = block.c_form()
+    if isinstance(forward, str):
+        return forward
+    rest = "ME_forward_rest(&s->forward, x);\ns->forward.count = ahead;\nreturn x;"
+    return CForm(step, rest, {"ahead": float(ahead)}, parts={"forward": forward})
+
+
+class InvertedAddition(InvertedBlock):
+    """y = x + d(t)."""
+
+    def __init__(self, block: TimeBlock) -> None:
+        self.block = block
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        return y - self.block.value(np.zeros_like(y), time), None
+
+    def c_form(self, ahead: int) -> CForm | str:
+        return at_time("return x - ME_forward_step(&s->forward, 0.0);", self.block, ahead)

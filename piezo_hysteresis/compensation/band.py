@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from ..blocks.arx import arx_row, difference_equation, padded
 from ..blocks.block import State
+from ..blocks.inverses.inverted_block import InvertedBlock
 from ..c_form import CForm
 from ..errors import ModelError
-from .inverted_block import InvertedBlock
 
 Array = NDArray[np.float64]
 

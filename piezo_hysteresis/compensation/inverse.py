@@ -23,23 +23,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..blocks.block import Block, State
-from ..blocks.channel_addition import ChannelBlock
-from ..blocks.scaling import ChangeOfUnit
-from ..blocks.softening.mode_path import WholePath
-from ..blocks.softening.softened_arx import SoftenedArxBlock
-from ..blocks.time import TimeBlock
+from ..blocks.inverses.inverted_block import InvertedBlock
+from ..blocks.inverses.linear_inverse import InvertedLinear
 from ..c_form import CForm
 from ..effects import Invertibility
-from ..effects.environment.mains_hum import MainsHumBlock
-from ..effects.sensor.gain_drift import GainDriftBlock
-from ..effects.sensor.offset import OffsetBlock
-from ..effects.sensor.sensor_nonlinearity import SensorNonlinearityBlock
 from ..errors import ModelError
 from ..inverse_terms import InverseTerms
 from ..model.chain import Chain, ChainState
 from ..model.model import Model
 from ..model.samples import samples
-from . import inverted_block as t
 from .band import Band
 from .limits import Limits
 from .nonlinear_part import NonlinearPart, RecursionState
@@ -129,8 +121,8 @@ class Inverse:
         self._nonlinear_end = len(terms)
         self._nonlinear = NonlinearPart(terms, self.limits, self.sample_period)
         after = list(zip(labels, blocks, strict=True))[self._nonlinear_end :]
-        own = [(self._nonlinear_end + k, _stage(b, label)) for k, (label, b) in enumerate(after)]
-        inverted: list[tuple[int | None, t.InvertedBlock]] = [(k, stage) for k, stage in own[::-1] if stage is not None]
+        own = [(self._nonlinear_end + k, _inverted(b, label)) for k, (label, b) in enumerate(after)]
+        inverted: list[tuple[int | None, InvertedBlock]] = [(k, stage) for k, stage in own[::-1] if stage is not None]
         if band is not None:
             inverted.insert(0, (None, band.stage(self.sample_period)))
         self._stages = inverted
@@ -223,39 +215,16 @@ def _terms_of_nonlinear_part(blocks: Sequence[Block], labels: Sequence[str]) -> 
     for k, block in enumerate(blocks):
         own = block.inverse_terms()
         if own is None and k < scale:
-            raise _without_inverse(block, labels[k])
+            raise ModelError(
+                f"{labels[k]}: {type(block).__name__} has no inverse; expected `inverse_terms` of the drive"
+            )
         if own is None or (k > scale and own.drive):
             break
         terms.append(own)
     return terms
 
 
-def _stage(block: Block, label: str) -> t.InvertedBlock | None:
-    """The inverse of a block; None if the drive voltage does not influence it.
-
-    Raises
-    ------
-    ModelError
-        If no inverse of such a block is known.
-    """
-    if isinstance(block, ChannelBlock | MainsHumBlock):
-        return None
-    if block.sections():
-        return t.InvertedLinear(block, block.sections(), label)
-    if isinstance(block, SoftenedArxBlock) and isinstance(block.path, WholePath):
-        return t.InvertedSoftening(block, label)
-    if isinstance(block, ChangeOfUnit):
-        return t.InvertedFactor(block.factor)
-    if isinstance(block, SensorNonlinearityBlock):
-        return t.InvertedCubic(block)
-    if isinstance(block, GainDriftBlock):
-        return t.InvertedGainDrift(block)
-    if isinstance(block, TimeBlock):
-        return t.InvertedAddition(block)
-    if isinstance(block, OffsetBlock):
-        return t.InvertedOffset(block)
-    raise _without_inverse(block, label)
-
-
-def _without_inverse(block: Block, label: str) -> ModelError:
-    return ModelError(f"{label}: {type(block).__name__} has no inverse; expected a block that compensation can invert")
+def _inverted(block: Block, label: str) -> InvertedBlock | None:
+    """The inverse that a block declares, by its sections or in `Block.inverted`."""
+    sections = block.sections()
+    return InvertedLinear(block, sections, label) if sections else block.inverted(label)

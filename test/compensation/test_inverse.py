@@ -21,9 +21,9 @@ import itertools
 import numpy as np
 import pytest
 
+from piezo_hysteresis.blocks.inverses.factors import factors, preview_taps, zero_phase_taps
+from piezo_hysteresis.blocks.inverses.linear_inverse import LinearInverse
 from piezo_hysteresis.compensation import Band, Inverse, Limits, plan
-from piezo_hysteresis.compensation.factors import factors, preview_taps, zero_phase_taps
-from piezo_hysteresis.compensation.linear_inverse import LinearInverse
 from piezo_hysteresis.compensation.plan import smooth_way
 from piezo_hysteresis.effects import AmplifierBandwidth, Arx, Backlash, BoucWen, Creep, ExtraResonance, HysteresisMemory
 from piezo_hysteresis.errors import ModelError, StageError

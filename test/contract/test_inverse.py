@@ -22,12 +22,16 @@ import itertools
 import numpy as np
 import pytest
 
+from piezo_hysteresis.blocks.block import Block, MemorylessBlock
+from piezo_hysteresis.blocks.inverses.inverted_block import InvertedBlock
 from piezo_hysteresis.compensation import Inverse
 from piezo_hysteresis.effects import (
     CHAIN,
     Arx,
     BoucWen,
+    ChainPosition,
     Creep,
+    Discretisation,
     Effect,
     HysteresisMemory,
     Invertibility,
@@ -37,6 +41,7 @@ from piezo_hysteresis.effects import (
 )
 from piezo_hysteresis.errors import DivergenceError, ModelError, ParameterError
 from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.parameter import Parameter
 
 PERIOD = 2e-5
 N = 1500
@@ -189,6 +194,61 @@ def test_every_cutting_gives_the_same_bits(kind: type[Effect]) -> None:
             u, state = inverse.run(y[a:b], state)
             parts.append(u)
         np.testing.assert_array_equal(np.concatenate(parts), whole)
+
+
+class OwnSensor(Effect):
+    """A sensor outside the package."""
+
+    name = "own_sensor"
+    invertibility = Invertibility.EXACT
+    family = "static"
+    place = ChainPosition.SENSOR
+    equation = "y = sinh(k x)/k"
+    signature = "harmonics"
+    source = "none"
+    parameters = (Parameter("k", "k", "1", 0.3, 0.1, 1.0, "bend", "none"),)
+
+    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
+        return OwnSensorBlock(self["k"])
+
+
+class OwnSensorBlock(MemorylessBlock):
+    """sinh(k x)/k."""
+
+    names = ("own_sensor.k",)
+
+    def __init__(self, k: float) -> None:
+        self.k = k
+
+    def value(self, x: np.ndarray) -> np.ndarray:
+        return np.sinh(self.k * x) / self.k
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        return np.cosh(self.k * x)
+
+    def by_parameter(self, x: np.ndarray) -> np.ndarray:
+        return (x * np.cosh(self.k * x) - self.value(x))[np.newaxis, :] / self.k
+
+    def inverted(self, name: str) -> InvertedBlock:
+        return InvertedOwnSensor(self.k)
+
+
+class InvertedOwnSensor(InvertedBlock):
+    """arsinh(k y)/k."""
+
+    def __init__(self, k: float) -> None:
+        self.k = k
+
+    def run(self, y: np.ndarray, state: object, time: np.ndarray) -> tuple[np.ndarray, object]:
+        return np.arcsinh(self.k * y) / self.k, state
+
+
+def test_an_effect_outside_the_package_brings_its_inverse(monkeypatch) -> None:
+    model = model_with(OwnSensor(k=0.5))
+    assert mismatch(model, Inverse(model)) < 1e-12
+    monkeypatch.delattr(OwnSensorBlock, "inverted")
+    with pytest.raises(ModelError, match="own_sensor: OwnSensorBlock has no inverse"):
+        Inverse(model)
 
 
 def test_several_together_are_exact() -> None:

@@ -28,37 +28,13 @@ from ...c_form import CForm
 from ..arx import ArxBlock
 from ..block import Array, Block, MemorylessBlock, SeriesBlock, State
 from ..group_delay import GroupDelayBlock
+from ..inverses.inverted_block import InvertedBlock
+from ..inverses.linear_inverse import LinearInverse
 from ..kernel import kernel
-from .mode_path import Path
+from .inverted_softening import InvertedSoftening
+from .mode_path import Path, WholePath
 from .softened_arx_c import FORCE, REST, SETTLE, STEP
-
-
-@kernel
-def force(x, k2, k3):
-    """N(x)."""
-    return (k2 * abs(x) + k3 * x * x) * x
-
-
-@kernel
-def force_slope(x, k2, k3):
-    """∂N/∂x."""
-    return 2.0 * k2 * abs(x) + 3.0 * k3 * x * x
-
-
-@kernel
-def settle(w, k2, k3, x):
-    """Static deflections x (n,) with x + N(x) = w; NaN if the stiffness becomes zero before."""
-    for i in range(w.size):
-        x[i] = w[i]
-        for _ in range(50):
-            stiffness = 1.0 + force_slope(x[i], k2, k3)
-            if stiffness <= 0.0:
-                x[i] = np.nan
-                break
-            step = (w[i] - x[i] - force(x[i], k2, k3)) / stiffness
-            x[i] += step
-            if abs(step) <= 1e-15 * abs(x[i]):
-                break
+from .stiffness import StaticSoftening, force, force_slope
 
 
 @kernel
@@ -117,27 +93,6 @@ def add_mixed(weights, rows, out):
                 out[j, i] += weights[k, j] * rows[k, i]
 
 
-class StaticSoftening(MemorylessBlock):
-    """Static deflection, for records slower than the model."""
-
-    def __init__(self, name: str, k2: float, k3: float) -> None:
-        self.names = (f"{name}.k2", f"{name}.k3")
-        self.k2, self.k3 = k2, k3
-
-    def value(self, x: Array) -> Array:
-        settled = np.empty(x.shape)
-        settle(x, self.k2, self.k3, settled)
-        return settled
-
-    def slope(self, x: Array) -> Array:
-        at = self.value(x)
-        return np.asarray(1.0 / (1.0 + 2.0 * self.k2 * np.abs(at) + 3.0 * self.k3 * at * at))
-
-    def by_parameter(self, x: Array) -> Array:
-        at = self.value(x)
-        return -self.slope(x) * np.vstack((np.abs(at) * at, at * at * at))
-
-
 class SoftenedArxBlock(Block):
     """State: state of the ARX; w and x at rest; states of mode and ξ; state of the path."""
 
@@ -171,6 +126,12 @@ class SoftenedArxBlock(Block):
         state = ("double w0, x0", "double mode[2]", "double xi[2]")
         parts = {"linear": self.arx.c_form(), "path": self.path.filter.c_form()}
         return CForm(STEP, REST, numbers, state, (FORCE, SETTLE), parts)
+
+    def inverted(self, name: str) -> InvertedBlock | None:
+        if not isinstance(self.path, WholePath):
+            return super().inverted(name)
+        path = LinearInverse(self.path.filter.sections()[0], self.arx.gain, name)
+        return InvertedSoftening(self.settled, self.loop, path)
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
         slope, own = self.settled.static_slopes(x0)

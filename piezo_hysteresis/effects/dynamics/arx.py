@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from ...blocks.arx import ArxBlock, dc_gain_slopes
 from ...blocks.block import Array, Block
 from ...blocks.group_delay import GroupDelayBlock
-from ...blocks.softening.softened_arx import SlowSoftenedBlock, SoftenedArxBlock, StaticSoftening
+from ...blocks.softening.softened_arx import SlowSoftenedBlock, SoftenedArxBlock
+from ...blocks.softening.stiffness import StaticSoftening
 from ...errors import ModelError, ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect

@@ -149,3 +149,6 @@ class MainsHumBlock(TimeBlock):
             return CForm("return x;")
         rate = 2.0 * np.pi * self.frequency
         return self.value_in_c(SUM, HARMONICS=self.cosine.size, rate=rate, c_k=self.cosine, s_k=self.sine)
+
+    def inverted(self, name: str) -> None:
+        return None

@@ -20,8 +20,9 @@ from typing import Self
 
 import numpy as np
 
-from ...blocks.block import Array, Block
-from ...blocks.time import TimeBlock
+from ...blocks.block import Array, Block, State
+from ...blocks.inverses.inverted_block import InvertedBlock
+from ...blocks.time import TimeBlock, at_time
 from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
@@ -89,3 +90,19 @@ class GainDriftBlock(TimeBlock):
 
     def c_form(self) -> CForm:
         return self.value_in_c("return x * (1.0 - g * expm1(-t / tau));", g=self.change, tau=self.tau)
+
+    def inverted(self, name: str) -> InvertedBlock:
+        return InvertedGainDrift(self)
+
+
+class InvertedGainDrift(InvertedBlock):
+    """y = x · g(t)."""
+
+    def __init__(self, block: GainDriftBlock) -> None:
+        self.block = block
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        return y / self.block.slope(y, time), None
+
+    def c_form(self, ahead: int) -> CForm | str:
+        return at_time("return x / ME_forward_step(&s->forward, 1.0);", self.block, ahead)

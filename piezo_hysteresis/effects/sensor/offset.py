@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...blocks.block import Array, Block, State
+from ...blocks.inverses.inverted_block import InvertedBlock
 from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
@@ -101,3 +102,24 @@ class OffsetBlock(Block):
         step = "return x + (y0 + settling * s->x_rest);"
         rest = "s->x_rest = x;\nreturn x + (y0 + settling * x);"
         return CForm(step, rest, {"y0": self.y0, "settling": self.settling}, ("double x_rest",))
+
+    def inverted(self, name: str) -> InvertedBlock:
+        return InvertedOffset(self)
+
+
+class InvertedOffset(InvertedBlock):
+    """y = x + y0 + r x_rest."""
+
+    def __init__(self, block: OffsetBlock) -> None:
+        self.block = block
+
+    def start(self, x0: float, state: State) -> State:
+        return state
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        return y - (self.block.y0 + self.block.settling * state), state
+
+    def c_form(self, ahead: int) -> CForm:
+        numbers = {"y0": self.block.y0, "settling": self.block.settling}
+        step, rest = "return x - (y0 + settling * s->x_rest);", "s->x_rest = x;\nreturn x;"
+        return CForm(step, rest, numbers, ("double x_rest",))

@@ -18,7 +18,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...blocks.block import Array, Block, MemorylessBlock
+from ...blocks.block import Array, Block, MemorylessBlock, State
+from ...blocks.inverses.inverted_block import InvertedBlock
+from ...blocks.kernel import kernel
 from ...c_form import CForm
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
@@ -79,3 +81,64 @@ class SensorNonlinearityBlock(MemorylessBlock):
 
     def c_form(self) -> CForm:
         return CForm("return x + (s2 + s3 * x) * x * x;", numbers={"s2": self.s2, "s3": self.s3})
+
+    def inverted(self, name: str) -> InvertedBlock:
+        return InvertedCubic(self)
+
+
+@kernel
+def cubic_root(y, s2, s3, x):
+    """x (n,) with x + s2 x² + s3 x³ = y (n,), on the branch through zero; its extremum if there is no solution."""
+    for i in range(y.size):
+        root = y[i]
+        for _ in range(60):
+            slope = 1.0 + (2.0 * s2 + 3.0 * s3 * root) * root
+            if slope < 1e-3:
+                root *= 0.9
+                continue
+            change = (y[i] - root - (s2 + s3 * root) * root * root) / slope
+            root += change
+            if abs(change) <= 2e-16 * abs(root):
+                break
+        x[i] = root
+
+
+CUBIC_ROOT = """\
+/* x with x + s2 x^2 + s3 x^3 = y, the one joined to zero; else the turning point. */
+static double cubic_root(double y, double s2, double s3)
+{
+    double root = y;
+    int k;
+    for (k = 0; k < 60; k++) {
+        const double slope = 1.0 + (2.0 * s2 + 3.0 * s3 * root) * root;
+        double change;
+        if (slope < 1e-3) {
+            root *= 0.9;
+            continue;
+        }
+        change = (y - root - (s2 + s3 * root) * root * root) / slope;
+        root += change;
+        if (fabs(change) <= 2e-16 * fabs(root)) {
+            break;
+        }
+    }
+    return root;
+}
+"""
+"""C function of `cubic_root`."""
+
+
+class InvertedCubic(InvertedBlock):
+    """y = x + s2 x² + s3 x³."""
+
+    def __init__(self, block: SensorNonlinearityBlock) -> None:
+        self.block = block
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        x = np.empty_like(y)
+        cubic_root(y, self.block.s2, self.block.s3, x)
+        return x, None
+
+    def c_form(self, ahead: int) -> CForm:
+        numbers = {"s2": self.block.s2, "s3": self.block.s3}
+        return CForm("return cubic_root(x, s2, s3);", "", numbers, (), (CUBIC_ROOT,))

@@ -12,18 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`LinearInverse`: inverse of one section of linear dynamics, as an FIR filter with preview and a recursion."""
+"""Inverse of linear dynamics: of one section, as an FIR filter with preview and a recursion, and of a whole block."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.arx import arx_row, difference_equation, padded
-from ..blocks.block import Section
-from ..c_form import CForm
-from ..errors import ModelError
+from ...c_form import CForm
+from ...errors import ModelError
+from ..arx import arx_row, difference_equation, padded
+from ..block import Block, Section, State
 from .factors import factors, preview_taps, zero_phase_taps
+from .inverted_block import InvertedBlock
 
 Array = NDArray[np.float64]
 
@@ -104,3 +107,37 @@ class LinearInverse:
         x = np.empty_like(y)
         arx_row(y, self.gain * x0, x0, self._padded, 0, self._recursion, z, x)
         return x, (x0, z)
+
+
+class InvertedLinear(InvertedBlock):
+    """Inverse of sections of linear dynamics in series."""
+
+    def __init__(self, block: Block, sections: Iterable[Section], name: str) -> None:
+        slope, _ = block.static_slopes(0.0)
+        own = list(sections)
+        gains = [slope] if len(own) == 1 else [float(b.sum() / a.sum()) for b, a in own]
+        self.inverses = [LinearInverse(s, g, name) for s, g in zip(own, gains, strict=True)][::-1]
+        self.preview = sum(i.preview for i in self.inverses)
+        self.is_exact = all(i.is_exact for i in self.inverses)
+        self.noise_gain = float(np.prod([i.noise_gain for i in self.inverses]))
+
+    def start(self, x0: float, state: State) -> State:
+        states = []
+        for inverse in self.inverses[::-1]:
+            states.append(inverse.rest(x0))
+            x0 = inverse.gain * x0
+        return tuple(states[::-1])
+
+    def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        states = []
+        for inverse, s in zip(self.inverses, state, strict=True):
+            y, s = inverse.run(y, s)
+            states.append(s)
+        return y, tuple(states)
+
+    def c_form(self, ahead: int) -> CForm:
+        parts = {f"section_{k}": inverse.c_form() for k, inverse in enumerate(self.inverses)}
+        steps = [f"x = {part.call('step', name, 'x')};" for name, part in parts.items()]
+        rest = [f"{part.call('rest', n, 'x')};\nx = gain_{k} * x;" for k, (n, part) in enumerate(parts.items())][::-1]
+        gains = {f"gain_{k}": float(inverse.gain) for k, inverse in enumerate(self.inverses)}
+        return CForm("\n".join((*steps, "return x;")), "\n".join((*rest, "return x;")), gains, parts=parts)
