@@ -87,7 +87,7 @@ def truth_of(plant: Plant, model: Model) -> dict[str, float]:
             case "backlash", width:
                 found["backlash.b"] = width * plant.volt
             case "amplifier_bandwidth", tau:
-                found["amplifier_bandwidth.tau"] = tau
+                found |= {"amplifier_bandwidth.tau": tau, "amplifier_bandwidth_held.tau": tau}
             case "amplifier_slew_limit", slew:
                 found["amplifier_slew_limit.S"] = slew * plant.volt
             case "axis_coupling", kappa:

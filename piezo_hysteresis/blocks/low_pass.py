@@ -12,9 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`LowPassBlock`: equal poles in series, exact for an input that is linear between samples."""
+"""`LowPassBlock`: equal poles in series, exact for an input that is linear or constant between samples."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +26,52 @@ from .block import Array, Section, State
 from .kernel import kernel
 from .linear import AddedBlock
 from .relaxation import hold
+
+
+class PoleStep(NamedTuple):
+    """Coefficients of one pole, y_i = left y_(i−1) + lead x_i + back x_(i−1), and their derivatives by τ [1/s]."""
+
+    left: float
+    lead: float
+    back: float
+    left_slope: float
+    lead_slope: float
+    back_slope: float
+
+
+def linear_step(tau: float, sample_period: float) -> PoleStep:
+    """A pole of time constant `tau` [s] whose input is linear between samples; its lag near dc is τ.
+
+    >>> step = linear_step(1.0, 1.0)
+    >>> round(step.lead, 6), round(step.back, 6)
+    (0.367879, 0.264241)
+    """
+    fade, lead, fade_slope, lead_slope = (float(c[0]) for c in hold(np.array([tau]), sample_period))
+    return PoleStep(1.0 - fade, lead, fade - lead, -fade_slope, lead_slope, fade_slope - lead_slope)
+
+
+def held_step(tau: float, sample_period: float) -> PoleStep:
+    """A pole whose input jumps after a sample, stays there, and is observed at the end of the period.
+
+    The period in which the input is held is a delay, which is not part of this pole. Its lag near dc is `held_lag`.
+
+    >>> step = held_step(1.0, 1.0)
+    >>> round(step.lead, 6), step.back
+    (0.632121, 0.0)
+    """
+    fade, _, fade_slope, _ = (float(c[0]) for c in hold(np.array([tau]), sample_period))
+    return PoleStep(1.0 - fade, fade, 0.0, -fade_slope, fade_slope, 0.0)
+
+
+def held_lag(tau: float, sample_period: float) -> tuple[float, float]:
+    """Lag near dc of `held_step` [s], T/(e^(T/τ) − 1), and its derivative by τ [1].
+
+    >>> [round(value, 6) for value in held_lag(1.0, 1.0)]
+    [0.581977, 0.920674]
+    """
+    step = held_step(tau, sample_period)
+    fade = step.lead
+    return sample_period * step.left / fade, sample_period * step.left_slope / fade**2
 
 
 @kernel
@@ -72,28 +120,23 @@ return x + (y - (x - s->x_rest));
 
 
 class LowPassBlock(AddedBlock):
-    """`count` poles with time constant τ; the lag near dc is count·τ at every sample period; τ = 0 gives y = x.
+    """`count` equal poles; τ = 0 gives y = x.
 
     Parameters
     ----------
     name : str
         Name of the parameter τ.
-    tau : float
-        Time constant [s], zero or more.
+    step : PoleStep
+        Coefficients of each pole.
     count : int
         Number of poles.
-    sample_period : float
-        Sample period [s].
     """
 
     keeps_state = True
 
-    def __init__(self, name: str, tau: float, count: int, sample_period: float) -> None:
+    def __init__(self, name: str, step: PoleStep, count: int = 1) -> None:
         self.names, self.count = (name,), count
-        step = hold(np.array([tau]), sample_period)
-        fade, lead, fade_slope, lead_slope = (float(c[0]) for c in step)
-        self.step = (1.0 - fade, lead, fade - lead)
-        self.slopes = (-fade_slope, lead_slope, fade_slope - lead_slope)
+        self.step, self.slopes = step[:3], step[3:]
 
     def sections(self) -> tuple[Section, ...]:
         """One section for every pole."""

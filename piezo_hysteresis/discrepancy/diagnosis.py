@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from ..effects import CHAIN
 from ..html_table import html_table
 from ..identification.fit.fit import Fit
 from ..model.model import Model
@@ -116,8 +117,8 @@ class Diagnosis(Pictured):
                 )
             for rejection in step.rejected:
                 rejections[rejection.name] = rejection
-        named = {s.best.name for s in self.selection.accepted} if self.names else set()
-        return tuple(r for r in rejections.values() if r.name not in named)
+        forms = {e.name for e in CHAIN if e.public_name() in self.names}
+        return tuple(r for r in rejections.values() if r.name not in forms)
 
     def effects(self) -> list[dict[str, Any]]:
         """The named effects, as in ``answer.json``."""

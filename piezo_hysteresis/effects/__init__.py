@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from ..errors import ModelError
 from .drive.amplifier_bandwidth import AmplifierBandwidth
+from .drive.amplifier_bandwidth_held import AmplifierBandwidthHeld
 from .drive.amplifier_saturation import AmplifierSaturation
 from .drive.amplifier_slew_limit import AmplifierSlewLimit
 from .drive.backlash import Backlash
@@ -66,6 +67,7 @@ CHAIN: tuple[type[Effect], ...] = (
     AmplifierSaturation,
     AmplifierSlewLimit,
     AmplifierBandwidth,
+    AmplifierBandwidthHeld,
     Backlash,
     BoucWen,
     PublishedBoucWen,
@@ -146,6 +148,7 @@ __all__ = [
     "OPERATORS",
     "UNNAMED",
     "AmplifierBandwidth",
+    "AmplifierBandwidthHeld",
     "AmplifierSaturation",
     "AmplifierSlewLimit",
     "Arx",

@@ -45,6 +45,7 @@ FAMILIES = {
     "extra_resonance": "dynamics",
     "extra_delay": "lag",
     "amplifier_bandwidth": "lag",
+    "amplifier_bandwidth_held": "lag",
     "sensor_bandwidth": "lag",
     "amplifier_slew_limit": "amplifier",
     "amplifier_saturation": "amplifier",

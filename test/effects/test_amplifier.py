@@ -21,8 +21,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from piezo_hysteresis.effects import AmplifierSaturation, AmplifierSlewLimit, Discretisation, Effect
+from piezo_hysteresis.effects import (
+    AmplifierBandwidthHeld,
+    AmplifierSaturation,
+    AmplifierSlewLimit,
+    Discretisation,
+    Effect,
+)
 from piezo_hysteresis.errors import ParameterError
+from piezo_hysteresis.stage.plant.clock import Clock
+from piezo_hysteresis.stage.plant.electronics import Amplifier, Electronics
 
 PERIOD = 2e-5
 
@@ -71,3 +79,20 @@ def test_a_corner_is_smooth_monotonic_and_ends_at_the_limits(lower: float, upper
 def test_crossed_limits_are_refused() -> None:
     with pytest.raises(ParameterError, match="expected lower < upper"):
         AmplifierSaturation(lower=5.0, upper=1.0)
+
+
+@pytest.mark.parametrize("bandwidth", [1e3, 1e4, 5e4])
+def test_a_held_pole_is_the_amplifier_at_the_ends_of_the_holds(bandwidth: float) -> None:
+    clock = Clock.cut(PERIOD, 0.0, PERIOD / 7.0)
+    drive = np.random.default_rng(3).normal(5.0, 1.0, 500)
+    amplifier = Amplifier(Electronics(amplifier_bandwidth=bandwidth, delay=0.0), clock, drive[0])
+    ends = amplifier.run(drive)[clock.count - 1 :: clock.count]
+    np.testing.assert_allclose(run(AmplifierBandwidthHeld(tau=1 / (2 * np.pi * bandwidth)), drive), ends, atol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [1, 3, 40, 1000])
+def test_a_held_pole_lags_by_the_same_time_at_every_sample_period(ratio: int) -> None:
+    tau, t = 1.5e-5, np.arange(100) * PERIOD * ratio
+    block = AmplifierBandwidthHeld(tau=tau).block(Discretisation(PERIOD * ratio, PERIOD))
+    y = block.run(t, block.rest(0.0, 0.0))[0]
+    np.testing.assert_allclose(y[50:], t[50:] - PERIOD / np.expm1(PERIOD / tau), rtol=1e-9)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import Self
 
 from ...blocks.block import Block
-from ...blocks.low_pass import LowPassBlock
+from ...blocks.low_pass import LowPassBlock, linear_step
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
@@ -56,4 +56,4 @@ class AmplifierBandwidth(Effect):
         return cls(), *(cls(tau=tau) for tau in FOUND_BY)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
-        return LowPassBlock("amplifier_bandwidth.tau", self["tau"], 1, setting.sample_period)
+        return LowPassBlock("amplifier_bandwidth.tau", linear_step(self["tau"], setting.sample_period))

@@ -22,7 +22,7 @@ import numpy as np
 
 from ...blocks.block import Array, Block, State
 from ...blocks.linear import AddedBlock
-from ...blocks.low_pass import LowPassBlock
+from ...blocks.low_pass import LowPassBlock, linear_step
 from ...c_form import CForm
 from ...errors import ParameterError
 from ...inverse_terms import InverseStart, InverseTerms, RelaxationTerms
@@ -99,7 +99,7 @@ class CreepExponentialBlock(AddedBlock):
 
     def __init__(self, names: tuple[str, ...], c: Array, tau: Array, sample_period: float) -> None:
         self.names, self.c = names, c
-        self.poles = tuple(LowPassBlock("", float(t), 1, sample_period) for t in tau)
+        self.poles = tuple(LowPassBlock("", linear_step(float(t), sample_period)) for t in tau)
         self.gain = float(c.sum())
 
     @property

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from ...blocks.block import Block
-from ...blocks.low_pass import LowPassBlock
+from ...blocks.low_pass import LowPassBlock, linear_step
 from ...errors import ParameterError
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
@@ -54,4 +54,5 @@ class SensorBandwidth(Effect):
             raise ParameterError(f"sensor_bandwidth.poles: got {self['poles']:g}, expected a whole number")
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
-        return LowPassBlock("sensor_bandwidth.tau", self["tau"], int(self["poles"]), setting.sample_period)
+        step = linear_step(self["tau"], setting.sample_period)
+        return LowPassBlock("sensor_bandwidth.tau", step, int(self["poles"]))
