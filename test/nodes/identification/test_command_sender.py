@@ -28,7 +28,8 @@ from piezo_hysteresis.nodes.identification.driver_client import DriverClient
 pytestmark = pytest.mark.nodes
 
 PERIOD = 2e-5
-MAX_AGE = 2.0
+MAX_AGE = 5.0
+"""Oldest command that is played [s]; 96 MB take seconds on a busy machine."""
 
 
 class SlowToPack:
