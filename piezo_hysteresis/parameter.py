@@ -27,6 +27,15 @@ from .errors import ParameterError
 Value = float | tuple[float, ...]
 
 
+def slew_text(rate: float, digits: int = 6) -> str:
+    """A rate of change of a voltage as text, never with an exponent of ten.
+
+    >>> slew_text(30000.0, 4), slew_text(0.12345, 4), slew_text(1.25e6)
+    ('30000 V/s', '0.1235 V/s', '1250000 V/s')
+    """
+    return f"{float(f'{rate:.{digits}g}'):.15g} V/s"
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A named physical quantity with unit, value, bounds, meaning and source.

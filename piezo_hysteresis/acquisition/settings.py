@@ -22,7 +22,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from ..errors import ParameterError
-from ..parameter import Parameter, Row, Setting
+from ..parameter import Parameter, Row, Setting, slew_text
 from ..stage.back_ends import BACK_ENDS
 from ..stage.stage import Description
 
@@ -130,11 +130,12 @@ class DriverSettings:
         slew = self.max_slew_rate or min(usual, stage.max_slew_rate)
         if slew > stage.max_slew_rate:
             raise ParameterError(
-                f"max_slew_rate: got {slew:g} V/s, expected at most the {stage.max_slew_rate:g} V/s of {stage.name}"
+                f"max_slew_rate: got {slew_text(slew)}, expected at most the {slew_text(stage.max_slew_rate)} "
+                f"of {stage.name}"
             )
         if self.ramp_rate > slew:
             raise ParameterError(
-                f"ramp_rate: got {self.ramp_rate:g} V/s, expected at most the slew rate {slew:g} V/s; "
+                f"ramp_rate: got {slew_text(self.ramp_rate)}, expected at most the slew rate {slew_text(slew)}; "
                 "lower ramp_rate or raise max_slew_rate"
             )
         return replace(stage, voltage_min=low, voltage_max=high, max_slew_rate=slew, longest_block=None)

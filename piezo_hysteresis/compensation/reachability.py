@@ -21,6 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..parameter import slew_text
+
 Array = NDArray[np.float64]
 
 
@@ -57,7 +59,7 @@ class UnreachablePart:
         needed = {
             "voltage_min": f"{self.needed_min:.3g} V",
             "voltage_max": f"{self.needed_max:.3g} V",
-            "max_slew_rate": f"{self.needed_slew:.3g} V/s",
+            "max_slew_rate": slew_text(self.needed_slew, 4),
         }[self.limit]
         message = (
             f"the path cannot be reached from {self.begin:.4g} to {self.end:.4g} s: it needs {needed}, "

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..effects import UnnamedCorrection
 from ..model.model import Model
+from ..parameter import slew_text
 from ..record import Experiment, Notice, Record
 from .records.excitation_content import excitation_content
 
@@ -106,7 +107,7 @@ def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
         yield Notice("outside_frequencies", said, record.phase)
     rate = _slew_rate(record)
     if rate > FASTER * steepest > 0.0:
-        said = f"the drive changes by {rate:.3g} V/s, the model was identified up to {steepest:.3g} V/s"
+        said = f"the drive changes by {slew_text(rate, 4)}, the model was identified up to {slew_text(steepest, 4)}"
         yield Notice("outside_rates", said, record.phase)
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import StageError, printable
+from ..parameter import slew_text
 
 Samples = NDArray[np.float64]
 
@@ -173,6 +174,6 @@ class Description:
                 first = int(np.argmax(step > steepest))
                 raise StageError(
                     f"{self.name}: drive sample {first} steps by {step[first]:g} V, expected at most {steepest:g} V "
-                    f"per sample ({self.max_slew_rate:g} V/s); nothing was played"
+                    f"per sample ({slew_text(self.max_slew_rate)}); nothing was played"
                 )
         return block

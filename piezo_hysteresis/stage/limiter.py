@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import StageError
+from ..parameter import slew_text
 from .description import Description, Samples
 
 LONGEST_PART = 65536
@@ -47,7 +48,7 @@ class Limiter:
 
     def __init__(self, limits: Description, ramp_rate: float = math.inf) -> None:
         if not ramp_rate > 0:
-            raise StageError(f"{limits.name}: got a ramp rate of {ramp_rate:g} V/s, expected more than 0")
+            raise StageError(f"{limits.name}: got a ramp rate of {slew_text(ramp_rate)}, expected more than 0")
         self.limits, self.ramp_rate = limits, min(ramp_rate, limits.max_slew_rate)
 
     def restricted(self, limits: Description, ramp_rate: float) -> Limiter:
@@ -63,8 +64,8 @@ class Limiter:
         if not (inside and limits.max_slew_rate <= own.max_slew_rate):
             raise StageError(
                 f"{own.name}: got limits {limits.voltage_min:g} to {limits.voltage_max:g} V and "
-                f"{limits.max_slew_rate:g} V/s, expected them inside {own.voltage_min:g} to {own.voltage_max:g} V and "
-                f"{own.max_slew_rate:g} V/s"
+                f"{slew_text(limits.max_slew_rate)}, expected them inside {own.voltage_min:g} to {own.voltage_max:g} V "
+                f"and {slew_text(own.max_slew_rate)}"
             )
         narrowed = replace(
             own,

@@ -25,6 +25,7 @@ import pytest
 from piezo_hysteresis.effects import Arx, BoucWen, SofteningOfOneMode
 from piezo_hysteresis.model import model_file
 from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.parameter import slew_text
 from piezo_hysteresis.report.words import nanometre
 
 PERIOD = 2e-5
@@ -73,7 +74,7 @@ def test_terminal_page_and_json_contain_the_same_numbers(piezo, model, tmp_path)
     for text in (
         nanometre(answer["expected_error"]["total_m"]),
         nanometre(answer["expected_error"]["planned_m"]),
-        f"{answer['largest_slew_V_per_s']:.4g} V/s",
+        slew_text(answer["largest_slew_V_per_s"], 4),
         f"{answer['voltage_min_V']:.4g} to {answer['voltage_max_V']:.4g} V",
     ):
         assert text in done.out and text in page

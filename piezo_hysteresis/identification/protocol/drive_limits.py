@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import IdentificationError
+from ...parameter import slew_text
 
 Samples = NDArray[np.float64]
 
@@ -114,7 +115,7 @@ class DriveLimits:
         slew = float(np.max(np.abs(np.diff(voltage)), initial=0.0)) / self.sample_period
         if slew > self.max_slew_rate * (1.0 + 1e-6):
             raise IdentificationError(
-                f"{name}: got a slew of {slew:g} V/s, expected at most {self.max_slew_rate:g} V/s"
+                f"{name}: got a slew of {slew_text(slew)}, expected at most {slew_text(self.max_slew_rate)}"
             )
         if voltage[0] != self.safe_voltage or voltage[-1] != self.safe_voltage:
             raise IdentificationError(

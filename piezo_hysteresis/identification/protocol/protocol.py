@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import IdentificationError
+from ...parameter import slew_text
 from ...record import CONDITIONING
 from . import excitation
 from .drive_limits import DriveLimits, Samples
@@ -98,7 +99,7 @@ class Summary:
     def __str__(self) -> str:
         return (
             f"{self.phases} phases, {self.duration:.1f} s, {self.voltage_min:g} to {self.voltage_max:g} V, "
-            f"largest slew {self.largest_slew:.4g} V/s, {self.stored_samples} samples stored"
+            f"largest slew {slew_text(self.largest_slew, 4)}, {self.stored_samples} samples stored"
         )
 
 

@@ -23,6 +23,7 @@ from sensor_msgs.msg import PointCloud2
 
 from ...compensation import Plan
 from ...errors import RecordError
+from ...parameter import slew_text
 from ..messages.cloud import from_cloud, to_cloud
 from ..messages.conversions import PERIOD_TOLERANCE, with_phase
 
@@ -65,7 +66,7 @@ def described(plan: Plan) -> str:
     stated = "no free-run error stated" if expected.free_run is None else f"model {1e9 * expected.free_run:.1f} nm"
     return (
         f"{plan.voltage.size * plan.sample_period:.3g} s, {plan.voltage.min():.3g} to {plan.voltage.max():.3g} V, "
-        f"at most {plan.largest_slew:.3g} V/s, expected error {1e9 * expected.total:.1f} nm rms "
+        f"at most {slew_text(plan.largest_slew, 4)}, expected error {1e9 * expected.total:.1f} nm rms "
         f"(plan {1e9 * expected.planned:.1f} nm, {stated}), "
         + ("all of it is reachable" if plan.reachability.is_whole else why_not(plan))
     )

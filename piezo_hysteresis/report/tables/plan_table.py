@@ -19,6 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...compensation.plan import Plan
+from ...parameter import slew_text
 from ..words import nanometre
 from .table import Table
 
@@ -38,7 +39,7 @@ def plan_table(found: Plan) -> Table:
     way_back = found.voltage.size - found.begin - found.wanted.size
     rows = (
         ("drive voltage", f"{found.voltage.min():.4g} to {found.voltage.max():.4g} V"),
-        ("largest slew", f"{found.largest_slew:.4g} V/s"),
+        ("largest slew", slew_text(found.largest_slew, 4)),
         ("duration", f"{found.voltage.size * found.sample_period:.4g} s, {found.voltage.size} samples"),
         ("way back to the first voltage", f"{1e3 * way_back * found.sample_period:.4g} ms"),
         ("preview", f"{found.preview} samples, {1e3 * found.preview * found.sample_period:.3g} ms"),

@@ -20,6 +20,7 @@ import math
 from dataclasses import dataclass
 
 from ...errors import StageError
+from ...parameter import slew_text
 from ..description import Description
 
 
@@ -116,7 +117,7 @@ class DaqmxSetup:
                 raise StageError(f"daqmx.{name}: got {getattr(self, name)!r}, expected more than 0")
         if not 0 < self.max_slew_rate < math.inf:
             raise StageError(
-                f"nidaqmx.max_slew_rate: got {self.max_slew_rate:g} V/s, expected the steepest that amplifier and "
+                f"nidaqmx.max_slew_rate: got {slew_text(self.max_slew_rate)}, expected the steepest that amplifier and "
                 "stage stand, more than 0 and finite; from the amplifier's current I and the piezo's capacitance C it "
                 "is I/C, divided by amplifier_gain"
             )

@@ -20,6 +20,7 @@ import math
 from dataclasses import dataclass
 
 from ...errors import StageError
+from ...parameter import slew_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +115,9 @@ class Gcs2Setup:
                 raise StageError(f"gcs2.{name}: got {getattr(self, name)!r}, expected more than 0")
         if not 0 < self.max_slew_rate < math.inf:
             raise StageError(
-                f"gcs2.max_slew_rate: got {self.max_slew_rate:g} V/s, expected the steepest drive that amplifier and "
-                "stage stand, more than 0 and finite; from the amplifier's current I and the piezo's capacitance C it "
-                "is I/C, divided by amplifier_gain"
+                f"gcs2.max_slew_rate: got {slew_text(self.max_slew_rate)}, expected the steepest drive that amplifier "
+                "and stage stand, more than 0 and finite; from the amplifier's current I and the piezo's capacitance C "
+                "it is I/C, divided by amplifier_gain"
             )
         for name in ("amplifier_gain", "command_per_volt"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) != 0):
