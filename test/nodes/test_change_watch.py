@@ -95,8 +95,10 @@ def test_a_stage_that_changes_is_reported_with_its_group(lab, tmp_path):
     stage.play(8.0)
     lab.wait(lambda: stage.play(0.5) or any("has changed: gain" in s.message for s in list(reported)), "an alarm")
     alarm = next(s for s in list(reported) if "has changed: gain" in s.message)
-    values = values_of(alarm)
-    assert float(values["change_low"]) < 0.005 < float(values["change_high"])
+    low, high = (float(values_of(alarm)[end]) for end in ("change_low", "change_high"))
+    # The interval holds the truth 19 times in 20, and the samples that the alarm rests on differ from run to run.
+    assert low - (high - low) / 2.0 < 0.005 < high + (high - low) / 2.0
+    assert high - low < 0.1 * 0.005
     lab.wait(
         lambda: any("has changed" in s.message for r in list(reports) for s in r.status), "the alarm on /diagnostics"
     )
