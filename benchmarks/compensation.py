@@ -29,8 +29,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.compensation_feedback import PERIOD, best_feedback
 from benchmarks.compensation_recording import recorded
-from benchmarks.compensation_rivals import best_feedback, hysteresis_alone, linear_gain, multiplicative
+from benchmarks.compensation_rivals import hysteresis_alone, linear_gain, multiplicative
 from benchmarks.compensation_speed import blocks as block_latency
 from benchmarks.compensation_speed import speed
 from benchmarks.figures import Cell, Figures, alone
@@ -41,8 +42,6 @@ from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
-PERIOD = 2e-5
-"""Sample period [s]."""
 LIMITS = Limits(0.0, 10.0)
 """Of the drive."""
 LOW, HIGH = 0.12, 0.82
@@ -75,8 +74,6 @@ PATHS = (
 )
 EDGE = round(3e-3 / PERIOD)
 """Samples at both ends of a path that are not scored."""
-FEEDBACK_FROM = 100.0
-"""Lowest frequency at which feedback is simulated, sample by sample [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +177,7 @@ def rows_of(bench: Bench, with_feedback: bool) -> list[tuple[Cell, ...]]:
         rivals = [simple(linear_gain(led, bench.stroke, 10.0)), simple(hysteresis_alone(extended, led, LIMITS))]
         rivals.append(simple(multiplicative(base, led, LIMITS)) if "bouc_wen" in base else float("nan"))
         closed: float | None = None
-        if with_feedback and frequency >= FEEDBACK_FROM:
+        if with_feedback:
             part = slice(found.begin + EDGE, led.size - EDGE)
             rms, _ = best_feedback(bench.parameters, led, part, 10.0 / bench.stroke, LIMITS)
             closed = 100.0 * rms / found.range

@@ -24,8 +24,6 @@ from piezo_hysteresis.blocks.kernel import kernel
 from piezo_hysteresis.compensation import Inverse, Limits
 from piezo_hysteresis.effects import Arx, BoucWen, ChainPosition
 from piezo_hysteresis.model.model import Model
-from piezo_hysteresis.stage.plant import PlantParameters
-from piezo_hysteresis.stage.simulated import SimulatedStage
 
 
 def linear_gain(wanted: np.ndarray, stroke: float, voltage: float) -> np.ndarray:
@@ -69,65 +67,3 @@ def multiplicative(model: Model, wanted: np.ndarray, limits: Limits) -> np.ndarr
     w = wanted / (arx.dc_gain * model.displacement_scale)
     run_multiplicative(w, a, beta, gamma, p1, p2, limits.voltage_min / scale, limits.voltage_max / scale, v)
     return scale * v
-
-
-def feedback(
-    parameters: PlantParameters,
-    wanted: np.ndarray,
-    gains: tuple[float, float],
-    voltage_per_metre: float,
-    limits: Limits,
-) -> np.ndarray:
-    """Displacement under a PI controller that runs once per sample, beside the linear gain as feedforward.
-
-    Parameters
-    ----------
-    parameters : PlantParameters
-        The stage.
-    wanted : (n,) ndarray
-        Path [m].
-    gains : (float, float)
-        Proportional and integral gain, in units of `voltage_per_metre` and per sample.
-    voltage_per_metre : float
-        Slope of the stage [V/m].
-    limits : Limits
-        Of the drive.
-    """
-    stage = SimulatedStage(parameters)
-    sum_, y, u = 0.0, np.empty_like(wanted), np.empty(1)
-    last = 0.0
-    for i in range(wanted.size):
-        error = (wanted[i] - last) * voltage_per_metre
-        rough = wanted[i] * voltage_per_metre + gains[0] * error + sum_
-        u[0] = min(max(rough, limits.voltage_min), limits.voltage_max)
-        if u[0] == rough:  # no wind-up
-            sum_ += gains[1] * error
-        last = float(stage.exchange(u).displacement[0])
-        y[i] = last
-    return y
-
-
-def best_feedback(
-    parameters: PlantParameters, wanted: np.ndarray, part: slice, voltage_per_metre: float, limits: Limits
-) -> tuple[float, tuple[float, float]]:
-    """Smallest rms error over `part` of the path [m] over a grid of gains, refined once, and the gains."""
-    tried: dict[tuple[float, float], float] = {}
-
-    def rms(gains: tuple[float, float]) -> float:
-        if gains not in tried:
-            y = feedback(parameters, wanted, gains, voltage_per_metre, limits)
-            tried[gains] = float(np.sqrt(np.mean((y - wanted)[part] ** 2)))
-        return tried[gains]
-
-    for p in (0.0, 0.3, 1.0):
-        for i in (0.01, 0.03, 0.1, 0.2):
-            rms((p, i))
-    best = min(tried, key=lambda gains: tried[gains])
-    for factor in (0.6, 0.8, 1.25, 1.6):
-        rms((best[0], best[1] * factor))
-    best = min(tried, key=lambda gains: tried[gains])
-    for p in (best[0] - 0.15, best[0] + 0.15):
-        if p >= 0.0:
-            rms((p, best[1]))
-    best = min(tried, key=lambda gains: tried[gains])
-    return tried[best], best

@@ -127,3 +127,28 @@ def test_the_way_begins_where_the_stage_is() -> None:
     assert abs(found.voltage[0] - state.inputs[0]) < 0.02
     assert np.abs(found.path_predicted - y).max() < 1e-10
     assert found.sample_period == PERIOD
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_nearest_band_is_reachable_and_not_much_lower_than_it_must_be(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    model, t = stage(), PERIOD * np.arange(6_000)
+    frequency = 50.0 * 2.0 ** np.arange(0.0, 5.1, 0.25)
+    rate, phase = 2.0 * np.pi * frequency[:, None], 2.0 * np.pi * rng.random(frequency.size)
+    parts = 1e-3 / rate * np.sin(rate * t + phase[:, None])  # equally steep
+    window, approach = (
+        np.sin(np.pi * np.arange(t.size) / t.size) ** 2,
+        0.5 - 0.5 * np.cos(np.pi * np.arange(3000) / 3000),
+    )
+
+    def below(highest: float) -> np.ndarray:
+        """The path from rest, without its components above a frequency [Hz]."""
+        return 1e-5 * np.append(approach, 1.0 + 1e5 * window * parts[frequency <= highest].sum(axis=0))
+
+    limits = Limits(-20.0, 40.0, float(rng.uniform(1500.0, 3500.0)))
+    found = reachable(model, limits, below(np.inf))
+    assert {p.limit for p in found.parts} == {"max_slew_rate"}
+    band = found.nearest.band if found.nearest else None
+    assert band is not None and band < 1000.0
+    assert reachable(model, limits, below(band), search=False).is_whole
+    assert not reachable(model, limits, below(2.5 * band), search=False).is_whole

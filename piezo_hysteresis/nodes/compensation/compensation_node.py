@@ -44,7 +44,7 @@ from ..runtime.sending import send
 from ..topics import advertise, subscribe
 from .applied_state import AppliedState, check_period
 from .path_runs import TICK, Job, PathError, PathRuns
-from .set_point import SetPoint
+from .set_point import SetPoint, volts_per_metre
 from .settings import COMPENSATION
 from .status import ENDED, CompensationStatus
 from .trajectory import described, trajectory_from_cloud, trajectory_to_cloud, why_not
@@ -151,7 +151,7 @@ class CompensationNode(GuardedNode):
         except PiezoError as error:
             self._status.refuse("set_displacement", str(error))
             return
-        slope = (found.voltage[-1] - applied.voltage, found.predicted[-1] - found.predicted[0])
+        slope = volts_per_metre(applied.model, limits)
         self._set_point.go(float(message.data), float(found.voltage[-1]), slope, limits)
         self._status.show("set", f"{1e6 * message.data:.6g} µm by {found.voltage[-1]:.6g} V", "set_displacement")
 

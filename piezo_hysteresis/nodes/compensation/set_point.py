@@ -22,10 +22,18 @@ import numpy as np
 from std_msgs.msg import Float64
 
 from ...compensation import Limits
+from ...model.model import Model
 from ..runtime.sending import send
 
 _INTERVAL = 0.1
 """Time between two corrections [s]; the driver ramps to each of them."""
+
+
+def volts_per_metre(model: Model, limits: Limits) -> float:
+    """Voltage for a displacement, of a stage that rests at one limit and then at the other [V/m]."""
+    ends = limits.voltage_min, limits.voltage_max
+    low, high = (float(model.run([voltage], model.rest(voltage))[0][0]) for voltage in ends)
+    return (ends[1] - ends[0]) / (high - low)
 
 
 class SetPoint:
@@ -49,11 +57,9 @@ class SetPoint:
         self._limits = Limits()
         self._sum, self._count = 0.0, 0
 
-    def go(self, target: float, voltage: float, way: tuple[float, float], limits: Limits) -> None:
-        """Hold a displacement [m] by a voltage [V]; `way` is the change of both from the present ones."""
-        self._target, self._voltage, self._limits = target, voltage, limits
-        if abs(way[1]) > 1e-9 and way[0] / way[1] > 0.0:
-            self._slope = way[0] / way[1]
+    def go(self, target: float, voltage: float, slope: float, limits: Limits) -> None:
+        """Hold a displacement [m] by a voltage [V]; `slope` is that of voltage against displacement [V/m]."""
+        self._target, self._voltage, self._slope, self._limits = target, voltage, slope, limits
         self._waited, self._sum, self._count = 0.0, 0.0, 0
         send(self._publisher, Float64(data=voltage))
 

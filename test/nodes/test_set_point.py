@@ -1,0 +1,92 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The slow integral behind a displacement that is held: what it settles to, and that it does not wind up."""
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.compensation import Limits
+from piezo_hysteresis.effects import Arx, BoucWen, Offset
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.nodes.compensation.set_point import SetPoint, volts_per_metre
+
+TICK = 0.1
+"""Time between two corrections [s]."""
+
+
+class Driver:
+    """A stage y = gain · u + load behind a publisher of voltages."""
+
+    def __init__(self, gain: float, voltage: float) -> None:
+        self.gain, self.load, self.voltages = gain, 0.0, [voltage]
+
+    def publish(self, message) -> None:
+        self.voltages.append(message.data)
+
+    def hold(self, point: SetPoint, ticks: int) -> list[float]:
+        """Voltages of the next corrections."""
+        for _ in range(ticks):
+            point.measured(self.gain * self.voltages[-1] + self.load, 100)
+            point.tick(TICK)
+        return self.voltages[-ticks:]
+
+
+def held(seed: int) -> tuple[Driver, SetPoint, float]:
+    """A displacement that is held inside the limits of 0 and 10 V, its stage, and the voltage that it needs."""
+    rng = np.random.default_rng(seed)
+    gain, needed = float(rng.uniform(0.5e-6, 5e-6)) * (-1.0) ** seed, float(rng.uniform(2.0, 8.0))
+    driver = Driver(gain, 0.0)
+    point = SetPoint(driver, float(rng.uniform(0.2, 2.0)))
+    point.go(gain * needed, needed + 0.3, 1.0 / gain, Limits(0.0, 10.0))
+    return driver, point, needed
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_constant_error_is_removed(seed: int) -> None:
+    driver, point, needed = held(seed)
+    assert driver.hold(point, 400)[-1] == pytest.approx(needed, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_follows_a_time_at_a_limit_does_not_depend_on_its_length(seed: int) -> None:
+    after = []
+    for ticks in (200, 2000):
+        driver, point, needed = held(seed)
+        driver.load = -driver.gain * 20.0 * (-1.0) ** (seed // 2)  # no voltage inside the limits is enough
+        at_limit = driver.hold(point, ticks)
+        assert min(at_limit) >= 0.0 and max(at_limit) <= 10.0 and at_limit[-1] in (0.0, 10.0)
+        driver.load = 0.0
+        after.append(driver.hold(point, 400))
+        assert abs(after[-1][0] - needed) < abs(at_limit[-1] - needed), "it leaves the limit at once"
+        assert after[-1][-1] == pytest.approx(needed, abs=1e-6)
+    assert after[0] == after[1]
+
+
+def test_without_an_integral_time_nothing_is_corrected() -> None:
+    driver = Driver(1e-6, 0.0)
+    point = SetPoint(driver, 0.0)
+    point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
+    driver.hold(point, 50)
+    assert driver.voltages == [0.0, 5.3]
+
+
+@pytest.mark.parametrize("p2", [2.2, -2.2])
+def test_the_slope_is_that_of_the_model(p2: float) -> None:
+    model = Model(
+        (BoucWen(A=-0.3 * np.sign(p2), p1=-0.05 * p2, p2=p2), Arx(b=(0.5,)), Offset(y0=1e-6)), 2e-5, 10.0, 1e-5
+    )
+    ends = [float(model.run(np.full(2000, u), model.rest(u))[0][-1]) for u in (0.0, 10.0)]
+    assert volts_per_metre(model, Limits(0.0, 10.0)) == pytest.approx(10.0 / (ends[1] - ends[0]), rel=1e-9)
+    assert np.sign(volts_per_metre(model, Limits(0.0, 10.0))) == np.sign(p2)
