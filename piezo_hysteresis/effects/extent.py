@@ -16,7 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from ..record import Record
 
 ROOM = 293.15
 """Temperature if none was recorded [K]."""
@@ -67,3 +73,46 @@ class Extent:
     def span(self) -> float:
         """Range of the drive voltage [V]."""
         return self.voltage_max - self.voltage_min
+
+    @classmethod
+    def of(cls, records: Sequence[Record], voltage_scale: float, displacement_scale: float) -> Self:
+        """Ranges that records in order cover.
+
+        Parameters
+        ----------
+        records : sequence of Record
+            Records in order.
+        voltage_scale, displacement_scale : float
+            Scales of the model [V], [m].
+        """
+        known = [float(r.temperature.mean()) for r in records if r.temperature is not None]
+        return cls(
+            voltage_min=min(float(r.voltage.min()) for r in records),
+            voltage_max=max(float(r.voltage.max()) for r in records),
+            max_slew=max(float(np.abs(np.diff(r.voltage)).max(initial=0.0)) / r.sample_period for r in records),
+            voltage_scale=voltage_scale,
+            displacement_scale=displacement_scale,
+            fastest_period=min(r.sample_period for r in records),
+            duration=max(r.start_time + r.duration for r in records) - min(r.start_time for r in records),
+            longest_record=max(r.duration for r in records),
+            longest_run=longest_run(records),
+            temperature=round(float(np.mean(known)), 2) if known else ROOM,
+        )
+
+
+def longest_run(records: Sequence[Record]) -> float:
+    """Time from rest to the end of the last record that continues the one before, the longest [s].
+
+    Examples
+    --------
+    >>> u = np.zeros(100)
+    >>> first, second = Record(u, u, 0.1), Record(u, u, 0.1, start_time=12.0, continues=True)
+    >>> round(longest_run([first, first, second]), 6)
+    22.0
+    """
+    longest = begin = 0.0
+    for k, record in enumerate(records):
+        if k == 0 or not record.continues:
+            begin = record.start_time
+        longest = max(longest, record.start_time + record.duration - begin)
+    return longest

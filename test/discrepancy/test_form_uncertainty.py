@@ -19,8 +19,9 @@ import pytest
 
 from piezo_hysteresis.discrepancy.form_uncertainty import PIECES, with_form_uncertainty
 from piezo_hysteresis.discrepancy.residual.noise_floor import ADEQUACY
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import AmplifierBandwidth, Arx, BoucWen, Offset
+from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
@@ -38,7 +39,9 @@ def errors_of(size, misfit=0.0):
     noise = 1e-9
     slow = misfit * np.sqrt(2.0) * np.cos(2 * np.pi * 3 * np.arange(size) / size)
     record = Record(u, y + noise * rng.normal(size=size) + slow, 1e-3)
-    training_data = TrainingData((record,), np.array([noise]), Nuisance(), extent_of([record], MODEL))
+    training_data = TrainingData(
+        (record,), np.array([noise]), Nuisance(), Extent.of([record], MODEL.voltage_scale, MODEL.displacement_scale)
+    )
     found = fit(MODEL, (record,), ["bouc_wen.p2"], floors=[noise])
     wider = with_form_uncertainty(found, training_data, np.array([noise]), SPAN)
     return found.standard_errors["bouc_wen.p2"], wider.standard_errors["bouc_wen.p2"]
@@ -63,6 +66,8 @@ def test_a_lag_is_known_to_one_sample_at_best():
     model = MODEL.with_effect(AmplifierBandwidth(tau=0.5 * period))
     u = np.sin(2 * np.pi * 20 * np.arange(20_000) / 20_000)
     record = Record(u, model.simulate(Record(u, np.zeros(u.size), period))[0], period)
-    training_data = TrainingData((record,), np.array([noise]), Nuisance(), extent_of([record], model))
+    training_data = TrainingData(
+        (record,), np.array([noise]), Nuisance(), Extent.of([record], model.voltage_scale, model.displacement_scale)
+    )
     found = with_form_uncertainty(fit(model, (record,), [name], floors=[noise]), training_data, np.array([noise]), SPAN)
     assert found.standard_errors[name] > period / np.sqrt(12.0)

@@ -22,9 +22,10 @@ from hypothesis import strategies as st
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.discrepancy.verdict import is_explained
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
+from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
@@ -32,7 +33,9 @@ from piezo_hysteresis.record import Record
 
 STAGE = Model((BoucWen(), Arx(b=(1.0,))), 1e-4, 10.0, 1e-5)
 RECORD = Record(np.linspace(0.0, 10.0, 100), np.zeros(100), 1e-4)
-EVIDENCE = TrainingData((RECORD,), np.ones(1), Nuisance(), extent_of([RECORD], STAGE))
+EVIDENCE = TrainingData(
+    (RECORD,), np.ones(1), Nuisance(), Extent.of([RECORD], STAGE.voltage_scale, STAGE.displacement_scale)
+)
 
 
 def selection(explained, leaves):

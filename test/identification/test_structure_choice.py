@@ -21,13 +21,14 @@ import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy.residual.residual import errors
-from piezo_hysteresis.effects import CreepTwoRates, ExtraResonance, HysteresisMemory
+from piezo_hysteresis.effects import Arx, CreepTwoRates, ExtraResonance, HysteresisMemory
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.structure.left_out import score_left_out
+from piezo_hysteresis.identification.structure.linear_part import fit_structure
 from piezo_hysteresis.identification.structure.piece_fit import best_step, fit_pieces
 from piezo_hysteresis.identification.structure.pieces import Kind, pieces_of
-from piezo_hysteresis.record import Experiment
+from piezo_hysteresis.record import Experiment, Record
 
 PERIOD = 5e-4
 STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
@@ -86,6 +87,28 @@ def test_one_rate_predicts_others_and_larger_amplitudes():
     assert max(percents(one.model, played(STAGE, (1.0, 10.0, 50.0)))) < 0.6
     small = identify(played(STAGE, (1.0, 50.0), levels=(0.2, 0.4, 0.6)), memory=True)
     assert max(percents(small.model, played(STAGE, (1.0, 50.0)))) < 0.6
+
+
+def test_the_pole_of_a_lag_stays_between_zero_and_one(identified):
+    """A root of A(z) below 0 is no lag: the response would alternate from sample to sample."""
+    alternating = identified.model.with_effect(Arx(a=(0.4,), b=(1.4,), delay=1.0))
+    records = [replace(r, displacement=alternating.simulate(r)[0]) for r in played(STAGE, (1.0, 50.0))]
+    pieces, sizes = pieces_of(records, (0, 1)), [STAGE.noise * STAGE.stroke] * 2
+    start = identified.model.without("offset").with_effect(Arx(a=(-0.3,), b=(0.7,), delay=1.0))
+    assert -1.0 < fit_structure(start, pieces, sizes).model.values()["arx.a[0]"] < 1e-9
+
+
+def test_creep_goes_on_after_records_that_continue_one_another():
+    """The relaxations last far longer than the whole run, not only longer than the longest record."""
+    period = 2e-3
+    stage = Nanopositioner(mode=150.0, delay=2e-4, pole=2e-4, creep_fast=0.012, creep_slow=0.012)
+    shown = ((1.0, 0.5), (5.0, 1.0), (1.0, 0.9), (20.0, 0.6))
+    run = stage.play(np.concatenate([growing_sine(f, period, (size,), hold=8.0) for f, size in shown]), period)
+    model = identify(Experiment(run.split(*range(2000, run.size - 200, 2000))), memory=True).model
+    held = np.full(30000, 5.0)
+    (y,) = model.simulate(Record(held, np.zeros(held.size), period, initial_voltage=0.0))
+    from_6_to_60_s = (y[-1] - y[3000]) / (y[50] - model["offset"]["y0"])
+    assert from_6_to_60_s == pytest.approx(0.012, rel=0.15)
 
 
 def test_a_record_is_cut_by_its_drive():

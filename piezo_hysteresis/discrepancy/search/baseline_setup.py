@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects.extent import Extent
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.conditioning import select as select_records
@@ -40,7 +41,7 @@ from .cross_validation import ADEQUATE, Score
 from .refit import FAILURES, LAST, PRECISE, clearly_better, joint, renewed
 from .selection_result import Selection
 from .test_records import reporting
-from .training_data import TrainingData, extent_of
+from .training_data import TrainingData
 
 Array = NDArray[np.float64]
 
@@ -151,7 +152,7 @@ def prepare_baseline(
     first = known.baseline if known is not None else model
     starts = iter((first,)) if first is not None else start_models(records, fitted)
     start = exact(next(starts))
-    extent = extent_of([records[i] for i in usable], start)
+    extent = Extent.of([records[i] for i in usable], start.voltage_scale, start.displacement_scale)
 
     def gathered(records: Sequence[Record], least: Array) -> TrainingData:
         kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)

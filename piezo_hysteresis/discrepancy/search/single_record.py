@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...effects import Effect
+from ...effects.extent import Extent
 from ...errors import PiezoError
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.normal_equations import Nuisance, residuals
@@ -55,7 +56,7 @@ from .selection_result import Selection, Step, explained
 from .structure_steps import structure_steps
 from .test_records import reporting
 from .time_limit import ending_at
-from .training_data import TrainingData, extent_of
+from .training_data import TrainingData
 
 BLOCKS = 16
 """Approximate number of blocks into which the records are cut."""
@@ -174,7 +175,7 @@ def _training_data(
     weights = np.array([np.inf if k is None else least[k] for k in origin])
     runs = sum(not r.continues for r in records)
     jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
-    span = extent_of([records[i] for i in fitted], model)
+    span = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
     return TrainingData(tuple(blocks), weights, Nuisance(offset=runs > 1), span, jumps)
 
 

@@ -23,10 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects import MainsHum
-from ...effects.extent import ROOM, Extent
+from ...effects.extent import Extent
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.excitation_content import excitation_content
-from ...model.model import Model
 from ...record import Record
 
 Array = NDArray[np.float64]
@@ -90,41 +89,6 @@ class TrainingData:
     def without(self, effect: str) -> TrainingData:
         """The same data for a model without `effect`; without mains hum, hum is not free in the records."""
         return replace(self, nuisance=replace(self.nuisance, hum_frequency=None)) if effect == MainsHum.name else self
-
-
-def extent_of(records: Sequence[Record], model: Model) -> Extent:
-    """Ranges that the records cover."""
-    known = [float(r.temperature.mean()) for r in records if r.temperature is not None]
-    return Extent(
-        voltage_min=min(float(r.voltage.min()) for r in records),
-        voltage_max=max(float(r.voltage.max()) for r in records),
-        max_slew=max(float(np.abs(np.diff(r.voltage)).max(initial=0.0)) / r.sample_period for r in records),
-        voltage_scale=model.voltage_scale,
-        displacement_scale=model.displacement_scale,
-        fastest_period=min(r.sample_period for r in records),
-        duration=max(r.start_time + r.duration for r in records) - min(r.start_time for r in records),
-        longest_record=max(r.duration for r in records),
-        longest_run=longest_run(records),
-        temperature=round(float(np.mean(known)), 2) if known else ROOM,
-    )
-
-
-def longest_run(records: Sequence[Record]) -> float:
-    """Time from rest to the end of the last record that continues the one before, the longest [s].
-
-    Examples
-    --------
-    >>> u = np.zeros(100)
-    >>> first, second = Record(u, u, 0.1), Record(u, u, 0.1, start_time=12.0, continues=True)
-    >>> round(longest_run([first, first, second]), 6)
-    22.0
-    """
-    longest = begin = 0.0
-    for k, record in enumerate(records):
-        if k == 0 or not record.continues:
-            begin = record.start_time
-        longest = max(longest, record.start_time + record.duration - begin)
-    return longest
 
 
 def peaks_of(records: Sequence[Record], left: Sequence[Array], most: int = 3) -> tuple[float, ...]:

@@ -48,7 +48,7 @@ class Creep(Effect):
     gamma : float
         Creep per decade of time, relative to the response 0.1 s after a step [1/decade].
     tau_min, tau_max : float
-        Range of the relaxation times [s]: from the fastest sample period to 10 times the longest record.
+        Range of the relaxation times [s]: from the fastest sample period to `LASTING` times the longest run.
 
     Notes
     -----

@@ -39,7 +39,7 @@ class UnnamedRelaxation(UnnamedCorrection):
         Delayed motion per decade of time at ``tau_min`` and at ``tau_max``, relative to the response 0.1 s after a step
         [1/decade]; linear in log τ in between. Not negative, because a stage is passive.
     tau_min, tau_max : float
-        Range of the relaxation times [s]: from the fastest sample period to 10 times the longest record.
+        Range of the relaxation times [s]: as in `Creep`.
     """
 
     name = "unnamed_relaxation"

@@ -223,11 +223,9 @@ def best_step(now: PieceFit, total: Array, damping: float = 0.0) -> Array:
     damped = np.any(directions[: len(now.names)] != 0.0, axis=0)
     hessian = hessian + np.diag((damping * damped + STIFF) * diagonal)
     low, high = now.box()
-    single = (directions != 0.0).sum(axis=0) == 1
-    rows = directions.argmax(axis=0)
-    low, high = np.where(single, low[rows], -np.inf), np.where(single, high[rows], np.inf)
+    own = (directions == 1.0).argmax(axis=0)  # the parameter of the direction; G(1) is kept by others
     slope = directions.T @ total[:-1, -1]
-    return np.asarray(directions @ bounded_step(hessian, slope, low - 1e-300, high + 1e-300))
+    return np.asarray(directions @ bounded_step(hessian, slope, low[own] - 1e-300, high[own] + 1e-300))
 
 
 def free_directions(now: PieceFit) -> Array:

@@ -26,7 +26,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import MEMORY, CreepTwoRates
+from ...effects import MEMORY, CreepTwoRates, EvenInputPolynomial
 from ...model.model import Model
 from .pieces import RecordPiece
 
@@ -44,6 +44,11 @@ SMOOTH = 0.1
 """Standard deviation of the second difference of the weights of neighbouring plays, as a share of `LOOP`."""
 BEND = 0.2
 """Standard deviation of the growth of the weights with the level [1]."""
+CURVE = 0.1
+"""Standard deviation of the coefficients of the cube, the square and the fourth power of the drive [1].
+
+Without it, small amplitudes determine them by differences of large terms, and larger amplitudes are predicted badly.
+"""
 LOOP = 0.25
 """Sum of the weights of a usual piezo, relative to the response."""
 INDEPENDENT = 16
@@ -110,6 +115,9 @@ def prior_of(model: Model, names: Sequence[str], slow: int) -> Array:
             rows.append(_row(model, names, terms, SMOOTH * LOOP, slow))
     bends = [n for n in names if n.partition(".")[0] == MEMORY.level_term.name]
     rows += [_row(model, names, [(n, 1.0)], BEND, slow) for n in bends]
+    curves = {f"{EvenInputPolynomial.name}.{p.name}" for p in EvenInputPolynomial.parameters}
+    curves.add(f"{model.hysteresis.name}.p1")
+    rows += [_row(model, names, [(n, 1.0)], CURVE, slow) for n in names if n in curves]
     whole = np.vstack(rows)
     return np.asarray(whole.T @ whole / INDEPENDENT)
 

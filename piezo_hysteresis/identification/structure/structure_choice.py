@@ -36,6 +36,7 @@ from ...effects import (
     EvenInputPolynomial,
     ExtraResonance,
 )
+from ...effects.extent import Extent
 from ...errors import PiezoError
 from ...model.model import Model
 from ...record import Notice, Record
@@ -156,14 +157,12 @@ def _with_plays(start: Model, records: Sequence[Record]) -> Model:
     low = min(float(np.append(r.voltage, r.settled_voltage).min()) for r in records)
     high = max(float(np.append(r.voltage, r.settled_voltage).max()) for r in records)
     reach = WIDEST * max(farthest, 0.5 * (high - low)) / start.voltage_scale
-    longest = max(r.duration for r in records)
+    (creep,) = CreepTwoRates.starts(Extent.of(records, start.voltage_scale, start.displacement_scale))
     effects: tuple[Effect, ...] = (
         start.hysteresis.memoryless() or start.hysteresis,
         MEMORY(c=(0.02,) * PLAYS, reach=reach, virgin=1.0),
         EvenInputPolynomial(),
-        CreepTwoRates(
-            gamma_fast=START_CREEP, gamma_slow=START_CREEP, tau_min=period, tau_max=max(10.0 * longest, 20.0 * period)
-        ),
+        creep.with_values(gamma_fast=START_CREEP, gamma_slow=START_CREEP),
         Arx(a=(), b=(1.0,), delay=1.0),
     )
     return Model(effects, period, start.voltage_scale, start.displacement_scale)

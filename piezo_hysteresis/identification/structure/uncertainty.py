@@ -23,6 +23,7 @@ import numpy as np
 from ...effects import Creep
 from ...errors import IdentificationError
 from ..fit.fit import Fit
+from .linear_part import SHAPE, SHARE
 from .piece_fit import DELAY, POLE, Array, PieceFit, free_directions
 from .pieces import Kind, RecordPiece
 from .prior import INDEPENDENT
@@ -32,10 +33,14 @@ OPEN = 0.4
 """Difference of scores within which another structure is possible; its parameter changes count as uncertainty."""
 
 BETWEEN_SAMPLES = 0.05
-"""Uncertainty of a delay that stands for a delay and a pole [samples].
+"""Uncertainty of a delay that stands for a delay and a pole, or for the form of a ringing drive [samples].
 
-On the stages of `python -m benchmarks.rates` it is 0.02 to 0.07.
+On the stages of `python -m benchmarks.rates` it is 0.02 to 0.07 without a pole. If the whole stage rings, the share of the
+mode is 1. A fit with another share replaces the steps of a held drive, which are not linear between samples; its delay
+is off by up to 0.12 samples per unit of the share.
 """
+NO_POLE = 1e-6
+"""Largest pole that counts as none: a fit that would need a negative one ends here."""
 
 
 def spread_of(full: PieceFit, final: PieceFit, chosen: Judged, judged: Sequence[Judged]) -> Array:
@@ -68,10 +73,10 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
     left = found.squares
     for weight, square, matrix, piece in zip(found.weights, left, found.matrices, counted, strict=True):
         meat += weight**2 * square / np.sqrt(piece.record.size) * matrix[:-1, :-1]
-    if DELAY in found.names and POLE not in found.names:
+    if DELAY in found.names:
         delay = found.names.index(DELAY)
         spread = spread.copy()
-        spread[delay, delay] += BETWEEN_SAMPLES**2
+        spread[delay, delay] += BETWEEN_SAMPLES**2 * _open_forms(found)
     known_to = max(1.0, found.cost) / INDEPENDENT  # independent parts of the misfit
     covariance = (inverse @ meat @ inverse + known_to * inverse)[:numbers, :numbers]
     origins = sorted({p.origin for p in counted})
@@ -95,6 +100,14 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
         converged=found.converged,
         iterations=found.iterations,
     )
+
+
+def _open_forms(found: PieceFit) -> float:
+    """How often `BETWEEN_SAMPLES` counts, squared: for a pole that is not there, and for a share of the mode but 1."""
+    values = found.model.values()
+    has_pole = POLE in found.names and values[POLE] < -NO_POLE
+    off = values[SHARE] - 1.0 if {SHARE, *SHAPE} <= set(found.names) else 0.0
+    return float(not has_pole) + off * off
 
 
 def _inverse(found: PieceFit) -> Array:

@@ -35,8 +35,9 @@ from piezo_hysteresis.discrepancy.choice.time_to_decide import best_drive, expec
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, FittedCandidate
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.selection_result import Step
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, Backlash, BoucWen, Creep, MainsHum, ThermalDrift
+from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
@@ -48,7 +49,9 @@ STAGE = Model((BoucWen(), Arx(b=(1.0,))), 1e-3, 10.0, 1e-5)
 RECORDS = tuple(
     Record(p.voltage, np.zeros(p.voltage.size), 1e-3, p.name) for p in tiers(LIMITS)[0].phases if p.name != "rest"
 )
-DATA = TrainingData(RECORDS, np.full(len(RECORDS), 5e-9), Nuisance(), extent_of(RECORDS, STAGE))
+DATA = TrainingData(
+    RECORDS, np.full(len(RECORDS), 5e-9), Nuisance(), Extent.of(RECORDS, STAGE.voltage_scale, STAGE.displacement_scale)
+)
 PRIOR = {
     NOTHING: 0.4,
     NONE_OF_THESE: 0.1,

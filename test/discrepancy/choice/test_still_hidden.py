@@ -21,8 +21,9 @@ import pytest
 
 from piezo_hysteresis.discrepancy.choice.still_hidden import still_hidden
 from piezo_hysteresis.discrepancy.choice.tiers import tiers
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen, Creep, Offset, ThermalDrift
+from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.model.model import Model
@@ -42,7 +43,12 @@ def played(count: int, stage: Model = STAGE) -> TrainingData:
         bare = Record(phase.voltage, np.zeros(phase.voltage.size), 1e-3, phase.name, start_time=clock)
         records.append(Record(phase.voltage, stage.simulate(bare)[0], 1e-3, phase.name, start_time=clock))
         clock += phase.duration
-    return TrainingData(tuple(records), np.full(len(records), FLOOR), Nuisance(), extent_of(records, STAGE))
+    return TrainingData(
+        tuple(records),
+        np.full(len(records), FLOOR),
+        Nuisance(),
+        Extent.of(records, STAGE.voltage_scale, STAGE.displacement_scale),
+    )
 
 
 def hidden_after(count: int, *effects: type, stage: Model = STAGE) -> set[str]:

@@ -20,8 +20,9 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.residual.explicit_step import KIND, explicit_model, step_changes, without_steps
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, AsymmetricHysteresis, BoucWen, HysteresisExponent, PublishedBoucWen
+from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
@@ -50,7 +51,9 @@ def answered(kind):
 
 def training_data(records):
     floors = np.full(len(records), 3.0 * NOISE)
-    return TrainingData(records, floors, Nuisance(), extent_of(records, model(BoucWen)))
+    return TrainingData(
+        records, floors, Nuisance(), Extent.of(records, model(BoucWen).voltage_scale, model(BoucWen).displacement_scale)
+    )
 
 
 @pytest.mark.parametrize("height", [0.01, 0.1, 0.4])

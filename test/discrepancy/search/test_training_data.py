@@ -18,8 +18,9 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.search.candidates import free_numbers
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
+from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -30,6 +31,8 @@ STAGE = Model((BoucWen(A=-0.2, beta=3.0), Arx(a=(-0.5,), b=(0.5,)), Offset()), 1
 @pytest.mark.parametrize(("begins", "free"), [((0.0, 0.0), False), ((0.0, 0.01), False), ((0.0, 45.0), True)])
 def test_settling_is_free_only_where_records_begin_at_different_levels(begins, free):
     records = tuple(Record(u + np.linspace(0.0, 50.0, 100), np.zeros(100), 1e-4) for u in begins)
-    training_data = TrainingData(records, np.ones(2), Nuisance(), extent_of(records, STAGE))
+    training_data = TrainingData(
+        records, np.ones(2), Nuisance(), Extent.of(records, STAGE.voltage_scale, STAGE.displacement_scale)
+    )
     assert ("offset.settling" in free_numbers(STAGE, training_data)) is free
     assert "offset.y0" in free_numbers(STAGE, training_data)

@@ -27,7 +27,7 @@ from piezo_hysteresis.discrepancy import passes
 from piezo_hysteresis.discrepancy.search.baseline_setup import BaselineSetup
 from piezo_hysteresis.discrepancy.search.candidates import score_baseline
 from piezo_hysteresis.discrepancy.search.refit import LAST, joint
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData, extent_of
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.discrepancy.unnamed.correction import Correction, without_corrections
 from piezo_hysteresis.discrepancy.unnamed.held_out import held_out
 from piezo_hysteresis.discrepancy.unnamed.offer import offered, tried
@@ -43,6 +43,7 @@ from piezo_hysteresis.effects import (
     UnnamedPlays,
     UnnamedPositionMap,
 )
+from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance, residuals
 from piezo_hysteresis.identification.identified_range import outside_of
 from piezo_hysteresis.model import model_file
@@ -86,7 +87,9 @@ def setup_of(plant: Model) -> BaselineSetup:
     records = tuple(played(plant, *drive, seed) for seed, drive in enumerate(drives))
     chosen, least = range(9), np.full(len(records), FLOOR)
     span = float(np.ptp([r.displacement.max() for r in records] + [0.0]))
-    data = TrainingData(records[:9], least[:9], Nuisance(), extent_of(records, PLAIN))
+    data = TrainingData(
+        records[:9], least[:9], Nuisance(), Extent.of(records, PLAIN.voltage_scale, PLAIN.displacement_scale)
+    )
     fit = joint(PLAIN, data, LAST)
     data, score = score_baseline(fit.model, data)
     lost = [np.zeros(r.size) for r in records]
