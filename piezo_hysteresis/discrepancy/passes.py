@@ -43,7 +43,7 @@ from .search.selection_result import Selection
 from .search.single_record import diagnose_few
 from .search.time_limit import ending_at
 from .unnamed.correction import without_corrections
-from .verdict import FEWEST
+from .verdict import FEWEST_RECORDS
 
 Array = NDArray[np.float64]
 
@@ -176,7 +176,7 @@ def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosi
 def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:
     """Ends if there are few records or none is broadband: the answer follows from the chosen structure."""
     needs_structure = state.model is None and not roles_of(state.experiment).broadband
-    if len(state.moving) >= FEWEST and not needs_structure:
+    if len(state.moving) >= FEWEST_RECORDS and not needs_structure:
         return state
     return diagnose_few(state.experiment, state.model, state.moving, state.effects, state.progress, state.end)
 

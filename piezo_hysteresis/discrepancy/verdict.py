@@ -24,7 +24,7 @@ from .gap import Gap
 from .search.cross_validation import ADEQUATE
 from .search.selection_result import Selection
 
-FEWEST = 4
+FEWEST_RECORDS = 4
 """Fewest records from which test records can be taken and an effect can be named."""
 FORESEEN, UNFORESEEN = 1.1, 1.5
 """Error on the test records in units of the floor. Up to the first value nothing is missing, even if V of the training
@@ -87,7 +87,7 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
         if not selection.in_time:
             said += " The time limit ended the search; more effects may be missing."
         return Verdict.NAMED, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
-    many = gap.unseen and len(gap.per_phase) >= FEWEST
+    many = gap.unseen and len(gap.per_phase) >= FEWEST_RECORDS
     foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
     if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):
         if gap.after > UNFORESEEN * gap.floor:

@@ -45,8 +45,7 @@ from ..next_experiment import decide
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
 from ..residual.sampling import shortened
-from ..verdict import FEWEST as FEWEST_RECORDS
-from ..verdict import NAMED, verdict_of
+from ..verdict import FEWEST_RECORDS, NAMED, verdict_of
 from .baseline import with_zero
 from .candidates import loop_is_off, score_model
 from .cross_validation import ADEQUATE, Score
@@ -173,10 +172,10 @@ def _training_data(
 ) -> TrainingData:
     blocks, origin = blocks_of(records, fitted)
     weights = np.array([np.inf if k is None else least[k] for k in origin])
-    runs = sum(not r.continues for r in records)
     jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
-    span = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
-    return TrainingData(tuple(blocks), weights, Nuisance(offset=runs > 1), span, jumps)
+    extent = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
+    free = Nuisance(offset=sum(not r.continues for r in records) > 1)
+    return TrainingData(tuple(blocks), weights, free, extent, jumps)
 
 
 def _delivered(

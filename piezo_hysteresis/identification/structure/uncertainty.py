@@ -35,9 +35,9 @@ OPEN = 0.4
 BETWEEN_SAMPLES = 0.05
 """Uncertainty of a delay that stands for a delay and a pole, or for the form of a ringing drive [samples].
 
-On the stages of `python -m benchmarks.rates` it is 0.02 to 0.07 without a pole. If the whole stage rings, the share of the
-mode is 1. A fit with another share replaces the steps of a held drive, which are not linear between samples; its delay
-is off by up to 0.12 samples per unit of the share.
+On the stages of `python -m benchmarks.rates` it is 0.02 to 0.07 without a pole. If the whole stage rings, the share of
+the mode is 1. A fit with another share replaces the steps of a held drive, which are not linear between samples; its
+delay is off by up to 0.12 samples per unit of the share.
 """
 NO_POLE = 1e-6
 """Largest pole that counts as none: a fit that would need a negative one ends here."""
