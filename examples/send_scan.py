@@ -12,26 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Send the stage along a scan [m] from any lab software: `python send_scan.py --ros-args -r __ns:=/stage_x`."""
+"""Send the stage along a scan [m] from any lab software: `python send_scan.py --ros-args -r __ns:=/stage_x`.
 
-import array
+Both fields lie on the same bytes: one says what they are, the other gives the name of the phase.
+"""
 
 import numpy as np
 import rclpy
 from rclpy.duration import Duration
 from sensor_msgs.msg import PointCloud2, PointField
 
-wanted = 10e-6 + 5e-6 * np.sin(2 * np.pi * 10.0 * 20e-6 * np.arange(50_000))  # m: 10 Hz for 1 s at the driver's 20 µs
+path = 10e-6 + 5e-6 * np.sin(2 * np.pi * 10.0 * 20e-6 * np.arange(50_000))  # m: 10 Hz for 1 s at the driver's 20 µs
+fields = [PointField(name=name, datatype=PointField.FLOAT64, count=1) for name in ("displacement", "phase:my_scan")]
+scan = PointCloud2(height=1, width=path.size, fields=fields, point_step=8, row_step=path.nbytes, data=path.tobytes())
 rclpy.init()
 node = rclpy.create_node("send_scan")
 publisher = node.create_publisher(PointCloud2, "trajectory", 10)
 while not publisher.get_subscription_count():  # until the compensation node is found
     rclpy.spin_once(node, timeout_sec=0.1)
-scan = PointCloud2(height=1, width=wanted.size, point_step=8, row_step=8 * wanted.size, is_dense=True)
-scan.fields = [
-    PointField(name=name, offset=0, datatype=PointField.FLOAT64, count=1)
-    for name in ("displacement", "phase:my_scan")  # the same bytes: what they are, and the name of the phase
-]
-scan.data = array.array("B", wanted.tobytes())
 publisher.publish(scan)
 publisher.wait_for_all_acked(Duration(seconds=5.0))

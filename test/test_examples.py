@@ -14,6 +14,7 @@
 
 """The examples that need no stage."""
 
+import ast
 import runpy
 import subprocess
 import sys
@@ -56,3 +57,9 @@ def test_hide_effect_prints_no_answer_and_writes_the_plant_of_the_seed(tmp_path)
 def test_own_stage(capsys):
     runpy.run_path(str(EXAMPLES / "own_stage.py"), run_name="__main__")
     assert capsys.readouterr().out == "50 samples, 23.5 µm, 0 V at the end\n"
+
+
+def test_ten_lines_send_a_scan():
+    body = ast.parse((EXAMPLES / "send_scan.py").read_text()).body
+    lines = [node for node in body if not isinstance(node, ast.Import | ast.ImportFrom)][1:]  # without the docstring
+    assert sum((node.end_lineno or 0) - node.lineno + 1 for node in lines) == 10
