@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ...blocks.kernel import kernel
 from ...record import Samples
+from ...turning_points import find_turns as plain_find_turns
 
 SWING = 0.005
 """A turning point counts if the drive goes back by this share of its range."""
@@ -36,6 +37,8 @@ SHORTEST = 8
 """Smallest number of samples in a swing whose duration is known well enough."""
 HARMONICS = 8.0
 """Largest ratio of bandwidth and rate of a sine or a triangle; a sequence of steps has a larger one."""
+find_turns = kernel(plain_find_turns)
+"""`turning_points.find_turns`, compiled."""
 
 
 def is_row_of_waves(voltage: Samples, sample_period: float, bandwidth: float) -> bool:
@@ -60,7 +63,7 @@ def is_row_of_waves(voltage: Samples, sample_period: float, bandwidth: float) ->
     (True, False)
     """
     turns = np.empty(voltage.size, np.int64)
-    count = find_turns(voltage, SWING * float(np.ptp(voltage)), turns)
+    count = find_turns(voltage, SWING * float(np.ptp(voltage)), False, turns)
     if count <= FEWEST:
         return False
     rates, covered, shortest = _rows(np.diff(turns[:count]))
@@ -82,28 +85,3 @@ def _rows(sizes: NDArray[np.int64]) -> tuple[int, int, int]:
             shortest = min(shortest, sizes[first])
         first = i
     return rates, covered, shortest
-
-
-@kernel
-def find_turns(u: Samples, least: float, turns: NDArray[np.int64]) -> int:
-    """Write the indices at which u (n,) turns back by more than `least` to turns (n,); returns their number."""
-    count = 0
-    low, high, at_low, at_high, direction = u[0], u[0], 0, 0, 0
-    for i in range(u.size):
-        if u[i] > high:
-            high, at_high = u[i], i
-        if u[i] < low:
-            low, at_low = u[i], i
-        if direction >= 0 and high - u[i] > least:
-            if direction > 0:
-                turns[count] = at_high
-                count += 1
-            direction, low, at_low = -1, u[i], i
-            high, at_high = u[i], i
-        elif direction <= 0 and u[i] - low > least:
-            if direction < 0:
-                turns[count] = at_low
-                count += 1
-            direction, high, at_high = 1, u[i], i
-            low, at_low = u[i], i
-    return count

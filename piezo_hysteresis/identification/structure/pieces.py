@@ -130,7 +130,7 @@ def _loops(record: Record, u: Samples, largest: float) -> list[tuple[int, int, i
     if not u.size:
         return []
     turns = np.empty(u.size, np.int64)
-    count = find_turns(u, SWING * largest, turns)
+    count = find_turns(u, SWING * largest, False, turns)
     edges = np.concatenate((turns[:count], [u.size - 1]))
     starts = np.concatenate(([0], edges[:-1]))
     times = np.maximum(edges - starts, 1) * record.sample_period

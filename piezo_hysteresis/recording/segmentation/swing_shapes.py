@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Samples
+from ...turning_points import find_turns
 
 COARSEST = 40_000
 """Largest number of samples in which turning points are searched one by one."""
@@ -40,28 +41,24 @@ _LARGEST_STEP = 6.0
 
 
 def turning_points(voltage: Samples, least_swing: float) -> NDArray[np.int64]:
-    """Positions of the first sample, of every reversal by at least `least_swing` [V], and of the last sample."""
-    positions = np.arange(voltage.size)
+    """Positions of the first sample, of every reversal by at least `least_swing` [V], and of the last sample.
+
+    The first swing begins at the first sample. Of a long drive only the smallest and the largest value of every block
+    are examined, because a recording is read without the compiler.
+    """
     if voltage.size > COARSEST:
         length = 2 * voltage.size // COARSEST
         blocks = voltage[: voltage.size // length * length].reshape(-1, length)
         extremes = np.stack((blocks.argmin(axis=1), blocks.argmax(axis=1)), axis=1)
         extremes.sort(axis=1)
-        positions = np.append((extremes + length * np.arange(len(blocks))[:, None]).ravel(), voltage.size - 1)
-    found = [0]
-    candidate, direction = 0, 0
-    values = voltage.tolist() if voltage.size <= COARSEST else None
-    for position in positions.tolist():
-        value = values[position] if values else voltage[position]
-        best = values[candidate] if values else voltage[candidate]
-        if direction == 0 and abs(value - best) >= least_swing:
-            direction, candidate = (1 if value > best else -1), position
-        elif direction and (value - best) * direction > 0:
-            candidate = position
-        elif direction and (best - value) * direction >= least_swing:
-            found.append(candidate)
-            direction, candidate = -direction, position
-    return np.array([*found, voltage.size - 1])
+        inner = (extremes + length * np.arange(len(blocks))[:, None]).ravel()
+        positions = np.concatenate(([0], inner, [voltage.size - 1]))
+    else:
+        positions = np.arange(voltage.size)
+    turns = np.zeros(positions.size, np.int64)
+    more_than = np.nextafter(least_swing, 0.0)
+    count = find_turns(voltage[positions].tolist(), more_than, True, turns)
+    return np.concatenate(([0], positions[turns[:count]], [voltage.size - 1]))
 
 
 def swing_shapes(voltage: Samples, turns: NDArray[np.int64]) -> NDArray[np.int8]:
