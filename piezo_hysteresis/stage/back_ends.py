@@ -14,54 +14,31 @@
 
 """`BACK_ENDS`: every kind of stage that a driver can open, by the value of the driver's parameter `stage`.
 
-To support another device, add a folder beside this file that exports PARAMETERS and `open`, and a line to `BACK_ENDS`.
+To support another device, add a folder beside this file whose `__init__.py` exports a `BackEnd` as ``BACK_END``. It is
+found here without being listed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any
 
 from ..errors import ParameterError
-from ..parameter import Row
-from . import daqmx, gcs2, replay, simulated
-from .opening import Opening
+from .opening import BackEnd, Opening
 from .stage import Stage
 
 
-@dataclass(frozen=True, slots=True)
-class BackEnd:
-    """One kind of stage.
-
-    Parameters
-    ----------
-    rows : tuple of Parameter or Setting
-        ROS parameters of the stage, declared under the prefix ``"<word>."``.
-    open : callable
-        Makes the stage from the values of the rows and an `Opening`.
-    is_device : bool
-        True for hardware. It is locked by the name of the device and runs in real time.
-    has_keeper : bool
-        True if a second process can bring the device to its safe voltage.
-    keeper_ends_driver : bool
-        True if that process can do so only after the driver has ended, because the device serves one process at a time.
-    """
-
-    rows: tuple[Row, ...]
-    open: Callable[[Mapping[str, Any], Opening], Stage]
-    is_device: bool
-    has_keeper: bool = False
-    keeper_ends_driver: bool = False
+def _found() -> list[BackEnd]:
+    """The back end of every folder that exports one."""
+    folders = [import_module(f"{__package__}.{f.name}") for f in iter_modules([str(Path(__file__).parent)]) if f.ispkg]
+    return [folder.BACK_END for folder in folders if hasattr(folder, "BACK_END")]
 
 
-BACK_ENDS: Mapping[str, BackEnd] = {
-    "simulated": BackEnd(simulated.PARAMETERS, simulated.open, is_device=False),
-    "replay": BackEnd(replay.PARAMETERS, replay.open, is_device=False),
-    "gcs2": BackEnd(gcs2.PARAMETERS, gcs2.open, is_device=True, has_keeper=True),
-    "nidaqmx": BackEnd(daqmx.PARAMETERS, daqmx.open, is_device=True, has_keeper=True, keeper_ends_driver=True),
-}
-"""Every back end by the value of the parameter `stage`."""
+BACK_ENDS: Mapping[str, BackEnd] = {b.word: b for b in sorted(_found(), key=lambda b: (b.is_device, b.word))}
+"""Every back end by the value of the parameter `stage`; devices come last."""
 
 
 def open_stage(word: str, values: Mapping[str, Any], opening: Opening) -> Stage:

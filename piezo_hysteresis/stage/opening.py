@@ -12,15 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Opening`: how a driver opens a stage, in addition to the values of its parameters."""
+"""`BackEnd`: a kind of stage that a driver can open. `Opening`: what it needs besides the values of its parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ..errors import StageError
+from ..parameter import Row
 from ..record import Record
+from .stage import Stage
 
 
 def _no_reader(path: str) -> Iterable[Record]:
@@ -44,3 +47,31 @@ class Opening:
     sample_period: float = 0.0
     real_time_factor: float = 1.0
     read: Callable[[str], Iterable[Record]] = _no_reader
+
+
+@dataclass(frozen=True, slots=True)
+class BackEnd:
+    """One kind of stage, as a folder of `stage` exports it under the name ``BACK_END``.
+
+    Parameters
+    ----------
+    word : str
+        Value of the driver's parameter `stage` that chooses it.
+    rows : tuple of Parameter or Setting
+        ROS parameters of the stage, declared under the prefix ``"<word>."``.
+    open : callable
+        Makes the stage from the values of the rows and an `Opening`.
+    is_device : bool
+        True for hardware. It is locked by the name of the device and runs in real time.
+    has_keeper : bool
+        True if a second process can bring the device to its safe voltage.
+    keeper_ends_driver : bool
+        True if that process can do so only after the driver has ended, because the device serves one process at a time.
+    """
+
+    word: str
+    rows: tuple[Row, ...]
+    open: Callable[[Mapping[str, Any], Opening], Stage]
+    is_device: bool
+    has_keeper: bool = False
+    keeper_ends_driver: bool = False

@@ -22,6 +22,7 @@ import pytest
 
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.stage import back_ends
+from piezo_hysteresis.stage.opening import BackEnd
 from piezo_hysteresis.stage.simulated import SimulatedStage
 from piezo_hysteresis.stage.stage import Stage, StreamingStage
 
@@ -42,7 +43,7 @@ def test_the_example_is_short_and_whole(lab, monkeypatch):
     def opened(*_):
         return own_stage("bench 3", device.set_voltage, device.read_displacement, voltage_max=10.0, max_slew_rate=2e3)
 
-    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", back_ends.BackEnd((), opened, is_device=True))
+    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", BackEnd("simulated", (), opened, is_device=True))
     node = lab.add(DriverNode, discovery_time=0.0, sample_period=PERIOD)
     lab.do(node.begin)
     samples, statuses = lab.streaming(), lab.statuses()

@@ -18,6 +18,10 @@
 ``loop_back`` measures the delay of the card alone. The optional package ``nidaqmx[grpc]`` is needed.
 """
 
+from ..opening import BackEnd
 from .back_end import PARAMETERS, open
 
-__all__ = ["PARAMETERS", "open"]
+__all__ = ["BACK_END", "PARAMETERS", "open"]
+
+BACK_END = BackEnd("nidaqmx", PARAMETERS, open, is_device=True, has_keeper=True, keeper_ends_driver=True)
+"""Found by `back_ends`."""

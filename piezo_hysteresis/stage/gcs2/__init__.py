@@ -19,6 +19,10 @@ sends commands to one axis and reads its answers. ``client`` knows the syntax an
 link, and ``array_answer`` the tables of numbers.
 """
 
+from ..opening import BackEnd
 from .back_end import PARAMETERS, open
 
-__all__ = ["PARAMETERS", "open"]
+__all__ = ["BACK_END", "PARAMETERS", "open"]
+
+BACK_END = BackEnd("gcs2", PARAMETERS, open, is_device=True, has_keeper=True)
+"""Found by `back_ends`."""

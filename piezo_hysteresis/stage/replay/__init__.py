@@ -12,9 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A recording in place of a device, and how a driver opens it: PARAMETERS and `open`."""
+"""A recording in place of a device, and how a driver opens it."""
 
+from ..opening import BackEnd
 from .back_end import PARAMETERS, open
 from .stage import ReplayStage
 
-__all__ = ["PARAMETERS", "ReplayStage", "open"]
+__all__ = ["BACK_END", "PARAMETERS", "ReplayStage", "open"]
+
+BACK_END = BackEnd("replay", PARAMETERS, open, is_device=False)
+"""Found by `back_ends`."""

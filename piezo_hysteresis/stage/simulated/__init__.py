@@ -12,9 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Simulated stages, and how a driver opens one: PARAMETERS and `open`."""
+"""Simulated stages, and how a driver opens one."""
 
+from ..opening import BackEnd
 from .back_end import PARAMETERS, open
 from .stages import SimulatedMemoryStage, SimulatedStage
 
-__all__ = ["PARAMETERS", "SimulatedMemoryStage", "SimulatedStage", "open"]
+__all__ = ["BACK_END", "PARAMETERS", "SimulatedMemoryStage", "SimulatedStage", "open"]
+
+BACK_END = BackEnd("simulated", PARAMETERS, open, is_device=False)
+"""Found by `back_ends`."""

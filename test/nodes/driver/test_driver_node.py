@@ -30,6 +30,7 @@ from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import write
 from piezo_hysteresis.stage import back_ends
+from piezo_hysteresis.stage.opening import BackEnd
 
 from ...acquisition.witness import Witness
 
@@ -171,7 +172,7 @@ def test_a_failing_stage_is_made_safe_reported_and_can_be_tried_again(lab, monke
     """In the process of the test, since no real stage fails when asked to."""
     stages = [Witness(1e-3, 100.0, fails_at=5), Witness(1e-3, 100.0)]
     opened = iter(stages)
-    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", back_ends.BackEnd((), lambda *_: next(opened), True))
+    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", BackEnd("simulated", (), lambda *_: next(opened), True))
     reported = lab.diagnostics()
     node = lab.add(DriverNode, discovery_time=0.0, ramp_rate=50.0)
     node.begin()

@@ -23,6 +23,7 @@ from std_srvs.srv import Trigger
 from piezo_hysteresis.nodes.driver import commands
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.stage import back_ends
+from piezo_hysteresis.stage.opening import BackEnd
 
 from ...acquisition.witness import Witness
 
@@ -34,7 +35,7 @@ PERIOD = 1e-3
 def test_a_stop_in_the_middle_of_a_large_command_acts_before_it_is_decoded(lab, monkeypatch):
     """The thread that decodes commands stands still inside one, and others wait behind it, when the stop comes."""
     stage, decoding, go_on = Witness(PERIOD, 1e6), threading.Event(), threading.Event()
-    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", back_ends.BackEnd((), lambda *_: stage, is_device=True))
+    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", BackEnd("simulated", (), lambda *_: stage, is_device=True))
     node = lab.add(DriverNode, discovery_time=0.0, ramp_rate=50.0)
     lab.do(node.begin)
     other = lab.second_node("operator")

@@ -28,6 +28,7 @@ from piezo_hysteresis.nodes.identification.driver_client import DriverClient
 from piezo_hysteresis.nodes.identification.protocol_runner import run_protocol
 from piezo_hysteresis.recording import read
 from piezo_hysteresis.stage import back_ends
+from piezo_hysteresis.stage.opening import BackEnd
 
 from ...acquisition.witness import Witness
 
@@ -40,7 +41,7 @@ PERIOD = 1e-3
 def stage(monkeypatch):
     """A stage that notes what becomes of it, driven as a device."""
     stage = Witness(PERIOD, 1e6)
-    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", back_ends.BackEnd((), lambda *_: stage, is_device=True))
+    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", BackEnd("simulated", (), lambda *_: stage, is_device=True))
     return stage
 
 
