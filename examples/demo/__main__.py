@@ -71,7 +71,7 @@ class Demo:
         self.begin = time.monotonic()
         self.parts: dict[str, NDArray] = probe(LIMITS)
         self.traces: dict[str, Trace] = {}
-        self.verdict = ""
+        self.conclusion = ""
         self.scan: Scan | None = None
 
     def say(self, text: str) -> None:
@@ -169,8 +169,8 @@ class Demo:
 
         count = len(bench.models)
         values = self.run_job(bench, "diagnose")
-        self.verdict = values["verdict"]
-        self.say(f"[bold]verdict: {self.verdict}[/bold]")
+        self.conclusion = values["conclusion"]
+        self.say(f"[bold]verdict: {values['verdict']}[/bold]")
         self.look(bench, "extended", bench.new_model(count))
         self.scan.follow("extended model")
         self.scan.learn("learning")
@@ -195,7 +195,7 @@ class Demo:
         with (self.folder / "plant.yaml").open() as plant:
             self.say(f"[bold]the plant file opens: {plant.readline().removeprefix('# ').strip()}[/bold]")
         self.say("like every simulated stage it also has an amplifier with a pole of its own, at 10 kHz")
-        if self.verdict.startswith("nothing_missing"):
+        if self.conclusion == "nothing_missing":
             self.say("the identified model had taken it in already: its residual was at the noise before the search")
 
 

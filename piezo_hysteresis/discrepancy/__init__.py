@@ -22,7 +22,7 @@ runs them all.
 from __future__ import annotations
 
 from .diagnose import diagnose
-from .diagnosis import Diagnosis, Verdict
+from .diagnosis import Conclusion, Diagnosis, Verdict
 from .gap import Gap, measure_gap
 from .residual.localise import ResidualShare, localise
 from .residual.noise_floor import floors, noise_floors, stroke
@@ -30,6 +30,7 @@ from .search.selection import select
 from .search.selection_result import Selection
 
 __all__ = [
+    "Conclusion",
     "Diagnosis",
     "Gap",
     "ResidualShare",

@@ -32,7 +32,7 @@ from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection_result import Selection
 from .search.training_data import TrainingData
 from .unnamed.offer import offered
-from .verdict import is_explained, is_makeshift, verdict_of
+from .verdict import conclusion_of, is_explained, is_makeshift
 
 NOISY, WORTHWHILE = 1.1, 0.95
 """Ratio of the cost to the cost of noise from which the last fit is restarted, and the largest ratio of the new cost to
@@ -84,10 +84,10 @@ def concluded(
     fitted = replace(final_training_data, records=whole)
     final = with_form_uncertainty(final, fitted, setup.whole_noise, setup.span)
     progress("next experiment", 0.95)
-    verdict, reason = verdict_of(selection, named, falls, gap)
-    is_unexplained = verdict is Verdict.UNKNOWN and selection.in_time
+    conclusion, reason = conclusion_of(selection, named, falls, gap)
+    is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time
     return Diagnosis(
-        verdict=verdict,
+        conclusion=conclusion,
         reason=reason,
         model=stating(final.stated_model, gap.live, setup.span),
         baseline=stating(first.stated_model, gap.before, setup.span),

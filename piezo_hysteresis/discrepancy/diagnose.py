@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,7 +28,8 @@ from ..identification.fit.fit import Progress
 from ..identification.one_core import on_one_core
 from ..model.model import Model
 from ..record import Experiment
-from .diagnosis import Diagnosis
+from .changes.same_stage import UNCHANGED
+from .diagnosis import Conclusion, Diagnosis, Verdict
 from .passes import PASSES, DiagnosisState, subtract_explicit_steps
 
 
@@ -82,6 +84,14 @@ def diagnose(
         for run in (p for p in PASSES if explicit_step or p is not subtract_explicit_steps):
             found = run(state)
             if isinstance(found, Diagnosis):
-                return found
+                return _compared(found)
             state = found
     raise IdentificationError("diagnose: got no answer from the last pass, expected a diagnosis")
+
+
+def _compared(found: Diagnosis) -> Diagnosis:
+    """Without a verdict, what is known of a given model is that nothing has changed since it was identified."""
+    unchanged = any(n.kind == UNCHANGED for n in found.experiment.notices)
+    if unchanged and found.verdict is Verdict.UNKNOWN:
+        return replace(found, conclusion=Conclusion.NOTHING_CHANGED)
+    return found

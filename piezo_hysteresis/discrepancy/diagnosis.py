@@ -45,14 +45,37 @@ class Verdict(StrEnum):
     UNKNOWN = "unknown"
 
 
+class Conclusion(StrEnum):
+    """What the diagnosis found: the verdict, and what it rests on. The headline of every report follows from it."""
+
+    MISSING_EFFECT = "missing_effect"
+    CHANGED_PARAMETER = "changed_parameter"
+    NOTHING_MISSING = "nothing_missing"
+    NOTHING_CHANGED = "nothing_changed"
+    TIME_LIMIT = "time_limit"
+    INSUFFICIENT_DATA = "insufficient_data"
+    UNEXPLAINED_GAP = "unexplained_gap"
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict that this conclusion belongs to.
+
+        >>> str(Conclusion.CHANGED_PARAMETER.verdict), str(Conclusion.TIME_LIMIT.verdict)
+        ('named', 'unknown')
+        """
+        if self in (Conclusion.MISSING_EFFECT, Conclusion.CHANGED_PARAMETER):
+            return Verdict.NAMED
+        return Verdict.NOTHING_MISSING if self is Conclusion.NOTHING_MISSING else Verdict.UNKNOWN
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Diagnosis(Pictured):
     """Where a model is wrong, which effect is missing, and the gap after adding it.
 
     Parameters
     ----------
-    verdict : Verdict
-        Named, nothing missing, or unknown.
+    conclusion : Conclusion
+        What was found; the verdict (named, nothing missing, or unknown) follows from it.
     reason : str
         The verdict in one sentence.
     model : Model
@@ -78,7 +101,7 @@ class Diagnosis(Pictured):
         After "unknown": the best correction without a name, accepted or refused. It is not part of `model`.
     """
 
-    verdict: Verdict
+    conclusion: Conclusion
     reason: str
     model: Model | None
     baseline: Model | None
@@ -90,6 +113,11 @@ class Diagnosis(Pictured):
     experiment: Experiment
     change: ParameterChange | None = None
     correction: Correction | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """Named, nothing missing, or unknown."""
+        return self.conclusion.verdict
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -182,6 +210,7 @@ class Diagnosis(Pictured):
         return {
             "schema": SCHEMA,
             "verdict": str(self.verdict),
+            "conclusion": str(self.conclusion),
             "reason": self.reason,
             "effects": self.effects(),
             "where": [{"axis": p.axis, "share": round(p.share, 4), "detail": p.detail} for p in self.where],

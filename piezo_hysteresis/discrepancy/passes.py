@@ -32,7 +32,7 @@ from ..model.model import Model
 from ..record import CONDITIONING, Experiment, Notice
 from .changes.same_stage import same_stage
 from .conclusion import concluded
-from .diagnosis import Diagnosis, Verdict
+from .diagnosis import Conclusion, Diagnosis
 from .residual.explicit_step import KIND, explicit_model, without_steps
 from .residual.localise import ResidualShare, localise
 from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
@@ -158,7 +158,7 @@ def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
     if not severe:
         return state
     reason = f"No verdict is possible, because of the data: {severe[0].message}."
-    return Diagnosis(Verdict.UNKNOWN, reason, model, model, None, None, (), None, None, experiment)
+    return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, None, None, (), None, None, experiment)
 
 
 def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosis:

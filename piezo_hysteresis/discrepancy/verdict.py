@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..effects import ExtraResonance
-from .diagnosis import Verdict
+from .diagnosis import Conclusion
 from .gap import Gap
 from .search.cross_validation import ADEQUATE
 from .search.selection_result import Selection
@@ -57,8 +57,8 @@ def not_predicted_live(name: str, live: float) -> str:
     )
 
 
-def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Verdict, str]:
-    """Named, nothing missing, or unknown, and the reason.
+def conclusion_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Conclusion, str]:
+    """What the search found, and the reason.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
         Free-run error before and after.
     """
     if not selection.in_time and not named:
-        return Verdict.UNKNOWN, "No effect is named: the time limit ended the search before an answer was found."
+        return Conclusion.TIME_LIMIT, "No effect is named: the time limit ended the search before an answer was found."
     names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
     explain = "explain" if len(selection.accepted) > 1 else "explains"
     closed = selection.explained(selection.score)
@@ -86,15 +86,18 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
         fitted = [s.best.effect.public_name() for s in selection.accepted if not s.best.effect.is_predicted_live()]
         if not selection.in_time:
             said += " The time limit ended the search; more effects may be missing."
-        return Verdict.NAMED, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
+        return Conclusion.MISSING_EFFECT, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
     many = gap.unseen and len(gap.per_phase) >= FEWEST_RECORDS
     foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
     if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):
         if gap.after > UNFORESEEN * gap.floor:
             message = f"the error on the test records is {gap.after / gap.floor:.1f} times the noise floor"
-            return Verdict.UNKNOWN, f"No effect is named: nothing is missing on the training records, but {message}."
+            return (
+                Conclusion.INSUFFICIENT_DATA,
+                f"No effect is named: nothing is missing on the training records, but {message}.",
+            )
         return (
-            Verdict.NOTHING_MISSING,
+            Conclusion.NOTHING_MISSING,
             "No effect is missing: the error does not exceed the noise and the adequacy floor of 0.03 % of the range.",
         )
     if is_explained(selection) and is_makeshift(selection):
@@ -102,9 +105,12 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
             f"{names} {explain} only {100 * closed:.0f} % of the gap, and a linear effect that is really "
             "there explains all of it"
         )
-        return Verdict.UNKNOWN, f"No effect is named: {message}."
+        return Conclusion.UNEXPLAINED_GAP, f"No effect is named: {message}."
     if selection.accepted and not falls:
-        return Verdict.UNKNOWN, f"No effect is named: {names} improves the training records, but not the test records."
+        return (
+            Conclusion.INSUFFICIENT_DATA,
+            f"No effect is named: {names} improves the training records, but not the test records.",
+        )
     message = ""
     if selection.steps:
         closest = selection.steps[0].best
@@ -113,4 +119,4 @@ def verdict_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tupl
         message = (
             f"; the closest effect is {closest.effect.public_name()}, which explains {share:.0f} % of the gap{why}"
         )
-    return Verdict.UNKNOWN, f"Something is missing that no effect of the catalogue explains{message}."
+    return Conclusion.UNEXPLAINED_GAP, f"Something is missing that no effect of the catalogue explains{message}."

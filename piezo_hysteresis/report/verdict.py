@@ -26,6 +26,18 @@ from .words import nanometre
 ENOUGH = 1.5
 """Mean square of error over noise floor up to which nothing is missing."""
 
+HEADLINES = {
+    "missing_effect": "Missing effect: {names}",
+    "changed_parameter": "A parameter of the model has changed: {names}",
+    "nothing_missing": "Nothing is missing beyond the noise",
+    "nothing_changed": "Nothing has changed since the model was identified; what it does not contain is not determined",
+    "time_limit": "The time limit ended the search before a verdict",
+    "insufficient_data": "The data do not allow a verdict",
+    "unexplained_gap": "Something is missing, but these data do not determine what it is",
+    "": "No effect is named",
+}
+"""Headline of every conclusion in the answer of a diagnosis; the last one is for "unknown" in older files."""
+
 
 @dataclass(frozen=True, slots=True)
 class VerdictText:
@@ -118,22 +130,20 @@ def sentence(text: str) -> str:
 
 
 def _headline(answer: Mapping[str, Any]) -> str:
-    names = [effect["name"].replace("_", " ") for effect in answer.get("effects", ())]
-    if any(effect.get("changed_parameter") for effect in answer.get("effects", ())):
-        return f"A parameter of the model has changed: {names[0]}"
-    if answer["verdict"] == "named" and names:
-        return (
-            f"Missing effect: {' and '.join(names)}" if len(names) == 1 else f"Missing effects: {' and '.join(names)}"
-        )
+    effects = answer.get("effects", ())
+    names = " and ".join(effect["name"].replace("_", " ") for effect in effects)
+    conclusion = answer.get("conclusion") or _conclusion(answer)
+    headline = HEADLINES.get(conclusion, HEADLINES[""]).format(names=names)
+    return headline.replace("Missing effect:", "Missing effects:") if len(effects) > 1 else headline
+
+
+def _conclusion(answer: Mapping[str, Any]) -> str:
+    """The conclusion of an answer that does not state it, as those of older versions."""
     if answer["verdict"] == "nothing_missing":
-        return "Nothing is missing beyond the noise"
-    if any(finding["kind"] == "unchanged" for finding in answer.get("data_quality", ())):
-        return "Nothing has changed since the model was identified; what it does not contain is not determined"
-    if str(answer.get("reason", "")).startswith("No effect is named: the time limit"):
-        return "The time limit ended the search before a verdict"
-    if str(answer.get("reason", "")).startswith(("No verdict", "No name", "No effect is named")):
-        return "The data do not allow a verdict"
-    return "Something is missing, but these data do not determine what it is"
+        return "nothing_missing"
+    if any(effect.get("changed_parameter") for effect in answer.get("effects", ())):
+        return "changed_parameter"
+    return "missing_effect" if answer["verdict"] == "named" else ""
 
 
 def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.cli import diagnose as command
-from piezo_hysteresis.discrepancy import Diagnosis, Gap, Verdict
+from piezo_hysteresis.discrepancy import Conclusion, Diagnosis, Gap
 from piezo_hysteresis.discrepancy.unnamed.correction import Correction
 from piezo_hysteresis.effects import Arx, BoucWen, UnnamedPositionMap
 from piezo_hysteresis.model import model_file
@@ -43,8 +43,8 @@ def answered(correction: Correction, tmp_path: Path, monkeypatch: pytest.MonkeyP
     """The exit code of the command for a diagnosis with this correction, and the file that was asked for."""
     record = Record(np.sin(np.arange(9.0)), 1e-6 * np.arange(9.0), 1e-3, phase="sine_1hz")
     found = Diagnosis(
-        Verdict.UNKNOWN, "Something is missing.", PLAIN, PLAIN, None, None, (), None, None, Experiment((record,)),
-        correction=correction,
+        Conclusion.UNEXPLAINED_GAP, "Something is missing.", PLAIN, PLAIN, None, None, (), None, None,
+        Experiment((record,)), correction=correction,
     )  # fmt: skip
     monkeypatch.setattr(command, "diagnose", lambda *_, **__: found)
     monkeypatch.setattr(command.reading_options, "read", lambda _: found.experiment)

@@ -23,7 +23,7 @@ import pytest
 
 from benchmarks.naming_cases import UNKNOWN, Case
 from benchmarks.naming_experiments import ProtocolVariant
-from piezo_hysteresis.discrepancy import Verdict, diagnose
+from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
 from piezo_hysteresis.effects import BY_NAME, CATALOGUE
 from piezo_hysteresis.errors import IdentificationError, ParameterError
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
@@ -83,7 +83,7 @@ def test_an_effect_that_only_test_records_show_is_not_ignored():
         for i, r in enumerate(experiment)
     )
     found = diagnose(replace(experiment, records=records))
-    assert found.verdict is Verdict.UNKNOWN
+    assert found.conclusion is Conclusion.INSUFFICIENT_DATA
     assert "test records" in found.reason
 
 
@@ -97,7 +97,7 @@ def test_without_the_true_family_no_other_effect_is_named():
 def test_the_answer_has_its_stable_form():
     answer = json.loads(json.dumps(answered(hidden("creep")).answer("better.yaml"), allow_nan=False))
     assert answer["schema"] == 1
-    assert answer["verdict"] == "named"
+    assert (answer["verdict"], answer["conclusion"]) == ("named", "missing_effect")
     (effect,) = answer["effects"]
     assert effect["name"] == "creep" and effect["family"] == "creep"
     assert isinstance(effect["member_certain"], bool)
@@ -166,13 +166,13 @@ def test_a_stage_that_was_not_driven_is_refused():
 def test_no_effect_is_named_if_its_twin_was_not_a_candidate():
     library = [e for e in CATALOGUE if e.name != "sensor_nonlinearity"]
     found = diagnose(hidden("softening", plant="independent").experiment(), effects=library)
-    assert found.verdict is Verdict.UNKNOWN
+    assert found.conclusion is Conclusion.UNEXPLAINED_GAP
     assert "the closest effect is softening" in found.reason and "sensor_nonlinearity" in found.reason
 
 
 def test_a_search_that_runs_out_of_time_gives_the_best_answer_so_far():
     found = diagnose(hidden("creep").experiment(), time_limit=1e-9)
-    assert found.verdict is Verdict.UNKNOWN
+    assert found.conclusion is Conclusion.TIME_LIMIT
     assert "the time limit ended the search" in found.reason
     assert found.gap.after == pytest.approx(found.gap.before)
     with pytest.raises(ParameterError, match="more than 0 s"):

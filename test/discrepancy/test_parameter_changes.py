@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
-from piezo_hysteresis.discrepancy import Verdict, diagnose
+from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
 from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change
 from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy.changes.same_stage import sentence_of
@@ -127,11 +127,12 @@ def test_diagnose_names_a_filter_and_its_model_predicts_better(model, another_da
 
 
 def test_diagnose_says_that_nothing_has_changed(model, another_day):
-    def said(stage):
-        return [n for n in diagnose(played(stage), model).experiment.notices if n.kind == "unchanged"]
-
-    assert len(said(another_day)) == 1
-    assert not said(replace(another_day, filter_pole=2e-3))
+    found = diagnose(played(another_day), model)
+    assert [n.kind for n in found.experiment.notices].count("unchanged") == 1
+    assert found.conclusion is Conclusion.NOTHING_CHANGED
+    later = diagnose(played(replace(another_day, filter_pole=2e-3)), model)
+    assert all(n.kind != "unchanged" for n in later.experiment.notices)
+    assert later.conclusion is Conclusion.CHANGED_PARAMETER
 
 
 def test_one_new_record_recalibrates_a_model(model):

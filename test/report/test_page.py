@@ -25,6 +25,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from piezo_hysteresis.discrepancy import Conclusion
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.report.figures.diagnosis.correction import correction
 from piezo_hysteresis.report.tables.answer_tables import (
@@ -34,9 +35,12 @@ from piezo_hysteresis.report.tables.answer_tables import (
     rejection_table,
     where_table,
 )
-from piezo_hysteresis.report.verdict import answer_verdict, verdict
+from piezo_hysteresis.report.verdict import HEADLINES, answer_verdict, verdict
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
+
+EFFECT = {"name": "creep", "family": "creep", "member_certain": True, "explained_fraction": 0.97}
+"""An effect of an answer."""
 
 
 class Tags(HTMLParser):
@@ -142,19 +146,22 @@ def test_a_place_that_cannot_be_written_is_reported(drawn, saved):
     ("change", "headline"),
     [
         ({"verdict": "nothing_missing", "effects": []}, "Nothing is missing beyond the noise"),
-        ({"verdict": "unknown", "effects": []}, "Something is missing, but these data do not determine what it is"),
-        (
-            {"verdict": "unknown", "effects": [], "data_quality": [{"kind": "unchanged"}]},
-            "Nothing has changed since the model was identified; what it does not contain is not determined",
-        ),
-        (
-            {"verdict": "unknown", "effects": [], "reason": "No effect is named: the time limit ended the search."},
-            "The time limit ended the search before a verdict",
-        ),
+        ({"verdict": "unknown", "effects": []}, "No effect is named"),
+        ({"effects": [{**EFFECT, "changed_parameter": "delay"}]}, "A parameter of the model has changed: creep"),
+        ({"effects": [EFFECT, {**EFFECT, "name": "extra_delay"}]}, "Missing effects: creep and extra delay"),
     ],
 )
-def test_each_verdict_has_its_headline(comparison, answer, change, headline):
+def test_an_answer_of_an_older_version_has_a_headline(comparison, answer, change, headline):
     assert verdict(comparison, {**answer, **change}).headline == headline
+
+
+@pytest.mark.parametrize("conclusion", Conclusion)
+def test_the_conclusion_alone_decides_on_the_headline(answer, conclusion):
+    """Whatever the sentence of the reason is."""
+    stated = {**answer, "verdict": str(conclusion.verdict), "conclusion": str(conclusion), "reason": "No verdict."}
+    headline = answer_verdict(stated).headline
+    assert headline == HEADLINES[conclusion].format(names="creep")
+    assert [word for word, text in HEADLINES.items() if text.format(names="creep") == headline] == [conclusion]
 
 
 def test_without_a_diagnosis_the_verdict_gives_error_floor_and_worst_phase(comparison):

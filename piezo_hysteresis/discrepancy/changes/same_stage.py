@@ -27,7 +27,7 @@ from ...identification.fit.normal_equations import Nuisance, residuals
 from ...model.model import Model
 from ...model.provenance import data_hash
 from ...record import Experiment, Notice, Record
-from ..diagnosis import Diagnosis, Verdict
+from ..diagnosis import Conclusion, Diagnosis
 from ..gap import measure_gap
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
@@ -37,6 +37,8 @@ from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_
 
 ERROR, HASH = "free_run_error", "data_hash"
 """Keys of the provenance."""
+UNCHANGED = "unchanged"
+"""Kind of the notice that the given model is as good as on the day on which it was identified."""
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 """Units of time."""
 
@@ -67,7 +69,7 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
     try:
         if known and is_unchanged(model, records, used, limits):
             return Notice(
-                "unchanged",
+                UNCHANGED,
                 "nothing has changed since the model was identified: apart from its zero, gain and loop height, which "
                 f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; a gap was there "
                 "before",
@@ -85,7 +87,7 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
         return None
     where = localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])
     return Diagnosis(
-        verdict=Verdict.NAMED,
+        conclusion=Conclusion.CHANGED_PARAMETER,
         reason=sentence_of(change),
         model=changed,
         baseline=model,

@@ -38,14 +38,14 @@ from ...identification.structure.left_out import has_several_drives, score_left_
 from ...model.model import Model
 from ...model.provenance import provenance
 from ...record import CONDITIONING, Experiment, Notice, Record
-from ..diagnosis import Diagnosis, Verdict
+from ..diagnosis import Conclusion, Diagnosis
 from ..excitation_check import missing_excitation
 from ..gap import Gap, measure_gap, stating
 from ..next_experiment import decide
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
 from ..residual.sampling import shortened
-from ..verdict import FEWEST_RECORDS, NAMED, verdict_of
+from ..verdict import FEWEST_RECORDS, NAMED, conclusion_of
 from .baseline import with_zero
 from .candidates import loop_is_off, score_model
 from .cross_validation import ADEQUATE, Score
@@ -145,10 +145,10 @@ def diagnose_few(
     models = first, final.model
     gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), free, bool(aside))
     missing = missing_excitation([records[i] for i in used])
-    verdict, reason = _verdict(selection, steps, before, gap, len(used), missing)
+    conclusion, reason = _conclusion(selection, steps, before, gap, len(used), missing)
     delivered = replace(final.model, provenance={**final.model.provenance, **provenance(experiment, 0.0, 0.0)})
     return Diagnosis(
-        verdict=verdict,
+        conclusion=conclusion,
         reason=reason,
         model=stating(delivered, gap.live, stroke(records)),
         baseline=stating(first, gap.before, stroke(records)),
@@ -211,10 +211,10 @@ def _delivered(
     return best, extended
 
 
-def _verdict(
+def _conclusion(
     selection: Selection, decided: Sequence[Step], before: Score, gap: Gap, count: int, missing: Sequence[Notice]
-) -> tuple[Verdict, str]:
-    """The verdict and its reason."""
+) -> tuple[Conclusion, str]:
+    """The conclusion and its reason."""
     closed = explained(before.excess, selection.score.excess, selection.null)
     names = [s.best.effect.public_name() for s in selection.accepted]
     if decided and gap.falls:
@@ -224,10 +224,10 @@ def _verdict(
             f"records better that were left out of the fit; it explains {100 * closed:.0f} % of the gap."
         )
         alike = f" These data cannot distinguish {' or '.join(rivals)} from it." if rivals else ""
-        return Verdict.NAMED, said + alike
+        return Conclusion.MISSING_EFFECT, said + alike
     if count >= FEWEST_RECORDS and not decided:
         named = bool(selection.accepted) and gap.falls and closed >= NAMED
-        return verdict_of(selection, named, gap.falls, gap)
+        return conclusion_of(selection, named, gap.falls, gap)
     if before.excess <= ADEQUATE:
         message = "the error of the published model is at the noise floor, so the data cannot show further effects"
     elif names:
@@ -244,7 +244,7 @@ def _verdict(
     reason = "; ".join(
         (f"No effect is named, because {records} cannot distinguish effects", message, *(n.message for n in missing))
     )
-    return Verdict.UNKNOWN, f"{reason}."
+    return Conclusion.INSUFFICIENT_DATA, f"{reason}."
 
 
 def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Record], list[int | None]]:

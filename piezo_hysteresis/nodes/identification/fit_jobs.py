@@ -43,4 +43,6 @@ def diagnosis(path: Path, model: str, report: Report) -> Outcome:
     write_json(str(folder / "answer.json"), found.answer(model_file))
     if found.model is None:
         raise IdentificationError(found.reason)
-    return Outcome(dumps(found.model), found.summary(), f"{found.verdict}: {found.reason}")
+    return Outcome(
+        dumps(found.model), found.summary(), f"{found.verdict}: {found.reason}", conclusion=str(found.conclusion)
+    )

@@ -234,7 +234,7 @@ class IdentificationNode(GuardedNode):
         save(found, (path if path.is_dir() else path.parent) / f"{name}.yaml")
         for line in outcome.summary.splitlines():
             self.get_logger().info(line)
-        self._status.done(outcome.verdict)
+        self._status.done(outcome.verdict, outcome.conclusion)
 
     def _protocol(self, limits: DriveLimits) -> Protocol:
         values = read(self, IDENTIFICATION)

@@ -140,4 +140,5 @@ def _outcome(live: LiveDiagnosis, path: Path) -> Outcome:
     answer["live"] = live.answer()
     write_json(str(path / "answer.json"), answer)
     summary = "\n".join((live.reason(), found.summary()))
-    return Outcome(dumps(found.model), summary, f"{found.verdict}: {live.reason()} {found.reason}")
+    verdict = f"{found.verdict}: {live.reason()} {found.reason}"
+    return Outcome(dumps(found.model), summary, verdict, conclusion=str(found.conclusion))

@@ -82,10 +82,10 @@ class IdentificationStatus:
         self._node.get_logger().info(f"likely: {likely}")
         self.likely = likely
 
-    def done(self, verdict: str) -> None:
-        """Report the result."""
+    def done(self, verdict: str, conclusion: str) -> None:
+        """Report the result; `conclusion` is the stable word of a diagnosis, or empty."""
         self._node.get_logger().info(f"done: {verdict}")
-        self._show(DiagnosticStatus.OK, "done", verdict, fraction=1.0)
+        self._show(DiagnosticStatus.OK, "done", verdict, fraction=1.0, conclusion=conclusion)
 
     def failed(self, reason: str) -> None:
         """Report an error."""
@@ -97,7 +97,9 @@ class IdentificationStatus:
         self._node.get_logger().warning(f"aborted: {reason}")
         self._show(DiagnosticStatus.WARN, "aborted", reason)
 
-    def _show(self, level: bytes, state: str, reason: str, phase: str = "", fraction: float = 0.0) -> None:
+    def _show(
+        self, level: bytes, state: str, reason: str, phase: str = "", fraction: float = 0.0, conclusion: str = ""
+    ) -> None:
         status = diagnostic(
             level,
             self._name,
@@ -109,6 +111,7 @@ class IdentificationStatus:
             owner=self.owner,
             goal=self.goal,
             likely=self.likely,
+            conclusion=conclusion,
         )
         if status != self._shown:
             self._shown = status

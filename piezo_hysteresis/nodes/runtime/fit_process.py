@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from .job_process import Exchange, JobProcess, Report
@@ -35,11 +35,14 @@ class Outcome:
         Result with its uncertainties and warnings, several lines.
     verdict : str
         One line.
+    conclusion : str
+        What a diagnosis found, in one stable word (`discrepancy.Conclusion`); empty for other jobs.
     """
 
     model: str
     summary: str
     verdict: str
+    conclusion: str = field(default="", kw_only=True)
 
 
 Job = Callable[[Path, str, Report], Outcome]

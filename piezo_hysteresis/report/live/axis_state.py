@@ -31,9 +31,6 @@ from .sample_window import SampleWindow
 OK, WARN, ERROR, STALE = range(4)
 """Levels of a status, as in diagnostic_msgs/DiagnosticStatus."""
 
-VERDICTS = ("named", "nothing_missing", "unknown")
-"""Words that the verdict of a diagnosis begins with."""
-
 HISTORY = 20
 """Number of models, and of alarms, that are kept."""
 
@@ -217,7 +214,7 @@ class AxisState:
     def report_identification(self, status: Status) -> None:
         """Add a message of `status`."""
         self.identification = status
-        if status.values.get("state") == "done" and status.message.partition(":")[0] in VERDICTS:
+        if status.values.get("conclusion"):
             self.verdict = status.message
 
     def report_recalibrations(self, text: str) -> None:

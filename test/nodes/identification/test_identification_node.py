@@ -154,6 +154,7 @@ def test_from_an_unknown_stage_to_a_live_model(lab):
     identification.await_state("fitting")
     reported = identification.await_state("done", "failed", timeout=240.0)
     assert reported.message.startswith("nothing_missing: "), reported.message
+    assert values_of(reported)["conclusion"] == "nothing_missing"
     assert dumps(load(path / "diagnosis.yaml")) == dumps(from_parameters(identification.served())) == models[-1].data
     answer = read_json(str(path / "answer.json"))
     assert (answer["verdict"], answer["model"]) == ("nothing_missing", str(path / "diagnosis.yaml"))

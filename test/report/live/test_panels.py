@@ -45,3 +45,11 @@ def test_without_a_change_there_is_no_size_and_without_a_watch_no_statistic():
     assert "loop" not in shown(OK, **values)
     assert "0.22" in shown(OK, **values)
     assert "statistic" not in shown(STALE, statistic="0")
+
+
+def test_the_verdict_stays_until_the_next_diagnosis_whatever_its_words_are():
+    axis = AxisState("/stage_x")
+    for message, conclusion in (("fitted", ""), ("a new sentence", "time_limit"), ("named: not really", "")):
+        values = {"state": "done", "conclusion": conclusion}
+        axis.report_identification(Status("stage_x/identification_node", OK, message, values))
+    assert axis.verdict == "a new sentence"
