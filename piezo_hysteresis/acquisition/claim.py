@@ -61,7 +61,7 @@ class Claim:
         return is_new
 
     def renew(self, owner: str, now: float) -> bool:
-        """Renew the claim. Returns False where it has ended, so that a suspended owner learns this."""
+        """Renew the claim. Returns False where it has ended, so that an owner that was suspended finds out."""
         if not owner or owner != self.owner:
             return False
         self._heard = now

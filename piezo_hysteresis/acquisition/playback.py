@@ -128,7 +128,7 @@ class Playback:
         self._held = min(self._held + count, self._hold_limit - 1)
 
     def preview(self, count: int) -> Drive:
-        """The next `count` samples, which stay to be taken; for a device that receives its samples in advance."""
+        """The next `count` samples, without taking them; for a device that receives its samples in advance."""
         twin = copy.copy(self)
         twin._events = list(self._events)
         return twin.take(count)

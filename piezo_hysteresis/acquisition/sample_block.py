@@ -77,7 +77,7 @@ class SampleBlock:
         return replace(self, **kept)
 
     def between(self, first: int, end: int) -> SampleBlock:
-        """Samples from `first` up to but without `end`. Only a part that begins with the block can follow a gap."""
+        """Samples from `first` up to, but not including, `end`. Only the first part of a block can follow a gap."""
         kept: dict[str, Any] = {name: values[first:end] for name, values in self.columns.items()}
         return replace(self, **kept, follows_gap=self.follows_gap and first == 0)
 

@@ -46,17 +46,35 @@ DRIVER: tuple[Row, ...] = (
     Parameter(
         "max_slew_rate", "S_max", "V/s", 0.0, 0.0, 1e12, "steepest drive; 0: 0.4 of the range per sample", _SOURCE
     ),
-    Parameter("ramp_rate", "S_r", "V/s", 50.0, 1e-3, 1e9, "rate of set-points and of the way to safety", _SOURCE),
     Parameter(
-        "hold_timeout", "T_h", "s", 0.0, 0.0, 1e6, "a held voltage then gives way to the safe one; 0: never", _SOURCE
+        "ramp_rate", "S_r", "V/s", 50.0, 1e-3, 1e9, "rate of ramps to set-points and to the safe voltage", _SOURCE
     ),
-    Parameter("command_max_age", "T_c", "s", 2.0, 0.0, 1e6, "oldest command that is played", _SOURCE),
-    Parameter("claim_timeout", "T_o", "s", 10.0, 0.5, 600.0, "an owner unheard for longer has lost its claim", _SOURCE),
+    Parameter(
+        "hold_timeout",
+        "T_h",
+        "s",
+        0.0,
+        0.0,
+        1e6,
+        "time for which a voltage is held before the ramp to the safe voltage; 0: no limit",
+        _SOURCE,
+    ),
+    Parameter("command_max_age", "T_c", "s", 2.0, 0.0, 1e6, "largest age of a command that is played", _SOURCE),
+    Parameter(
+        "claim_timeout", "T_o", "s", 10.0, 0.5, 600.0, "time without a renewal after which a claim ends", _SOURCE
+    ),
     Parameter(
         "real_time_factor", "κ", "1", 1.0, 0.01, 1000.0, "speed of a simulated or replayed stage; 1: real time", _SOURCE
     ),
     Parameter(
-        "keeper_timeout", "T_k", "s", 1.0, 0.0, 60.0, "silence after which a device is made safe; 0: no keeper", _SOURCE
+        "keeper_timeout",
+        "T_k",
+        "s",
+        1.0,
+        0.0,
+        60.0,
+        "time without a heartbeat after which the keeper brings a device to its safe voltage; 0: no keeper",
+        _SOURCE,
     ),
     Setting("frame_id", "", "frame of the displacement in all headers; empty: the namespace, without one 'stage'"),
     Parameter("discovery_time", "T_d", "s", 0.5, 0.0, 30.0, "wait for another driver of the same topics", _SOURCE),
@@ -70,7 +88,9 @@ IN_FORCE: tuple[Row, ...] = (
     Parameter("voltage_max", "u_max", "V", 0.0, -math.inf, math.inf, "highest drive voltage", _SOURCE),
     Parameter("safe_voltage", "u_0", "V", 0.0, -math.inf, math.inf, "voltage of the stage at rest", _SOURCE),
     Parameter("max_slew_rate", "S_max", "V/s", 0.0, 0.0, math.inf, "steepest drive", _SOURCE),
-    Parameter("ramp_rate", "S_r", "V/s", 0.0, 0.0, math.inf, "rate of set-points and of the way to safety", _SOURCE),
+    Parameter(
+        "ramp_rate", "S_r", "V/s", 0.0, 0.0, math.inf, "rate of ramps to set-points and to the safe voltage", _SOURCE
+    ),
     Setting("stopped", False, "true after ~/stop, until ~/release"),
 )
 """Values in use while the driver is configured, with the prefix ``"in_force."``; planners read them."""

@@ -114,7 +114,7 @@ class Description:
         Raises
         ------
         StageError
-            Outside the range, or no whole multiple of `sample_period_step`.
+            If it is outside the range, or no whole multiple of `sample_period_step`.
         """
         low, high, step = self.sample_period_min, self.sample_period_max, self.sample_period_step
         inside = low * (1 - _PERIOD_TOLERANCE) <= sample_period <= high * (1 + _PERIOD_TOLERANCE)

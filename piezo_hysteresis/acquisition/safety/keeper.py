@@ -52,7 +52,7 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver makes the stage safe, and says goodbye
     line = sys.stdin.readline()
     if not line:
-        return 0  # the driver ended before it said what to open
+        return 0  # the driver ended before it named the stage
     order = json.loads(line)
     try:
         stage = _opened(order)

@@ -118,7 +118,7 @@ class PathRuns:
             If the driver refuses or stops the drive, or no samples arrive.
         """
         self._status.show("planning", f"{wanted.size} samples", name)
-        yield from self._until(lambda: self._applied().is_ready, "the model to be run over what was applied")
+        yield from self._until(lambda: self._applied().is_ready, "the model to be run over the applied voltages")
         found: Plan = yield from self._in_thread(self._pool.submit(self.planned, wanted, limits))
         self.last = (name, found)
         if not found.reachability.is_whole:
@@ -159,12 +159,12 @@ class PathRuns:
         return tracking
 
     def rounds(self, name: str, first: Plan, limits: Limits) -> Job:
-        """Play the last trajectory again, and correct it by what is measured; nobody else drives the stage meanwhile.
+        """Play the last trajectory again, corrected by the measurement; no other program drives the stage meanwhile.
 
         Raises
         ------
         StageError
-            If the stage is somebody else's, or the driver refuses or stops a round.
+            If another program has claimed the stage, or the driver refuses or stops a round.
         """
         self._driver.claim()
         try:
@@ -174,7 +174,7 @@ class PathRuns:
             self._driver.release()
 
     def _learn(self, name: str, first: Plan, limits: Limits) -> Job:
-        yield from self._until(lambda: self._applied().is_ready, "the model to be run over what was applied")
+        yield from self._until(lambda: self._applied().is_ready, "the model to be run over the applied voltages")
         applied = self._applied()
         learning = IterativeLearning(
             applied.model,
@@ -202,7 +202,7 @@ class PathRuns:
                 "learning", reason, f"{name}_{number}", first_index=index, rms=now.rms, expected=now.expected
             )
         if not learning.rounds:
-            raise StageError("the trajectory can no longer be had from where the stage is")
+            raise StageError("the trajectory can no longer be reached from the present position of the stage")
         best, last = learning.best, learning.rounds[-1]
         self.last = (name, best.plan)
         reason = ", ".join(f"{1e9 * r.rms:.1f}" for r in learning.rounds)

@@ -68,7 +68,7 @@ def described(plan: Plan) -> str:
         f"{plan.voltage.size * plan.sample_period:.3g} s, {plan.voltage.min():.3g} to {plan.voltage.max():.3g} V, "
         f"at most {slew_text(plan.largest_slew, 4)}, expected error {1e9 * expected.total:.1f} nm rms "
         f"(plan {1e9 * expected.planned:.1f} nm, {stated}), "
-        + ("all of it is reachable" if plan.reachability.is_whole else why_not(plan))
+        + ("the whole path is reachable" if plan.reachability.is_whole else why_not(plan))
     )
 
 
@@ -80,4 +80,4 @@ def why_not(plan: Plan) -> str:
         ways.append(f"moved by {1e6 * nearest.offset:+.4g} µm")
     if nearest is not None and nearest.amplitude is not None:
         ways.append(f"with {100.0 * nearest.amplitude:.4g} % of its amplitude")
-    return f"out of reach: {part}" + (f"; it becomes reachable {' or '.join(ways)}" if ways else "")
+    return f"not reachable: {part}" + (f"; it becomes reachable {' or '.join(ways)}" if ways else "")

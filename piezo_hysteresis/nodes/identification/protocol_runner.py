@@ -206,7 +206,7 @@ def _go_to_start(driver: DriverClient, phase: ProtocolPhase, progress: Progress)
         if not reason and driver.voltages >= seen + _NEWER:
             return
         if time.monotonic() > deadline:
-            why = f"{reason}; the stage was moved by somebody else" if reason else "'voltage' is silent"
+            why = f"{reason}; another program has moved the stage" if reason else "no message arrives on 'voltage'"
             raise StageError(f"phase '{phase.name}': {why}")
         yield progress
 

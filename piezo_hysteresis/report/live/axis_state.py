@@ -228,7 +228,7 @@ class AxisState:
         self.recalibrations = read_numbers(text, "topic 'recalibrations'")
 
     def follow(self, text: str) -> None:
-        """Add a model file; a file that is not acceptable is reported."""
+        """Add a model file. The reason why a file is not a model is kept in `refused_model`."""
         try:
             model = loads(text, "topic 'model'")
         except PiezoError as error:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Limits of the page's connections: neither silent nor many of them keep a visitor out, or fill the memory."""
+"""Limits of the connections to the page, so that silent or many connections keep no visitor out and fill no memory."""
 
 from __future__ import annotations
 

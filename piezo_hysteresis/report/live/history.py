@@ -56,7 +56,7 @@ class NumberHistory:
         )
 
     def show(self, numbers: Sequence[RecalibratedNumber]) -> None:
-        """Take the history of an axis, the oldest first; the same one costs nothing."""
+        """Show the history of an axis, the oldest number first. An unchanged history is not drawn again."""
         if numbers is self._numbers:
             return
         self._numbers = numbers

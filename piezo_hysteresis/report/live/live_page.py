@@ -117,7 +117,7 @@ class LivePage:
         return axes.get(str(self._axis.value))
 
     def _is_seen(self) -> bool:
-        """False for a page that was asked for, and that no window shows: yet, or any more."""
+        """False as long as no browser window shows the page: before one is connected, and after it was closed."""
         session = getattr(self._document.session_context, "session", None)
         return session is None or session.connection_count > 0
 
@@ -127,7 +127,7 @@ class LivePage:
         self._controls.poll()
         axis = self._state()
         if axis is None:
-            self._texts["state"].text = "<p>no axis yet: nobody publishes the topic 'samples'</p>"
+            self._texts["state"].text = "<p>No axis was found yet: no node publishes the topic 'samples'.</p>"
             return
         if self._pause.active:
             if self._window is None:  # all kept samples, so that they can be examined in detail

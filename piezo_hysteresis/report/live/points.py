@@ -74,7 +74,7 @@ def with_gaps(places: NDArray[np.intp], valid: NDArray[np.bool_], *columns: Arra
 
 
 def followed(time: Array, longest: float) -> NDArray[np.bool_]:
-    """Which samples have the next one within `longest` [s]; a driver that stalls leaves a jump in time, none in number.
+    """Which samples are followed by the next one within `longest` [s]. A stalled driver jumps in time, not in number.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ class RecordingPage:
     document : bokeh Document
         Of one browser window.
     comparison : ModelComparison
-        The experiment, and the model held against it, if there is one.
+        The experiment, and its comparison with a model, if there is one.
     title : str
         Heading of the page.
     """

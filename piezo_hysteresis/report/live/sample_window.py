@@ -69,7 +69,7 @@ class Window:
         return self.displacement - self.prediction
 
     def part(self, first: int, end: int | None = None) -> Window:
-        """Samples `first` to `end`, that one left out."""
+        """Samples from `first` up to, but not including, `end`."""
         cut = slice(first, end)
         return Window(
             self.time[cut], self.voltage[cut], self.displacement[cut], self.prediction[cut], self.sample_period

@@ -80,7 +80,7 @@ class PageServer:
         if self._failure is not None:
             raise ParameterError(
                 f"address {address}, port {port}: {getattr(self._failure, 'strerror', None) or self._failure}; "
-                "give another one where a page is open there already"
+                "if a page is open there already, give another port"
             ) from self._failure
 
     @property

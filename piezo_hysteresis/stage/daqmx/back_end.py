@@ -62,6 +62,6 @@ PARAMETERS: tuple[Row, ...] = (
 
 
 def open(values: Mapping[str, Any], opening: Opening) -> Stage:
-    """Open a stage on a National Instruments card; StageError if it is not there or not what the values say."""
+    """Open a stage on a National Instruments card; raises StageError if it is missing or contradicts the values."""
     period = {"sample_period": opening.sample_period} if opening.sample_period else {}
     return DaqmxStage(DaqmxSetup(**{**values, **period}))

@@ -37,9 +37,9 @@ def loop_back_delay(stage: StreamingStage, amplitude: float = 1.0) -> float:
     Parameters
     ----------
     stage : StreamingStage
-        On that card; noise is played from its voltage in force, which it returns to.
+        On that card; noise is played around its present voltage, to which it returns.
     amplitude : float
-        Peak of the noise [V]; towards the inside of the limits.
+        Peak of the noise [V]; the noise lies on the inner side of the present voltage.
 
     Returns
     -------

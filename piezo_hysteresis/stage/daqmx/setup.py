@@ -68,15 +68,15 @@ class DaqmxSetup:
     sensor_range : float
         The sensor's output and the inputs span ± this voltage [V].
     io_delay : float
-        Delay of the card from output to input, measured by `loop_back_delay` [s]. Its whole samples are taken off, so
-        that the rest belongs to the stage; irrelevant where the drive is measured.
+        Delay of the card from output to input, measured by `loop_back_delay` [s]. Its whole samples are subtracted, so
+        that the remaining delay is that of the stage; irrelevant where the drive is measured.
     timeout : float
         Longest wait for samples beyond their own time, and longest silence of a server [s].
 
     Raises
     ------
     StageError
-        On a value that cannot be.
+        If a value is impossible.
     """
 
     device: str
@@ -117,9 +117,9 @@ class DaqmxSetup:
                 raise StageError(f"daqmx.{name}: got {getattr(self, name)!r}, expected more than 0")
         if not 0 < self.max_slew_rate < math.inf:
             raise StageError(
-                f"nidaqmx.max_slew_rate: got {slew_text(self.max_slew_rate)}, expected the steepest that amplifier and "
-                "stage stand, more than 0 and finite; from the amplifier's current I and the piezo's capacitance C it "
-                "is I/C, divided by amplifier_gain"
+                f"nidaqmx.max_slew_rate: got {slew_text(self.max_slew_rate)}, expected the steepest drive that the "
+                "amplifier and the stage allow, more than 0 and finite; from the amplifier's current I and the piezo's "
+                "capacitance C it is I/C, divided by amplifier_gain"
             )
         for name in ("amplifier_gain", "monitor_gain", "sensor_gain"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) != 0):

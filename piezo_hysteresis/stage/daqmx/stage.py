@@ -33,14 +33,14 @@ _RAMP_PERIOD = 1e-3
 _READ_BACK_ERROR = 2e-3
 """Largest error of an output that the card reads back itself [V]."""
 _CLIPPED = 0.998
-"""Share of the range of the sensor from which on it counts as clipped."""
+"""Share of the range of the sensor from which a sample counts as clipped."""
 
 
 class DaqmxStage:
     """A streaming stage: output and input on one hardware clock, without regeneration.
 
-    A block that is given waits in the output buffer for `Description.latency` samples; what `exchange` returns is what
-    was applied and measured meanwhile, sample by sample. Blocks that come too late end the stream with an error.
+    A given block waits in the output buffer for `Description.latency` samples. `exchange` returns the samples that were
+    applied and measured meanwhile. A block that comes too late ends the stream with an error.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class DaqmxStage:
             if found is None and not setup.assume_safe:
                 raise StageError(
                     f"{self._description.name}: the voltage at the output is unknown, expected a card that reads it "
-                    "back or a monitor; wire one (voltage_input), or see to it that the output is at its safe voltage "
+                    "back or a monitor; wire one (voltage_input), or make sure that the output is at its safe voltage "
                     "and set nidaqmx.assume_safe"
                 )
             self._voltage = self._description.safe_voltage if found is None else found
@@ -77,21 +77,21 @@ class DaqmxStage:
 
     @property
     def description(self) -> Description:
-        """Limits and scales as the setup says; `latency` is that of the output buffer."""
+        """Limits and scales from the setup; `latency` is that of the output buffer."""
         return self._description
 
     @property
     def sample_period(self) -> float:
-        """Sample period in force [s]."""
+        """Present sample period [s]."""
         return self._sample_period
 
     @property
     def voltage(self) -> float:
-        """Drive voltage given last [V]; on opening the one that was found."""
+        """Last commanded drive voltage [V]; after opening the voltage that was found."""
         return self._voltage
 
     def configure(self, sample_period: float) -> None:
-        """Sample every so many seconds [s]; a stream ends where it is, at its last voltage."""
+        """Set the sample period [s]. A running stream ends at its last voltage."""
         self._require_open()
         period = self._description.check_sample_period(sample_period)
         if period != self._sample_period:
@@ -100,7 +100,7 @@ class DaqmxStage:
             self._sample_period = period
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
-        """Hold these limits and this ramp rate [V/s] from now on; see `Limiter.restricted`."""
+        """Use these limits and this ramp rate [V/s] from now on; see `Limiter.restricted`."""
         self._require_open()
         self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
 
@@ -127,7 +127,7 @@ class DaqmxStage:
             return float(self._tasks.read_once()[0]) * self._setup.sensor_gain
 
     def read_voltage(self) -> float:
-        """One reading of the drive voltage at the monitor [V], else the one given last; ends a stream."""
+        """One reading of the drive voltage at the monitor [V], or without a monitor the last command; ends a stream."""
         self._require_open()
         with self._guarded():
             self._drain()
@@ -135,7 +135,7 @@ class DaqmxStage:
             return float(self._measured(readings)) if self._setup.voltage_input else self._voltage
 
     def safe(self) -> None:
-        """Let what is in the buffer play to its end, go to the safe voltage, and end the stream."""
+        """Play the samples in the buffer to their end, go to the safe voltage, and end the stream."""
         if self._closed:
             return
         try:
@@ -199,7 +199,7 @@ class DaqmxStage:
         return Agreement(s.voltage_tolerance / abs(s.amplifier_gain), settling, -inside, inside)
 
     def _drain(self) -> None:
-        """End the stream when its last voltage is out."""
+        """End the stream after its last voltage was put out."""
         if self._tasks.is_running:
             self._stream(np.full(self._lead, self._voltage))
             self._tasks.stop()
@@ -247,7 +247,7 @@ class DaqmxStage:
     def _unknown(self) -> str:
         self._is_lost = True
         return (
-            f"the voltage of the stage is unknown, last given {self._voltage:g} V; switch the amplifier off "
+            f"the voltage of the stage is unknown, last commanded {self._voltage:g} V; switch the amplifier off "
             "by hand: the card holds its output"
         )
 

@@ -32,7 +32,7 @@ _RATE_TOLERANCE = 1e-4
 _OPTIONS = (
     ("grpc.max_receive_message_length", -1),
     ("grpc.max_send_message_length", -1),
-    ("grpc.use_local_subchannel_pool", 1),  # a new channel is a new link, not one that waits to be tried again
+    ("grpc.use_local_subchannel_pool", 1),  # a new channel opens a new link instead of waiting for the old one
 )
 """Options of the link to the server."""
 
@@ -134,7 +134,7 @@ class Tasks:
             raise fault
 
     def abandon(self) -> None:
-        """End both tasks as far as they can still be ended; the next call goes over a new link."""
+        """End both tasks if they can still be ended; the next call uses a new link."""
         with suppress(DaqmxError):
             self.stop()
         self.close()
@@ -186,7 +186,7 @@ class Tasks:
             self._calls = grpc.intercept_channel(self._channel, Deadline(self._setup.timeout))
 
     def _require_rate(self, asked: float) -> None:
-        """A card divides its timebase by whole numbers, and takes the nearest rate without a word."""
+        """A card divides its timebase by whole numbers, and takes the nearest rate without a message."""
         rate = float(self._output.timing.samp_clk_rate)
         if not abs(rate / asked - 1) <= _RATE_TOLERANCE:
             raise DaqmxError(

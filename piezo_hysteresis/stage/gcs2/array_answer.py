@@ -79,7 +79,7 @@ class ArrayAnswer:
 
 
 def _separator(code: str) -> str | None:
-    """The character of a code; None for white space, and for what is no visible character."""
+    """The character of a code; None for white space and for invisible characters."""
     visible = code.isascii() and code.isdecimal() and len(code) <= 3 and 32 < int(code) < 127
     return chr(int(code)) if visible else None
 

@@ -33,7 +33,7 @@ NEEDED = (
 """Commands without which an axis cannot be driven."""
 
 _SAMPLE_TIME_TOLERANCE = 1e-3
-"""Relative difference up to which two sample times are one."""
+"""Relative difference up to which two sample times count as equal."""
 _HIGHEST_VOLTAGE = 1e4
 """Largest voltage of any piezo amplifier [V]."""
 _SERVO_TIMES = (1e-6, 0.1)
@@ -146,7 +146,7 @@ class Axis:
         if self.client.whole(f"SVO? {self.setup.axis}"):
             raise Gcs2Error(
                 f"{self.client.connection.place}: the servo of axis {self.setup.axis} is on {when}, expected off; "
-                "look for another program, a macro or an analogue input that switches it"
+                "check for another program, a macro or an analogue input that switches it on"
             )
 
     def set_voltage(self, drive: float) -> None:
@@ -223,7 +223,7 @@ class Axis:
         Raises
         ------
         Gcs2Error
-            If the recorder holds another number of samples, at another period, or what cannot be samples.
+            If the recorder holds another number of samples, at another period, or values that cannot be samples.
         """
         s, place = self.setup, self.client.connection.place
         tables = (s.voltage_table, s.displacement_table)

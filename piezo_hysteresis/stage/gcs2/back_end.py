@@ -98,5 +98,5 @@ PARAMETERS: tuple[Row, ...] = (
 
 
 def open(values: Mapping[str, Any], opening: Opening) -> Stage:
-    """Connect to a GCS 2.0 controller; StageError if it is not there or not what the values say."""
+    """Connect to a GCS 2.0 controller; raises StageError if it is missing or contradicts the values."""
     return Gcs2Stage(Gcs2Setup(**values))

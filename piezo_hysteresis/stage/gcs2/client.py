@@ -135,7 +135,7 @@ class Client:
         return Gcs2Error(f"{self.connection.place}: got '{got[:60]}' to '{text}', expected {expected}")
 
     def _send(self, text: str) -> None:
-        """Send over a link on which no error of an earlier one waits."""
+        """Send over a link on which no error of an earlier command waits."""
         if not self.connection.is_open:
             self.connection.send("ERR?\n")
             self._error("connecting")

@@ -28,11 +28,11 @@ _LONGEST_ANSWER = 1 << 26
 
 
 class Gcs2Error(DeviceError):
-    """The controller refused or answered nonsense, or the link failed."""
+    """The controller refused a command, its answer is invalid, or the link failed."""
 
 
 class NoAnswerError(Gcs2Error):
-    """Not one byte came within the deadline."""
+    """No byte arrived before the deadline."""
 
 
 class Connection:
@@ -48,7 +48,7 @@ class Connection:
     port : int
         TCP port; 50000 on PI controllers.
     timeout : float
-        Deadline for opening, for sending, and for the whole of an answer [s].
+        Deadline for opening, for sending, and for a complete answer [s].
     """
 
     def __init__(self, host: str, port: int, timeout: float) -> None:
@@ -62,11 +62,11 @@ class Connection:
 
     @property
     def is_open(self) -> bool:
-        """True while there is a link; one that broke unnoticed counts."""
+        """True while there is a link; a link that broke unnoticed counts as one."""
         return self._socket is not None
 
     def send(self, text: str) -> None:
-        """Send bytes as they are; lines carry their own line feed.
+        """Send bytes unchanged; a line must contain its line feed.
 
         Raises
         ------
@@ -75,7 +75,7 @@ class Connection:
         """
         link = self._opened()
         try:
-            link.settimeout(self.timeout)  # of the whole text, however it is cut
+            link.settimeout(self.timeout)  # the deadline is that of the whole text, in any number of parts
             link.sendall(text.encode(_CODE_PAGE))
         except OSError as error:
             raise self._lost(f"lost the link while sending ({error})") from None
@@ -117,7 +117,7 @@ class Connection:
         return [line.rstrip() for line in lines]
 
     def close(self) -> None:
-        """Close the link; harmless when repeated."""
+        """Close the link; may be repeated."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None

@@ -74,9 +74,9 @@ MEANING = {
     TOO_FEW_RECORDED: "the recorder holds fewer samples",
     SERVO_IS_ON: "open-loop moves are refused while the servo is on",
 }
-"""Numbers that can come up here; every other one is reported by its number."""
+"""Meanings of the numbers that can occur here; others are reported as numbers."""
 
 
 def meaning(number: int) -> str:
-    """Error number with what it means."""
+    """Error number with its meaning."""
     return f"error {number} ({MEANING.get(number, 'see the manual of the controller')})"

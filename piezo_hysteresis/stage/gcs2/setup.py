@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Gcs2Setup`: how a stage is wired to a GCS 2.0 controller, and every fact that differs between controllers."""
+"""`Gcs2Setup`: how a stage is wired to a GCS 2.0 controller, and all properties that differ between controllers."""
 
 from __future__ import annotations
 
@@ -115,9 +115,9 @@ class Gcs2Setup:
                 raise StageError(f"gcs2.{name}: got {getattr(self, name)!r}, expected more than 0")
         if not 0 < self.max_slew_rate < math.inf:
             raise StageError(
-                f"gcs2.max_slew_rate: got {slew_text(self.max_slew_rate)}, expected the steepest drive that amplifier "
-                "and stage stand, more than 0 and finite; from the amplifier's current I and the piezo's capacitance C "
-                "it is I/C, divided by amplifier_gain"
+                f"gcs2.max_slew_rate: got {slew_text(self.max_slew_rate)}, expected the steepest drive that the "
+                "amplifier and the stage allow, more than 0 and finite; from the amplifier's current I and the piezo's "
+                "capacitance C it is I/C, divided by amplifier_gain"
             )
         for name in ("amplifier_gain", "command_per_volt"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) != 0):

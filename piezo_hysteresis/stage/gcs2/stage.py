@@ -38,7 +38,7 @@ _POLL = 5e-3
 class Gcs2Stage:
     """One axis, driven by voltage from the wave table and recorded by the data recorder at the servo rate.
 
-    Opening asks for identity, servo time and limits and moves nothing. Before every open-loop move the servo is
+    Opening queries identity, servo time and limits, and moves nothing. Before every open-loop move the servo is
     switched off, and that is verified. If the device fails, the stage goes to its safe voltage, over a new link if
     necessary; the error message says whether it got there.
 
@@ -49,7 +49,7 @@ class Gcs2Stage:
     Raises
     ------
     StageError
-        If the controller cannot be reached or is not what the setup says.
+        If the controller cannot be reached or contradicts the setup.
     """
 
     def __init__(self, setup: Gcs2Setup) -> None:
@@ -91,7 +91,7 @@ class Gcs2Stage:
         self._forget()
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
-        """Use these limits and this ramp rate [V/s] from now on; finds out whether the controller can draw ramps."""
+        """Use these limits and this ramp rate [V/s] from now on; tests whether the controller can draw ramps."""
         self._require_ready()
         self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
         self._waveform = None
@@ -101,7 +101,7 @@ class Gcs2Stage:
     def watch(self, is_interrupted: Callable[[], bool]) -> None:
         """Call `is_interrupted` before every message of upload, arm, start and read; StoppedError once it is true.
 
-        Between two looks there is one command, or one answer of `rows_per_answer` samples.
+        Between two calls there is one command, or one answer of `rows_per_answer` samples.
         """
         self._axis.waves.is_interrupted = is_interrupted
 

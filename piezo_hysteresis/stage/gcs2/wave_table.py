@@ -29,7 +29,7 @@ from .connection import Gcs2Error
 from .setup import Gcs2Setup
 
 _PROBE_POINTS = 50
-"""Number of points of the test line by which it is found out whether the controller can draw lines."""
+"""Number of points of the test line that shows whether the controller can draw lines."""
 
 
 class WaveTable:
@@ -61,7 +61,7 @@ class WaveTable:
 
     @contextmanager
     def uninterrupted(self) -> Iterator[None]:
-        """Do not interrupt what is done within the block."""
+        """Do not interrupt the transfers within the block."""
         watched, self.is_interrupted = self.is_interrupted, bool
         try:
             yield
@@ -69,7 +69,7 @@ class WaveTable:
             self.is_interrupted = watched
 
     def load(self, drive: Samples) -> None:
-        """Write a waveform of drive voltages [V] into the wave table, and read it back if the setup says so."""
+        """Write a waveform of drive voltages [V] into the wave table, and read it back if `read_back` is set."""
         s = self.setup
         points = s.command_at_zero + s.command_per_volt * s.amplifier_gain * drive
         self._write(points)
@@ -105,7 +105,7 @@ class WaveTable:
     def load_line(self, line: Samples) -> None:
         """Write drive voltages on a straight line [V].
 
-        The controller draws the line itself where it has shown that it can; point by point it takes much longer.
+        If the test line has shown that it can, the controller draws the line. Point by point takes much longer.
         """
         s = self.setup
         if self.draws_lines:
@@ -117,7 +117,7 @@ class WaveTable:
 
     @property
     def draws_lines(self) -> bool:
-        """Whether ``WAV … LIN`` makes a straight line here: tried once with the wave table, nothing moves."""
+        """Whether ``WAV … LIN`` makes a straight line: tried once in the wave table, nothing moves."""
         if self._draws_lines is None:
             s, client = self.setup, self.client
             begin, end = (s.command_per_volt * voltage + s.command_at_zero for voltage in self.limits)
@@ -147,7 +147,7 @@ def _drawn(table: int, count: int, begin: float, end: float) -> str:
 
 
 def _is_line(points: Samples, begin: float, end: float) -> bool:
-    """Whether points begin at `begin` and go to `end`, or one step before it, in steps that are all the same."""
+    """Whether points go from `begin` to `end`, or to one step before it, in equal steps."""
     step = (end - begin) / (points.size - 1)
     tolerance = 1e-5 * max(abs(begin), abs(end), 1.0)
     return (

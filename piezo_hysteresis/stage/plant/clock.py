@@ -53,7 +53,7 @@ class Clock:
 
     @classmethod
     def cut(cls, sample_period: float, dead_time: float, longest: float) -> Clock:
-        """Cut the hold at the reading, and both parts into equal sub-steps no longer than `longest` [s]."""
+        """Cut the hold interval at the reading, and both parts into equal sub-steps of at most `longest` [s]."""
         holds = math.ceil(dead_time / sample_period - 1e-9)
         first = holds * sample_period - dead_time
         if first < 1e-9 * sample_period:  # a whole number of samples: the reading stands at the start of the hold

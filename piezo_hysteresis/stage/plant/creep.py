@@ -43,7 +43,7 @@ _ELEMENTS_PER_DECADE = 4
 
 @dataclass(frozen=True)
 class PlantCreep(Group):
-    """Hidden effect: displacement that goes on growing after each change of level."""
+    """Hidden effect: the displacement continues to grow after each change of level."""
 
     gamma: float = quantity(0.0, "1/decade", -0.1, 0.1, "growth of the step response per decade at 0.1 s")
     slope: float = quantity(0.0, "1", -0.5, 0.5, "λ of the weights τ^λ; 0 for logarithmic creep")
@@ -79,7 +79,7 @@ class PlantCreep(Group):
 
 
 class Bank:
-    """Creep in motion, settled at the normalised output `w`: every element relaxed."""
+    """State of the creep, settled at the normalised output `w`: every element is relaxed."""
 
     def __init__(self, creep: PlantCreep, clock: Clock, w: float) -> None:
         tau, weight, start = creep.elements()

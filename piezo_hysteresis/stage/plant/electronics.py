@@ -56,7 +56,7 @@ class Electronics(Group):
         return 2 * self.dac_range / 2**self.dac_bits if self.dac_bits else 0.0
 
     def convert(self, voltage: Samples) -> Samples:
-        """The drive that the converter puts out [V]: the nearest of its steps within the drive limits."""
+        """Output of the converter [V]: the nearest of its steps within the drive limits."""
         if not self.dac_bits:
             return np.array(voltage)
         half = 2 ** (self.dac_bits - 1)
@@ -66,7 +66,7 @@ class Electronics(Group):
 
 
 class Amplifier:
-    """Electronics in motion, settled at `voltage` [V]: from converted drive to drive at the piezo, per sub-step."""
+    """State of the electronics, settled at `voltage` [V]: from converted drive to drive at the piezo, per sub-step."""
 
     def __init__(self, electronics: Electronics, clock: Clock, voltage: float) -> None:
         gain, bandwidth = electronics.amplifier_gain, electronics.amplifier_bandwidth
@@ -125,7 +125,7 @@ def _amplify(u, held, oldest, holds, state, step, limits, out):
                 gap = math.copysign(slew * tau * math.exp(-(step[j] - free / slew) / tau), gap)
             else:
                 gap = 0.0
-            # a settled amplifier is settled: an endless exponential ends in slow subnormal numbers
+            # an amplifier that has settled is set to its end, because arithmetic with subnormal numbers is slow
             v = target + gap if abs(gap) > 1e-14 else target
             out[i * count + j] = _saturate(v, low, high, corner)
     state[0], oldest[0] = v, k

@@ -45,13 +45,15 @@ class Environment(Group):
     hum: float = quantity(0.0, "m", 0.0, 1.0, "hidden effect: amplitude of mains hum")
     hum_frequency: float = quantity(50.0, "Hz", 0.1, 1e4, "frequency of the mains")
     hum_harmonics: tuple[float, ...] = quantity((0.0, 0.3), "1", 0.0, 10.0, "2nd, 3rd, … harmonic over the first")
-    coupling: float = quantity(0.0, "1", -1.0, 1.0, "hidden effect: part of the other axis' motion that is seen")
+    coupling: float = quantity(
+        0.0, "1", -1.0, 1.0, "hidden effect: share of the motion of the other axis that the sensor measures"
+    )
     other_amplitude: float = quantity(0.0, "m", 0.0, 1.0, "motion of the other axis; 0 where there is none")
     other_frequency: float = quantity(3.0, "Hz", 1e-3, 1e4, "its frequency")
 
 
 class Surroundings:
-    """The environment in motion from absolute time `time` [s]; `phases` holds random phases in turns."""
+    """State of the environment from absolute time `time` [s]; `phases` holds random phases in turns."""
 
     def __init__(self, environment: Environment, sample_period: float, time: float, phases: Samples) -> None:
         e = environment

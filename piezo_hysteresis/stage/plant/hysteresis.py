@@ -79,12 +79,12 @@ class Hysteresis(Group):
         if abs(self.rate_gain) >= self.rate_exponent:
             raise ParameterError(
                 f"hysteresis: got rate_gain {self.rate_gain:g}, expected less than rate_exponent "
-                f"{self.rate_exponent:g}; the loop of a slow drive would turn over"
+                f"{self.rate_exponent:g}, because the loop of a slow drive would be reversed"
             )
 
     @classmethod
     def prandtl_ishlinskii(cls, plays: int = 14) -> Hysteresis:
-        """A Prandtl-Ishlinskii operator in place of Bouc-Wen, opening about as wide a loop.
+        """A Prandtl-Ishlinskii operator in place of Bouc-Wen, with a loop of about the same width.
 
         Parameters
         ----------
@@ -104,7 +104,7 @@ class Hysteresis(Group):
 
 
 class Operator:
-    """Hysteresis in motion, settled at a drive of `voltage` [V]."""
+    """State of the hysteresis, settled at a drive of `voltage` [V]."""
 
     def __init__(self, hysteresis: Hysteresis, clock: Clock, voltage: float) -> None:
         p = hysteresis
@@ -140,7 +140,7 @@ def _play(z: float, v: float, r: float) -> float:
 
 @kernel
 def _fallen(x: float) -> float:
-    """1 − exp(−x); by its series, to the last digit, where expm1 would take most of the time of the whole plant."""
+    """1 − exp(−x) from its series, exact to the last digit; expm1 would take most of the time of the whole plant."""
     if abs(x) > 0.01:
         return -math.expm1(-x)
     return x * (1.0 - x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720))))))

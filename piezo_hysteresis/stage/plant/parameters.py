@@ -59,7 +59,7 @@ class PlantParameters:
     ------
     ParameterError
         If the full stroke does not fit the sensor, the drive limits do not fit the converter, or a softened spring
-        gives way.
+        cannot carry the load.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class PlantParameters:
         if not -e.dac_range <= e.voltage_min < e.voltage_max <= e.dac_range:
             raise ParameterError(
                 f"electronics: got voltage_min {e.voltage_min:g} V and voltage_max {e.voltage_max:g} V, expected them "
-                f"ordered and within ±{e.dac_range:g} V, which the converter can give"
+                f"ordered and within ±{e.dac_range:g} V, the range of the converter"
             )
         ends = self.stroke(0.0, e.voltage_min), self.stroke(0.0, e.voltage_max)
         for end in ends:
@@ -112,8 +112,8 @@ class PlantParameters:
     def from_mapping(cls, mapping: Mapping[str, Any]) -> PlantParameters:
         """Defaults changed by a mapping, nested or with dotted keys, as a YAML file gives it.
 
-        ``hysteresis.operator`` may be ``bouc_wen`` (default) or ``prandtl_ishlinskii``; other values of the part are
-        then changes to that operator's own defaults.
+        ``hysteresis.operator`` may be ``bouc_wen`` (default) or ``prandtl_ishlinskii``; the other values of the part
+        then change the defaults of that operator.
 
         Raises
         ------

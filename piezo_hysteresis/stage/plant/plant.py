@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Plant`: the simulated stage in motion, from drive voltage to sensor reading."""
+"""`Plant`: the state of the simulated stage, from drive voltage to sensor reading."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .structure import Mechanics
 Samples = NDArray[np.float64]
 
 _CHUNK = 4096
-"""Samples that are simulated in one go."""
+"""Number of samples that are simulated together."""
 
 
 class Reading(NamedTuple):
@@ -46,12 +46,12 @@ class Reading(NamedTuple):
 
 
 class Plant:
-    """A simulated stage: parameters, and the physical state it is in.
+    """A simulated stage: its parameters and its physical state.
 
     The chain is converter with hold → dead time → amplifier → backlash → hysteresis → creep → modes, softening → other
     axis → sensor → drift, hum, noise → converter. Every part is advanced by its exact solution over sub-steps of at
-    most `PlantParameters.sub_step`, so results do not depend on how the drive is cut into blocks, bit for bit. What is
-    neglected, the curvature of the hysteresis within a sub-step, is 5e-7 of the full stroke rms for a 2.5 V sine of
+    most `PlantParameters.sub_step`, so results do not depend on how the drive is cut into blocks, bit for bit. Only the
+    curvature of the hysteresis within a sub-step is neglected. It is 5e-7 of the full stroke rms for a 2.5 V sine of
     400 Hz and at most 4e-4 during the first microseconds of a 5 V step; it falls with the square of the sub-step.
 
     Parameters
@@ -79,7 +79,7 @@ class Plant:
 
     @property
     def voltage(self) -> float:
-        """Drive in force [V]."""
+        """Present drive [V]."""
         return self._voltage
 
     def configure(self, sample_period: float, voltage: float) -> None:
@@ -114,7 +114,7 @@ class Plant:
         Parameters
         ----------
         voltage : (n,) ndarray
-            Drive asked for [V], contiguous; limits are the business of the stage.
+            Requested drive [V], contiguous; the stage checks the limits.
 
         Returns
         -------

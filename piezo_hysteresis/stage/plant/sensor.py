@@ -45,8 +45,10 @@ class Sensor(Group):
     offset: float = quantity(0.0, "m", -1.0, 1.0, "reading at rest without drive")
     range: float = quantity(60e-6, "m", 1e-9, 1.0, "the converter spans ± this displacement")
     adc_bits: int = quantity(16, "1", 0, 32, "resolution of the converter; 0 for an ideal one")
-    noise: float = quantity(5e-4, "1", 0.0, 0.1, "rms of white noise per sample over the full stroke")
-    flicker: float = quantity(0.0, "1", 0.0, 0.1, "rms of 1/f noise per decade of frequency over the full stroke")
+    noise: float = quantity(5e-4, "1", 0.0, 0.1, "rms of white noise per sample, as a share of the full stroke")
+    flicker: float = quantity(
+        0.0, "1", 0.0, 0.1, "rms of 1/f noise per decade of frequency, as a share of the full stroke"
+    )
 
     @property
     def time_constants(self) -> tuple[float, ...]:
@@ -65,7 +67,7 @@ class Sensor(Group):
         return np.asarray(x * (1.0 + (x / full) * (self.quadratic + self.cubic * (x / full))))
 
     def convert(self, y: Samples) -> Samples:
-        """Output of the converter for `y` [m]; it clips beyond its range, as a real one does."""
+        """Output of the converter for `y` [m]; it clips beyond its range like a real converter."""
         half = 2 ** (self.adc_bits - 1) if self.adc_bits else 0
         if not self.adc_bits:
             return np.clip(y, -self.range, self.range)
@@ -73,7 +75,7 @@ class Sensor(Group):
 
 
 class Noise:
-    """Sensor noise as a stream of samples: the same for one seed however it is cut into blocks.
+    """Sensor noise as a stream of samples. It is the same for one seed, for every size of the blocks.
 
     White noise of a fixed rms per sample, and 1/f noise as white noise through a cascade of one pole and one zero per
     decade, from 0.01 Hz to half the sample rate; both start with the stage.

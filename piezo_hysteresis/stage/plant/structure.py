@@ -14,9 +14,9 @@
 
 """Mechanics: two modes, an optional third, softening, and the poles of the sensor, in one state space.
 
-Discretised exactly by matrix exponentials for the shape in which w really moves: between two converter steps the
-amplifier output, and with it w, approaches its end exponentially with the amplifier's time constant. Only the curvature
-of the hysteresis within one sub-step is neglected, second order in a step that is a fraction of a sample.
+They are discretised exactly by matrix exponentials for the real shape of w: between two converter steps the amplifier
+output, and with it w, approaches its end exponentially with the amplifier's time constant. Only the curvature of the
+hysteresis within one sub-step is neglected. It is of second order in a step that is a fraction of a sample.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Structure(Group):
     damping2: float = quantity(0.0248, "1", 1e-4, 1.0, "damping ratio of the second mode")
     softening_quadratic: float = quantity(0.0, "1", -0.5, 2.0, "hidden effect: k(1 + k2 |x|/X), X the full stroke")
     softening_cubic: float = quantity(0.0, "1", -0.3, 2.0, "hidden effect: k(1 + k3 x²/X²)")
-    resonance_share: float = quantity(0.0, "1", -0.5, 0.5, "hidden effect: part of x that passes one more resonance")
+    resonance_share: float = quantity(0.0, "1", -0.5, 0.5, "hidden effect: share of x that passes one more resonance")
     resonance_frequency: float = quantity(1800.0, "Hz", 1.0, 1e6, "natural frequency of that resonance")
     resonance_damping: float = quantity(0.01, "1", 1e-4, 1.0, "its damping ratio")
 
@@ -94,7 +94,7 @@ class Structure(Group):
 
 
 class Mechanics:
-    """Structure and sensor poles in motion, settled at the normalised output `w`.
+    """State of structure and sensor poles, settled at the normalised output `w`.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ from .stage import ReplayStage
 PARAMETERS: tuple[Row, ...] = (
     Setting("experiment", "", "path of the recording"),
     Setting("repeat", False, "begin again after the last sample"),
-    Setting("subscribers", 0, "begin when so many subscribers of samples are there", lower=0, upper=1000),
+    Setting("subscribers", 0, "number of subscribers of samples for which the beginning waits", lower=0, upper=1000),
 )
 """Of the driver, under ``replay.``."""
 

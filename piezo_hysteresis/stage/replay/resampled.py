@@ -44,7 +44,7 @@ class ResampledRecord:
     Attributes
     ----------
     record : Record
-        What the samples are taken from: the given record, or its averages.
+        Source of the samples: the given record, or its averages.
     size : int
         Number of played samples.
     is_resampled : bool

@@ -30,8 +30,8 @@ from .resampled import ResampledRecord
 class ReplayStage:
     """Plays records one after the other, as a streaming stage of one sample period.
 
-    The drive asked for is not played: `Description.ignores_drive` is true, and what comes back is the recorded voltage
-    with the recorded displacement. After the last record the last sample is held, or everything begins again.
+    The requested drive is not played: `Description.ignores_drive` is true, and every answer contains the recorded
+    voltage and displacement. After the last record the last sample is held, or the first record follows.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class ReplayStage:
     Raises
     ------
     StageError
-        Without a record, or where one cannot be resampled.
+        If there is no record, or one cannot be resampled.
 
     Examples
     --------
@@ -115,7 +115,7 @@ class ReplayStage:
 
     @property
     def finished(self) -> bool:
-        """True when every sample has been played and nothing repeats."""
+        """True when every sample has been played and the recording is not repeated."""
         return bool(self._position >= self._ends[-1])
 
     @property
@@ -145,7 +145,7 @@ class ReplayStage:
         return Acquired(voltage, displacement, dict(zip(self._channels, others, strict=True)))
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
-        """Ignored: nothing is put out."""
+        """Ignored: a recording has no output."""
         self._require_open()
 
     def set_voltage(self, voltage: float) -> None:

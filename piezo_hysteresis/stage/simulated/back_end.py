@@ -35,10 +35,10 @@ _PLANT = PlantParameters.table()
 PARAMETERS: tuple[Row, ...] = (
     Setting("seed", 0, "fixes noise and random phases", lower=0, upper=2**31 - 1),
     Setting("memory", False, "true for a stage with on-board memory: upload, run, read"),
-    Setting("longest_block", 32768, "samples that the memory holds", lower=2, upper=2**31 - 1),
+    Setting("longest_block", 32768, "largest number of samples in the memory", lower=2, upper=2**31 - 1),
     Parameter("dead_time", "t_d", "s", 0.05, 0.0, 100.0, "time that arming takes", "simulated plant"),
     Setting("hidden_effect", -1, "seed that draws one effect to hide; -1: nothing hidden", lower=-1, upper=2**31 - 1),
-    Setting("plant_file", "", "YAML file of plant parameters, which then count instead of the ones below"),
+    Setting("plant_file", "", "YAML file of plant parameters, which then replace the ones below"),
     Setting("hysteresis.operator", "bouc_wen", "hysteresis of the plant", ("bouc_wen", "prandtl_ishlinskii")),
     *_PLANT,
 )

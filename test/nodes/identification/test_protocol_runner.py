@@ -113,7 +113,7 @@ def test_a_stage_that_was_moved_between_two_phases_ends_the_protocol(lab, stage,
 
     ended_with = lab.wait(begun(lab, np.zeros(200), push, phases=2), "the end of the protocol")
     assert "begins at 0 V, and the stage is at" in str(ended_with)
-    assert "moved by somebody else" in str(ended_with)
+    assert "another program has moved the stage" in str(ended_with)
 
 
 def test_a_protocol_does_not_begin_after_a_stop_without_release(lab, stage):

@@ -96,7 +96,7 @@ def test_every_failure_is_reported_clearly_and_ends_safe(rig, streamed, fault, m
 @pytest.mark.parametrize("step", ["StartTask:1", "ReadAnalogF64:4", "WriteAnalogF64:5"])
 def test_a_lost_link_leaves_the_voltage_unknown_and_is_reported(rig, streamed, step):
     r = rig(f"gone@{step}")
-    with pytest.raises(StageError, match=r"voltage of the stage is unknown, last given .* by hand: the card holds"):
+    with pytest.raises(StageError, match=r"voltage of the stage is unknown, last commanded .* by hand: the card holds"):
         work(r.stage, streamed)
     with pytest.raises(StageError, match="unknown"):
         r.stage.close()
