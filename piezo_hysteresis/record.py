@@ -127,16 +127,6 @@ class Record(Pictured):
         return np.asarray(self.start_time + self.sample_period * np.arange(self.size))
 
     @property
-    def other_displacement(self) -> Samples | None:
-        """Displacement of the coupled axis [m], shape (n,); None where it was not measured."""
-        return self.channels.get("other_displacement")
-
-    @property
-    def temperature(self) -> Samples | None:
-        """Temperature of the stage [K], shape (n,); None where it was not measured."""
-        return self.channels.get("temperature")
-
-    @property
     def settled_voltage(self) -> float:
         """Voltage at which the stage had settled before the first sample [V]."""
         return float(self.voltage[0]) if self.initial_voltage is None else float(self.initial_voltage)

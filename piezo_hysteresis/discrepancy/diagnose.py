@@ -30,7 +30,8 @@ from ..model.model import Model
 from ..record import Experiment
 from .changes.same_stage import UNCHANGED
 from .diagnosis import Conclusion, Diagnosis, Verdict
-from .passes import PASSES, DiagnosisState, subtract_explicit_steps
+from .diagnosis_state import DiagnosisState
+from .passes import PASSES, subtract_explicit_steps
 
 
 @on_one_core

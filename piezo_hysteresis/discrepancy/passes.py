@@ -16,30 +16,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import Effect
 from ..errors import IdentificationError
 from ..identification.fit.fit import Progress
 from ..identification.fit.normal_equations import residuals
 from ..identification.records.conditioning_split import known_from_within
 from ..identification.records.roles import roles_of
 from ..model.model import Model
-from ..record import CONDITIONING, Experiment, Notice
+from ..record import Notice
 from .changes.same_stage import same_stage
 from .conclusion import concluded
 from .diagnosis import Conclusion, Diagnosis
+from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState, moves
 from .residual.explicit_step import KIND, explicit_model, without_steps
 from .residual.localise import ResidualShare, localise
 from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
 from .search.baseline_setup import BaselineSetup, prepare_baseline
 from .search.cross_validation import ADEQUATE
 from .search.selection import select
-from .search.selection_result import Selection
 from .search.single_record import diagnose_few
 from .search.time_limit import ending_at
 from .unnamed.correction import without_corrections
@@ -47,77 +46,8 @@ from .verdict import FEWEST_RECORDS
 
 Array = NDArray[np.float64]
 
-VOLTAGE_NOISE = "voltage_noise"
-"""Kind of the notice about an experiment from whose voltage the noise was removed."""
 STEPS_LEAVE = 10.0
 """Largest cost after the subtraction of an explicit step, if it is subtracted before the search."""
-IDLE = ("idle", "hold", CONDITIONING)
-"""Phases that only bring the stage from one state to another."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class DiagnosisState:
-    """Intermediate results between two passes of a diagnosis.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        Experiment that is compared with models.
-    model : Model or None
-        Model with which the search begins; None if it has to be identified.
-    effects : collection of Effect classes
-        Effects to choose from.
-    progress : callable
-        Called with a message and the fraction done.
-    end : float
-        Time at which the search for effects has to end, on the clock of `time.monotonic` [s].
-    setup : BaselineSetup or None
-        Floors, records, and the baseline that was fitted to them.
-    where : tuple of ResidualShare
-        Distribution of the residual of the baseline.
-    selection : Selection or None
-        Result of the search.
-    """
-
-    experiment: Experiment
-    model: Model | None
-    effects: Collection[type[Effect]]
-    progress: Progress
-    end: float = np.inf
-    setup: BaselineSetup | None = None
-    where: tuple[ResidualShare, ...] = ()
-    selection: Selection | None = None
-
-    @property
-    def usable(self) -> list[int]:
-        """Indices of the records that may be compared with a model."""
-        informative = [i for i, r in enumerate(self.experiment) if r.phase not in IDLE]
-        return [i for i in informative if not self.experiment[i].truncated] or informative
-
-    @property
-    def moving(self) -> list[int]:
-        """Indices of the usable records in which the drive moves."""
-        return [i for i in self.usable if _moves(self.experiment, i)]
-
-    @property
-    def sharpens(self) -> bool:
-        """Whether the inter-sample error is corrected; not with a noisy voltage, whose averages reverse at random."""
-        return all(n.kind != VOLTAGE_NOISE for n in self.experiment.notices)
-
-    @property
-    def fitted(self) -> BaselineSetup:
-        """The baseline setup, from an earlier pass."""
-        if self.setup is None:
-            raise IdentificationError("diagnose: got no baseline, expected the pass fit_baseline before this one")
-        return self.setup
-
-    @property
-    def searched(self) -> Selection:
-        """The result of the search, from an earlier pass."""
-        if self.selection is None:
-            raise IdentificationError("diagnose: got no search, expected the pass search_effects before this one")
-        return self.selection
-
 
 Pass = Callable[[DiagnosisState], DiagnosisState | Diagnosis]
 """Takes the state of the diagnosis; returns the new state, or the answer, which ends the diagnosis."""
@@ -152,7 +82,7 @@ def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
         If the drive does not move in any record.
     """
     experiment, model = state.experiment, state.model
-    if not any(_moves(experiment, i) for i in range(len(experiment.records))):
+    if not any(moves(record) for record in experiment):
         raise IdentificationError("diagnose: the drive does not move in any record; expected loops, steps or noise")
     severe = [n for n in experiment.notices if n.severe]
     if not severe:
@@ -256,11 +186,6 @@ PASSES: tuple[Pass, ...] = (
     conclude,
 )
 """The diagnosis, in the order in which the passes run."""
-
-
-def _moves(experiment: Experiment, index: int) -> bool:
-    record = experiment[index]
-    return bool(np.ptp(np.append(record.voltage, record.settled_voltage)) > 0.0)
 
 
 def _where(setup: BaselineSetup, progress: Progress) -> tuple[ResidualShare, ...]:

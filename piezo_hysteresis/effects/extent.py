@@ -85,7 +85,7 @@ class Extent:
         voltage_scale, displacement_scale : float
             Scales of the model [V], [m].
         """
-        known = [float(r.temperature.mean()) for r in records if r.temperature is not None]
+        known = [float(r.channels["temperature"].mean()) for r in records if "temperature" in r.channels]
         return cls(
             voltage_min=min(float(r.voltage.min()) for r in records),
             voltage_max=max(float(r.voltage.max()) for r in records),

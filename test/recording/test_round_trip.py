@@ -114,8 +114,8 @@ def test_optional_channels_and_flags_come_back(tmp_path, name):
         assert a.channels.keys() == b.channels.keys()
         for name, values in b.channels.items():
             np.testing.assert_array_equal(a.channels[name], values)
-        np.testing.assert_array_equal(a.other_displacement, b.channels["other_displacement"])
-        np.testing.assert_array_equal(a.temperature, b.channels["temperature"])
+        np.testing.assert_array_equal(a.channels["other_displacement"], b.channels["other_displacement"])
+        np.testing.assert_array_equal(a.channels["temperature"], b.channels["temperature"])
 
 
 def test_phases_are_averaged_on_reading_on_request(tmp_path):

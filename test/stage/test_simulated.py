@@ -212,7 +212,7 @@ def test_channels_reach_the_record():
         {"environment.other_amplitude": 1e-6, "environment.thermometer": 1}, seed=2, sample_period=1e-3
     )
     record = stage.play(np.zeros(10), average=2)
-    assert record.other_displacement.size == record.temperature.size == 5
+    assert record.channels["other_displacement"].size == record.channels["temperature"].size == 5
     acquired = stage.exchange(np.zeros(3))
     assert {name: values.size for name, values in acquired.channels.items()} == {
         "other_displacement": 3,

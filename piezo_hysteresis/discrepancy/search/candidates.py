@@ -159,7 +159,7 @@ def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Eff
 
 
 def _fits(model: Model, training_data: TrainingData, effect: type[Effect]) -> bool:
-    has_channel = effect.channel is None or any(getattr(r, effect.channel) is not None for r in training_data.records)
+    has_channel = effect.channel is None or any(effect.channel in r.channels for r in training_data.records)
     return effect.name not in model and has_channel and (effect.host is None or effect.host in model)
 
 

@@ -27,13 +27,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...effects import Effect
-from ...effects.extent import Extent
 from ...errors import PiezoError
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.normal_equations import Nuisance, residuals
 from ...identification.identification import Identification
 from ...identification.identify import identify
-from ...identification.records.leading_step import step_length
 from ...identification.structure.left_out import has_several_drives, score_left_out
 from ...model.model import Model
 from ...model.provenance import provenance
@@ -49,18 +47,14 @@ from ..verdict import FEWEST_RECORDS, NAMED, conclusion_of
 from .baseline import with_zero
 from .candidates import loop_is_off, score_model
 from .cross_validation import ADEQUATE, Score
+from .record_blocks import training_data_of
 from .refit import joint
 from .selection import select
 from .selection_result import Selection, Step, explained
 from .structure_steps import structure_steps
 from .test_records import reporting
 from .time_limit import ending_at
-from .training_data import TrainingData
 
-BLOCKS = 16
-"""Approximate number of blocks into which the records are cut."""
-FEWEST = 256
-"""Smallest number of samples in a block."""
 LAST, PRECISE = 25, 1e-6
 """Largest number of linearisations of a fit, and relative decrease of the cost at convergence."""
 SEARCHED = 20_000
@@ -116,7 +110,7 @@ def diagnose_few(
     noise = noise_floors(records)
     least = floors(records, noise)
     short = shortened(records, SEARCHED)
-    training_data = _training_data(short, fitted, least.tolist(), start)
+    training_data = training_data_of(short, fitted, least.tolist(), start)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
     baseline = joint(with_zero(published), training_data, LAST, PRECISE)
     before = score_model(baseline.model, training_data)
@@ -165,17 +159,6 @@ def _without(experiment: Experiment, aside: Collection[int]) -> Experiment:
     """The experiment in which the test records only determine the state of the stage."""
     records = tuple(replace(r, phase=CONDITIONING) if i in aside else r for i, r in enumerate(experiment.records))
     return Experiment(records, experiment.source)
-
-
-def _training_data(
-    records: Sequence[Record], fitted: Collection[int], least: Sequence[float], model: Model
-) -> TrainingData:
-    blocks, origin = blocks_of(records, fitted)
-    weights = np.array([np.inf if k is None else least[k] for k in origin])
-    jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
-    extent = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
-    free = Nuisance(offset=sum(not r.continues for r in records) > 1)
-    return TrainingData(tuple(blocks), weights, free, extent, jumps)
 
 
 def _delivered(
@@ -245,30 +228,3 @@ def _conclusion(
         (f"No effect is named, because {records} cannot distinguish effects", message, *(n.message for n in missing))
     )
     return Conclusion.INSUFFICIENT_DATA, f"{reason}."
-
-
-def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Record], list[int | None]]:
-    """Blocks of the records `used`, a leading jump apart, and the record of each (None: it only sets the state).
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Records in order.
-    used : collection of int
-        Indices of the records to cut.
-    """
-    length = max(FEWEST, sum(records[i].size for i in used) // BLOCKS)
-    blocks: list[Record] = []
-    origin: list[int | None] = []
-    for index, record in enumerate(records):
-        if index not in used:
-            blocks.append(record)
-            origin.append(None)
-            continue
-        step = 0 if record.continues else step_length(record)
-        count = max(1, round((record.size - step) / length))
-        edges = {step, *(step + round(k * (record.size - step) / count) for k in range(1, count))}
-        cuts = record.split(*sorted(edges - {0}))
-        blocks += [cuts[0], *(replace(c, initial_voltage=None) for c in cuts[1:])]
-        origin += [index] * len(cuts)
-    return blocks, origin

@@ -1,0 +1,105 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`DiagnosisState`: intermediate results between two passes of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects import Effect
+from ..errors import IdentificationError
+from ..identification.fit.fit import Progress
+from ..model.model import Model
+from ..record import CONDITIONING, Experiment, Record
+from .residual.localise import ResidualShare
+from .search.baseline_setup import BaselineSetup
+from .search.selection_result import Selection
+
+VOLTAGE_NOISE = "voltage_noise"
+"""Kind of the notice about an experiment from whose voltage the noise was removed."""
+IDLE = ("idle", "hold", CONDITIONING)
+"""Phases that only bring the stage from one state to another."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DiagnosisState:
+    """Intermediate results between two passes of a diagnosis.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Experiment that is compared with models.
+    model : Model or None
+        Model with which the search begins; None if it has to be identified.
+    effects : collection of Effect classes
+        Effects to choose from.
+    progress : callable
+        Called with a message and the fraction done.
+    end : float
+        Time at which the search for effects has to end, on the clock of `time.monotonic` [s].
+    setup : BaselineSetup or None
+        Floors, records, and the baseline that was fitted to them.
+    where : tuple of ResidualShare
+        Distribution of the residual of the baseline.
+    selection : Selection or None
+        Result of the search.
+    """
+
+    experiment: Experiment
+    model: Model | None
+    effects: Collection[type[Effect]]
+    progress: Progress
+    end: float = np.inf
+    setup: BaselineSetup | None = None
+    where: tuple[ResidualShare, ...] = ()
+    selection: Selection | None = None
+
+    @property
+    def usable(self) -> list[int]:
+        """Indices of the records that may be compared with a model."""
+        informative = [i for i, r in enumerate(self.experiment) if r.phase not in IDLE]
+        return [i for i in informative if not self.experiment[i].truncated] or informative
+
+    @property
+    def moving(self) -> list[int]:
+        """Indices of the usable records in which the drive moves."""
+        return [i for i in self.usable if moves(self.experiment[i])]
+
+    @property
+    def sharpens(self) -> bool:
+        """Whether the inter-sample error is corrected; not with a noisy voltage, whose averages reverse at random."""
+        return all(n.kind != VOLTAGE_NOISE for n in self.experiment.notices)
+
+    @property
+    def fitted(self) -> BaselineSetup:
+        """The baseline setup, from an earlier pass."""
+        if self.setup is None:
+            raise IdentificationError("diagnose: got no baseline, expected the pass fit_baseline before this one")
+        return self.setup
+
+    @property
+    def searched(self) -> Selection:
+        """The result of the search, from an earlier pass."""
+        if self.selection is None:
+            raise IdentificationError("diagnose: got no search, expected the pass search_effects before this one")
+        return self.selection
+
+
+def moves(record: Record) -> bool:
+    """Whether the drive moves in a record."""
+    return bool(np.ptp(np.append(record.voltage, record.settled_voltage)) > 0.0)
