@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 import threading
@@ -23,7 +24,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
+from rich.cells import cell_len
+from rich.console import Console, JustifyMethod
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 
@@ -33,14 +35,19 @@ from ..report.tables.table import Table
 
 WIDTH = 10_000
 """Width of the output to a file [characters]: tables take the width that they need, and no word is broken."""
+BREAKS = re.compile(r"(?<=[…,;]) ")
+"""Places inside a cell of numbers where a line may end."""
+SPACE = re.compile(r"\s+")
+"""Places inside a text where a line may end."""
 LINE_INTERVAL = 10.0
 """Time between two lines of progress in a file [s]."""
 
 
 def console() -> Console:
-    """Standard output; plain text where it is not a terminal."""
-    width = None if sys.stdout.isatty() else max(WIDTH, shutil.get_terminal_size().columns)
-    return Console(file=sys.stdout, highlight=False, markup=False, width=width, soft_wrap=True)
+    """Standard output: lines end between words on a terminal, and are as long as they need elsewhere."""
+    is_terminal = sys.stdout.isatty()
+    width = None if is_terminal else max(WIDTH, shutil.get_terminal_size().columns)
+    return Console(file=sys.stdout, highlight=False, markup=False, width=width, soft_wrap=not is_terminal)
 
 
 def show(*tables: Table | None) -> None:
@@ -48,16 +55,33 @@ def show(*tables: Table | None) -> None:
     for table in tables:
         if table is None:
             continue
+        out = console()
         drawn = RichTable(title=table.title, title_justify="left", title_style="bold", box=None, pad_edge=False)
-        for column, heading in enumerate(table.header):
-            drawn.add_column(heading, justify="right" if column in table.numeric else "left", header_style="underline")
+        for column, width in enumerate(_widths(table, out.width)):
+            justify: JustifyMethod = "right" if column in table.numeric else "left"
+            drawn.add_column(table.header[column], justify=justify, header_style="underline", width=width)
         for row in table.rows:
             drawn.add_row(*map(printable, row))
-        out = console()
-        out.print(drawn)
+        with out.capture() as text:
+            out.print(drawn, crop=False)
+        out.file.write("\n".join(line.rstrip() for line in text.get().splitlines()) + "\n")
         if table.note:
             out.print(table.note, style="dim")
         out.print()
+
+
+def _widths(table: Table, available: int) -> list[int]:
+    """Widths of the columns [characters]: as wide as the cells, else narrower, but no word or number is broken."""
+    most, least = [], []
+    for column, heading in enumerate(table.header):
+        cells = [printable(row[column]) for row in table.rows]
+        breaks = BREAKS if column in table.numeric else SPACE
+        most.append(max(map(cell_len, (heading, *cells))))
+        least.append(max(map(cell_len, (*heading.split(), *(part for cell in cells for part in breaks.split(cell))))))
+    left = available - 2 * (len(most) - 1) - sum(least)
+    wanted = sum(most) - sum(least)
+    share = min(1.0, max(left, 0) / wanted) if wanted else 1.0
+    return [low + int(share * (high - low)) for low, high in zip(least, most, strict=True)]
 
 
 def show_notices(notices: Iterable[Notice]) -> None:

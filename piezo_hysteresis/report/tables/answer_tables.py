@@ -34,10 +34,9 @@ def effect_table(answer: Mapping[str, Any]) -> Table | None:
         for name, value in effect["parameters"].items():
             interval = value.get("interval_95")
             message = f"{interval[0]:.4g} … {interval[1]:.4g}" if interval else ""
-            rows.append(
-                (effect["name"], effect["family"], share, twins, name, f"{value['value']:.4g}", message, value["unit"])
-            )
-    header = ("effect", "family", "gap explained", "confusable with", "parameter", "value", "95 %", "unit")
+            parameter = f"{name} [{value['unit']}]"
+            rows.append((effect["name"], effect["family"], share, twins, parameter, f"{value['value']:.4g}", message))
+    header = ("effect", "family", "share of the gap", "confusable with", "parameter", "value", "95 %")
     several = len({row[0] for row in rows}) > 1
     note = (
         "Each row states the share of the gap that this effect and all effects above it explain together."
