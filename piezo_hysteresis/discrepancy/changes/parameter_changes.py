@@ -53,6 +53,8 @@ TURNS = 4
 """Number of linearisations of that search."""
 UNCERTAIN = 0.6
 """Share of the remaining error, at least of the floors of the records, that can resemble a change."""
+FORMS = 6.0
+"""Largest ratio of V for which the lag of another form counts in the interval."""
 SURE = 2.5
 """Smallest significant change, in standard errors."""
 
@@ -96,7 +98,9 @@ def find_change(
     leaves = best.cost < LEAVES or best.cost < NEARLY_ALL * day.cost
     if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
         return None
-    interval = found[0].interval(day.cost)
+    low, high = found[0].interval(day.cost)
+    half = float(np.hypot(0.5 * (high - low), _spread_of_forms(found)))
+    interval = found[0].size - half, found[0].size + half
     least = {"gain": GAIN, "loop": LOOP}.get(best.key, 0.0)
     size = found[0].size
     if not _differs(size, interval) or abs(size) < least:
@@ -155,6 +159,20 @@ def _simulated(
     exact = search.shaped(key, near=0.0) if key == "delay" else search.account(key)
     left = min(found.account.cost, exact.cost)
     return replace(found, account=replace(found.account, cost=left))
+
+
+def _spread_of_forms(found: Sequence[_Explanation]) -> float:
+    """RMS difference to the lags of other forms, in the unit of the first explanation.
+
+    Samples do not show which form a lag of about a sample has, because the motion between them is interpolated.
+    """
+    best, unit = found[0], KINDS[found[0].account.key].lag if found[0].account.key in SHAPES else 0.0
+    if not unit:
+        return 0.0
+    most = FORMS * max(1.0, best.account.cost)
+    forms = [e for e in found[1:] if e.account.key in SHAPES and e.account.cost < most]
+    lags = np.array([e.size * KINDS[e.account.key].lag / unit - best.size for e in forms])
+    return float(np.sqrt(np.mean(lags**2))) if lags.size else 0.0
 
 
 def _moved_resonance(

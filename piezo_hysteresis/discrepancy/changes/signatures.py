@@ -20,11 +20,10 @@ A delay and a filter act on the predicted displacement as a whole; every other c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ...effects import (
@@ -32,7 +31,6 @@ from ...effects import (
     Creep,
     CreepFractional,
     CreepTwoRates,
-    Discretisation,
     ExtraDelay,
     ExtraResonance,
     Offset,
@@ -43,6 +41,7 @@ from ...effects import (
 from ...model.model import Model
 from ...record import Record
 from .change_kinds import KINDS
+from .filtered_signal import derivatives, filtered
 
 Array = NDArray[np.float64]
 
@@ -64,12 +63,21 @@ class ChangeablePrediction:
         Predicted displacement before the first sample [m].
     rows : mapping of str to (n,) ndarray
         Change of y per unit of every linear change [m].
+    known : mapping of int to (4, n) ndarray
+        What `between` has computed, by the identity of the signal.
     """
 
     record: Record
     y: Array
     before: float
     rows: dict[str, Array]
+    known: dict[int, Array] = field(default_factory=dict)
+
+    def between(self, signal: Array, before: float) -> Array:
+        """Derivatives of y or of a row between samples (4, n); the signal was `before` until the first sample."""
+        if id(signal) not in self.known:
+            self.known[id(signal)] = derivatives(signal, before)
+        return self.known[id(signal)]
 
 
 def loop_numbers(model: Model) -> dict[str, float]:
@@ -150,46 +158,20 @@ def settled(model: Model, voltage: float) -> float:
 
 def delayed(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
     """A signal of the record, delayed by `tau` [s], which may be negative. It was `before` until the first sample."""
-    samples = np.arange(signal.size)
-    at = samples - tau / prediction.record.sample_period
-    padded = np.concatenate(([before], signal))
-    low = np.clip(np.floor(at).astype(int), -1, signal.size - 2)
-    part = np.clip(at - low, 0.0, 1.0)
-    # cubic interpolation, so that a fast sine keeps its amplitude
-    value = padded[low + 1] * (1.0 - part) + padded[low + 2] * part
-    inner = (low >= 1) & (low < signal.size - 2)
-    k, t = low[inner], part[inner]
-    a, b, c, d = signal[k - 1], signal[k], signal[k + 1], signal[k + 2]
-    smooth = (
-        -t * (t - 1.0) * (t - 2.0) / 6.0 * a
-        + (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0 * b
-        - (t + 1.0) * t * (t - 2.0) / 2.0 * c
-        + (t + 1.0) * t * (t - 1.0) / 6.0 * d
-    )
-    value[inner] = smooth
-    return np.asarray(value)
+    at = np.arange(signal.size) - tau / prediction.record.sample_period
+    end = np.clip(np.ceil(at).astype(int), 0, signal.size - 1)
+    part = np.clip(at - (end - 1), 0.0, 1.0)
+    value, slope, second, third = prediction.between(signal, before)[:, end]
+    return np.asarray(value + part * (slope + part * (second / 2.0 + part * third / 6.0)))
 
 
-def filtered(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
-    """A signal of the record, filtered with one pole of time constant `tau` [s], linear between samples."""
+def filtered_by(
+    prediction: ChangeablePrediction, signal: Array, before: float, tau: float, zeta: float | None = None
+) -> Array:
+    """A signal of the record behind a filter with time constant `tau` [s], of second order with a damping ratio."""
     if tau <= 0.0:
         return signal
-    x = prediction.record.sample_period / tau
-    keep = float(np.exp(-x))
-    lead = 1.0 - (1.0 - keep) / x
-    late = (1.0 - keep) - lead
-    num, den = [lead, late], [1.0, -keep]
-    state = scipy.signal.lfiltic(num, den, [before], [before])
-    return np.asarray(scipy.signal.lfilter(num, den, signal, zi=state)[0])
-
-
-def filtered_twice(prediction: ChangeablePrediction, signal: Array, before: float, tau: float, *, zeta: float) -> Array:
-    """A signal of the record behind a filter of second order with time constant `tau` [s] and damping ratio `zeta`."""
-    if tau <= 0.0:
-        return signal
-    period = prediction.record.sample_period
-    block = SecondOrderLowPass(tau=tau, zeta=zeta).block(Discretisation(period, period))
-    return np.asarray(block.run(signal, block.rest(before, 0.0))[0])
+    return filtered(prediction.between(signal, before), before, prediction.record.sample_period, tau, zeta)
 
 
 Shaped = Callable[[ChangeablePrediction, Array, float, float], Array]
@@ -200,8 +182,8 @@ SECOND_ORDER = {key: kind.damping for key, kind in KINDS.items() if kind.damping
 
 SHAPES: dict[str, Shaped] = {
     "delay": delayed,
-    "low_pass": filtered,
-    **{key: partial(filtered_twice, zeta=zeta) for key, zeta in SECOND_ORDER.items()},
+    "low_pass": filtered_by,
+    **{key: partial(filtered_by, zeta=zeta) for key, zeta in SECOND_ORDER.items()},
 }
 """Changes that act on the whole prediction, by name."""
 

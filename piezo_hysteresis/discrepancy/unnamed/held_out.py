@@ -116,7 +116,8 @@ def held_out(model: Model, training_data: TrainingData, correction: str = "") ->
     high = room(ends[1], theta, columns, np.inf)
     own = np.array([n.startswith(f"{correction}.") for n in names], dtype=bool)
     home = columns.T @ np.where(own, -theta, 0.0)  # the step that removes the correction
-    stiffness = STIFFNESS * np.maximum(np.diag(hessians.sum(axis=0)), np.finfo(float).tiny)
+    diagonal = np.diag(hessians.sum(axis=0))
+    stiffness = STIFFNESS * np.where(diagonal > 0.0, diagonal, 1.0)  # some numbers have no influence on these records
 
     def without_groups(groups: Array) -> Array:
         errors = np.empty(groups.size)

@@ -119,6 +119,14 @@ def found(of_position: BaselineSetup) -> Correction:
     return offered(of_position.baseline.model, of_position, 1.0)
 
 
+def test_plays_that_never_move_leave_the_errors_as_they_are(of_position: BaselineSetup) -> None:
+    """It ended with an error of the linear algebra."""
+    model, data = of_position.baseline.model, of_position.training_data
+    idle = model.with_effect(UnnamedPlays(c=(0.0,) * 7, reach=10.0))
+    without, with_idle = held_out(model, data), held_out(idle, data, UnnamedPlays.name)
+    np.testing.assert_allclose(with_idle.by_rate, without.by_rate, rtol=0.05)
+
+
 def test_a_deviation_of_the_position_is_offered_with_its_shape(found: Correction) -> None:
     assert found.accepted and isinstance(found.effect, UnnamedPositionMap)
     assert found.removed >= 0.5 and found.worst <= 1.05
