@@ -18,13 +18,20 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
 
 from piezo_hysteresis import __version__ as release  # noqa: E402, F401
 
 project = "piezo_hysteresis"
 author = "piezo_hysteresis maintainers"
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.mathjax", "numpydoc"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "numpydoc",
+    "symbol_links",
+]
 html_theme = "furo"
 html_title = "piezo_hysteresis"
 root_doc = "index"

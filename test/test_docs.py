@@ -23,6 +23,7 @@ import ast
 import importlib
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -109,6 +110,22 @@ def test_symbols_lead_to_their_entries(page):
     links = re.findall(r"\[[^\]]*\]\(nomenclature\.md#([^)]*)\)", page.read_text())
     assert len(links) > 50
     assert [link for link in links if link not in entries] == []
+
+
+def test_symbols_inside_equations_link_to_their_entries():
+    linked = runpy.run_path(str(ROOT / "docs" / "symbol_links.py"))["linked"]
+    link = re.compile(r"\{\\href\{([^}]*)\}\{((?:[^{}]|\{[^}]*\})*)\}\}")
+    _, *sections = (ROOT / "docs" / "model.md").read_text().split("*Symbols:*")
+    for section in sections:
+        symbols = re.findall(r"\[([^]]*)\]\(nomenclature", section.partition("\n\n")[0])
+        equations = [block or inline for block, inline in re.findall(r"\$\$(.*?)\$\$|\$([^$]+)\$", section, re.DOTALL)]
+        found = [linked(equation, {symbol: symbol for symbol in symbols}) for equation in equations]
+        assert [link.sub(r"\2", equation) for equation in found] == equations, "nothing but links is added"
+        used = {symbol for equation in found for symbol, _ in link.findall(equation)}
+        assert len(used) >= 0.8 * len(symbols), "the others stand in the text only"
+    assert linked(r"\dot h_{i-1} + \mathrm{Cov} h", {"h": "#h"}) == (
+        r"\dot {\href{#h}{h}}_{i-1} + \mathrm{Cov} {\href{#h}{h}}"
+    )
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
