@@ -68,6 +68,8 @@ def test_the_effects_of_the_stage_are_in_the_model(identified):
     mode = identified.model[ExtraResonance.name]
     assert mode["f0"] == pytest.approx(STAGE.mode, rel=0.01)
     assert mode["zeta"] == pytest.approx(STAGE.zeta, abs=0.01)
+    (notice,) = (n.message for n in identified.notices if n.kind == "ringing")
+    assert f"a mode at {mode['f0']:.4g} Hz with a damping ratio of {mode['zeta']:.2g}" in notice
 
 
 @pytest.mark.parametrize("damping", [1e2, 1e5, 1e8])

@@ -164,7 +164,7 @@ def _simulated(
 def _spread_of_forms(found: Sequence[_Explanation]) -> float:
     """RMS difference to the lags of other forms, in the unit of the first explanation.
 
-    Samples do not show which form a lag of about a sample has, because the motion between them is interpolated.
+    Samples hardly show which form a lag of about a sample has.
     """
     best, unit = found[0], KINDS[found[0].account.key].lag if found[0].account.key in SHAPES else 0.0
     if not unit:

@@ -64,9 +64,7 @@ def fit_structure(
     return fit_pieces(model, pieces, floors, [n for n in free_numbers(model) if n not in held])
 
 
-def fit_linear_part(
-    model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]
-) -> tuple[PieceFit, float, list[Notice]]:
+def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> tuple[PieceFit, float]:
     """Fit a delay; then a mode, if the stage rings or its gain rises with frequency; then a pole, if it helps.
 
     Parameters
@@ -84,12 +82,10 @@ def fit_linear_part(
         Fit of all free parameters.
     lead : float
         ln of the factor by which a ringing mode lowers the cost; 0 without such a mode.
-    notices : list of Notice
-        ``ringing``, if a mode was accepted.
     """
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
     plain = min(found, key=lambda f: f.cost)
-    best, notices = _with_mode(plain, pieces, floors)
+    best = _with_mode(plain, pieces, floors)
     held = held_by(best)
     lead = float(np.log(plain.cost / best.cost)) if set(SHAPE) & set(best.names) else 0.0
     poles = []
@@ -99,7 +95,7 @@ def fit_linear_part(
         if tried.model.values()[POLE] < 0.0:
             poles.append(tried)
     lagging = min(poles, key=lambda f: f.cost, default=best)
-    return (lagging if lagging.cost < POLE_GAINS * best.cost else best), lead, notices
+    return (lagging if lagging.cost < POLE_GAINS * best.cost else best), lead
 
 
 def held_by(fit: PieceFit) -> tuple[str, ...]:
@@ -107,25 +103,34 @@ def held_by(fit: PieceFit) -> tuple[str, ...]:
     return tuple(n for n in (*SHAPE, SHARE) if n in fit.model.values() and n not in fit.names)
 
 
-def _with_mode(
-    plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]
-) -> tuple[PieceFit, list[Notice]]:
+def mode_notices(fit: PieceFit) -> list[Notice]:
+    """``ringing`` with the fitted numbers of the mode, if there is one; one that rings has all numbers free."""
+    if ExtraResonance.name not in fit.model:
+        return []
+    mode = fit.model[ExtraResonance.name]
+    shown = f"a mode at {mode['f0']:.4g} Hz with"
+    if set(SHAPE) <= set(fit.names):
+        said = f"the stage rings after the step: {shown} a damping ratio of {mode['zeta']:.2g}"
+    else:
+        said = (
+            f"the gain rises with the frequency of the drive; {shown} {mode['r']:.3g} of the displacement explains this"
+        )
+    return [Notice("ringing", said)]
+
+
+def _with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
     frequency = ringing_frequency(plain.model, pieces)
-    found, described = plain, ""
+    found = plain
     if frequency is not None:
         mode = ExtraResonance(r=1.0, f0=frequency, zeta=DAMPING)
         rings = fit_structure(plain.model.with_effect(mode), pieces, floors)
         if _behind_steps(rings, pieces) < RINGING_STAYS * _behind_steps(plain, pieces) and rings.cost < plain.cost:
-            found, numbers = rings, rings.model[ExtraResonance.name]
-            shown = f"a mode at {numbers['f0']:.4g} Hz with a damping ratio of {numbers['zeta']:.2g}"
-            described = f"the stage rings after the step: {shown}"
+            found = rings
     if found is plain or abs(found.model.values()[SHARE] - 1.0) > WHOLE:
         silent = min(_silent(plain, pieces, floors), key=lambda f: f.cost, default=plain)
         if silent.cost < SILENT_GAINS * found.cost:
-            found, numbers = silent, silent.model[ExtraResonance.name]
-            shown = f"a mode at {numbers['f0']:.4g} Hz with {numbers['r']:.3g} of the displacement explains this"
-            described = f"the gain rises with the frequency of the drive; {shown}"
-    return found, [Notice("ringing", described)] if described else []
+            found = silent
+    return found
 
 
 def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> Iterator[PieceFit]:

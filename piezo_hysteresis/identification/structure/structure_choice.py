@@ -42,7 +42,7 @@ from ...model.model import Model
 from ...record import Notice, Record
 from ..fit.fit import Fit, Progress
 from ..records.conditioning import with_conditioning
-from .linear_part import fit_linear_part, fit_structure, held_by
+from .linear_part import fit_linear_part, fit_structure, held_by, mode_notices
 from .piece_fit import PieceFit
 from .pieces import RecordPiece, pieces_of
 from .scores import STRUCTURES, Judged, ModelStructure, judge
@@ -110,7 +110,7 @@ def choose_structure(
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)
-    plain, ringing, notices = fit_linear_part(_with_plays(start, used), pieces, sizes)
+    plain, ringing = fit_linear_part(_with_plays(start, used), pieces, sizes)
     progress("structure: effects", 0.4)
     held = held_by(plain)
     full = fit_structure(plain.model.with_effect(MEMORY.level_term()), pieces, sizes, held)
@@ -121,6 +121,8 @@ def choose_structure(
     final = fit_structure(_reduced(full.model, chosen), pieces, sizes, held)
     progress("structure: rival", 0.85)
     described = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in judged[:3])
+    rival, lead = _rival(start, final, chosen, pieces, sizes)
+    notices = mode_notices(rival or final)
     notices.append(
         Notice(
             "structure",
@@ -128,7 +130,6 @@ def choose_structure(
             f"prediction errors in units of the noise floor: {described}",
         )
     )
-    rival, lead = _rival(start, final, chosen, pieces, sizes)
     if rival is not None:
         message = f"{start.hysteresis.name} predicts data left out better by a factor of {np.exp(0.5 * lead):.3g}"
         notices.append(Notice("memory", f"{message}, so it is used instead of plays"))
