@@ -19,8 +19,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..record import CONDITIONING, Experiment, Notice
+import numpy as np
+
+from ..record import CONDITIONING, Experiment, Notice, Record
 from .table.read_options import ReadOptions
+
+AT_REST = 0.02
+"""Largest difference of a voltage from that of the settled stage, as a share of the drive range."""
 
 
 def with_rows_before(read: Callable[[ReadOptions], Experiment], options: ReadOptions, most: int) -> Experiment:
@@ -31,8 +36,8 @@ def with_rows_before(read: Callable[[ReadOptions], Experiment], options: ReadOpt
     read : callable
         Reads one recording as options say.
     options : ReadOptions
-        With its `rows`. Where they begin with the first one, or are counted from the end, or `initial_voltage` is
-        given, nothing is read before them.
+        With its `rows`. Where they begin with the first one, or are counted from the end, nothing is read before them.
+        An `initial_voltage` belongs to the first row of the file, unless the row before the chosen ones is at it.
     most : int
         Largest number of rows before.
     """
@@ -40,16 +45,27 @@ def with_rows_before(read: Callable[[ReadOptions], Experiment], options: ReadOpt
     first, _ = options.from_the_beginning
     count = min(first, most)
     count -= count % (options.average or 1)
-    if not (count and wanted[0].truncated and options.passes_over):
+    settled = options.initial_voltage
+    if not (count and (settled is not None or wanted[0].truncated)):
         return wanted
-    lead = read(replace(options, rows=(first - count, first), phases=CONDITIONING))
+    of_lead = options if first == count else replace(options, initial_voltage=None)
+    lead = read(replace(of_lead, rows=(first - count, first), phases=CONDITIONING))
+    if settled is not None and abs(lead[-1].voltage[-1] - settled) <= AT_REST * _swing(*lead, *wanted):
+        return wanted
     ahead = [replace(r, phase=CONDITIONING, truncated=r.truncated or first > count) for r in lead]
     end = ahead[-1].start_time + ahead[-1].duration
     has_no_clock = wanted[0].start_time == ahead[0].start_time
     if not has_no_clock and abs(wanted[0].start_time - end) > 0.5 * wanted[0].sample_period:
         return wanted
-    first_wanted = replace(wanted[0], continues=True, truncated=False)
+    first_wanted = replace(wanted[0], continues=True, truncated=False, initial_voltage=None)
     later = end - wanted[0].start_time if has_no_clock else 0.0
     behind = (replace(r, start_time=r.start_time + later) for r in (first_wanted, *wanted.records[1:]))
     message = f"the {count} rows before were read for the state of the stage; they are not fitted and not judged"
+    if settled is not None:
+        message += f"; the initial voltage of {settled:g} V is that of the first row of the file"
     return replace(wanted, records=(*ahead, *behind)).noting(Notice("rows_before", message, wanted[0].phase))
+
+
+def _swing(*records: Record) -> float:
+    """Range of the drive over all records [V]."""
+    return float(np.ptp(np.concatenate([r.voltage for r in records])))

@@ -378,5 +378,18 @@ def test_rows_before_the_selected_ones_determine_the_state(tmp_path):
         capped, _ = read(file, rows=(3000, 5000), rows_before=100, sample_period=period)
         assert capped.size == 100 and capped.truncated
         assert len(read(file, rows=(3000, 5000), sample_period=period)) == 1
-        settled = {"initial_voltage": 0.0, "sample_period": period}
-        assert len(read(file, rows=(3000, 5000), rows_before=1 << 20, **settled)) == 1
+        before = float(drive[2999])
+        settled = read(file, rows=(3000, 5000), rows_before=1 << 20, initial_voltage=before, sample_period=period)
+        assert len(settled) == 1 and settled[0].settled_voltage == pytest.approx(before)
+
+
+def test_an_initial_voltage_belongs_to_the_first_row_of_the_file(tmp_path):
+    """It was taken for that of the first chosen row, and the model began with a step that never was."""
+    time = 1e-3 * np.arange(4000)
+    table = np.c_[time, 5.0 + 4.0 * np.sin(6.28 * time), time]
+    np.savetxt(tmp_path / "lab.csv", table, delimiter=",", header="time_s,voltage_V,displacement_um", comments="")
+    found = read(tmp_path / "lab.csv", rows=(2100, 4000), rows_before=1 << 20, initial_voltage=0.0)
+    lead, wanted = found
+    assert (lead.size, lead.settled_voltage) == (2100, 0.0)
+    assert wanted.continues and wanted.initial_voltage is None
+    assert any("initial voltage of 0 V is that of the first row" in n.message for n in found.notices)
