@@ -108,7 +108,7 @@ MEMORY: type[HysteresisMemory] = HysteresisMemory
 OPERATORS: dict[str, type[HysteresisOperator]] = {e.name: e for e in CHAIN if issubclass(e, HysteresisOperator)}
 """Every operator that can be the hysteresis of a model, by its identifier."""
 
-BASELINE: tuple[type[Effect], ...] = (BoucWen, PublishedBoucWen, Arx, Offset)
+BASELINE: tuple[type[Effect], ...] = (*OPERATORS.values(), Arx, Offset)
 """The published model, to which the other effects are added."""
 
 FINER_FORMS: tuple[type[Effect], ...] = (LevelDependentMemory, CreepTwoRates, SecondOrderLowPass)

@@ -25,6 +25,7 @@ from piezo_hysteresis.blocks.block import Block
 from piezo_hysteresis.compensation import Inverse
 from piezo_hysteresis.discrepancy.search.baseline import exact
 from piezo_hysteresis.effects import (
+    CATALOGUE,
     CHAIN,
     Arx,
     BoucWen,
@@ -182,6 +183,10 @@ def test_an_operator_without_inverse_is_refused_by_name():
 
     with pytest.raises(ModelError, match="own_plays: OwnPlaysBlock has no inverse"):
         Inverse(Model((Silent(**TRUTH.values), Arx(b=(1.0,))), 2e-4, 10.0, 1e-5))
+
+
+def test_no_operator_is_an_effect_to_be_added():
+    assert not [e.name for e in CATALOGUE if issubclass(e, HysteresisOperator)]
 
 
 def test_a_chain_without_a_hysteresis_is_refused():
