@@ -51,7 +51,7 @@ def save(model: AxesModel, path: str | Path) -> Path:
 
 
 def load(path: str | Path) -> AxesModel:
-    """Read a model file; reads back bit for bit.
+    """Read a model file. Every number is the one that was saved, bit for bit.
 
     Raises
     ------

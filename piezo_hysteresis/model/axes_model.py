@@ -121,7 +121,7 @@ class AxesModel:
 
     @property
     def settling(self) -> int:
-        """Number of samples after which a wrong start from rest no longer matters, apart from slow plays."""
+        """Number of samples after which a wrong initial state has decayed, apart from that of slow plays."""
         return int(self.taps.shape[0] * self.taps.shape[2] + 5 * self.memory / self.sample_period)
 
     def rest(self) -> AxesState:

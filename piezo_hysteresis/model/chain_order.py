@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The order of a chain: that of physics, which every effect states by its place."""
+"""The order of a chain: the order of the physics. Every effect states its place."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def in_chain_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     Raises
     ------
     ModelError
-        On a doubled effect, or a term without its host.
+        If an effect occurs twice, or a term has no host.
     """
     ordered = tuple(sorted(effects, key=_place))
     names = [e.name for e in ordered]

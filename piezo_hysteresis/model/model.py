@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Effects in the order of physics; frozen, ``with_…`` returns a new one.
+    """Effects in the order of the physics. A model is frozen; ``with_…`` returns a new one.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Model:
     Raises
     ------
     ModelError
-        On a doubled effect, a term without its host, or a scale that is not positive.
+        If an effect occurs twice, a term has no host, or a scale is not positive.
 
     Examples
     --------
@@ -188,8 +188,8 @@ class Model:
         Raises
         ------
         ModelError
-            On a period shorter than the model's, and without one where the model was identified at several and has none
-            of its own.
+            If the period is shorter than the model's; or if none is given, and the model was identified at several
+            periods and has none of its own.
         """
         return self.at(stated_period(self, sample_period)).rest(voltage, time)
 
@@ -272,8 +272,8 @@ class Model:
     def standard_errors(self, records: Iterable[Record]) -> list[Array]:
         """Standard error (n,) [m] of the displacement of every record, from the covariance of the fitted numbers.
 
-        A prediction band of 95 % is `simulate` ± 1.96 of it. It holds what the data leave open of the numbers, to first
-        order, and neither the noise of the sensor nor effects that the model does not have.
+        A prediction band of 95 % is `simulate` ± 1.96 of it. It contains the uncertainty of the fitted numbers to first
+        order, but neither the noise of the sensor nor effects that the model does not have.
 
         Raises
         ------

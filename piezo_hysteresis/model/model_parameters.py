@@ -122,7 +122,7 @@ def from_parameters(values: Mapping[str, object], source: str = "model") -> Mode
 
 
 def model_hash(model: Model) -> str:
-    """``sha256:`` and 16 digits of all that decides a prediction; provenance and covariance do not count."""
+    """``sha256:`` and 16 digits of everything that a prediction depends on, so without provenance and covariance."""
     content = "\n".join(f"{name}: {entry(value)}" for name, value in sorted(_content(model).items()))
     return "sha256:" + hashlib.sha256(content.encode()).hexdigest()[:16]
 
@@ -202,7 +202,7 @@ def _floats(values: object, name: str, row: Parameter, source: str) -> tuple[flo
 
 
 def _number_or_text(text: str) -> float | str:
-    """Numbers stay numbers in ROS: PyYAML writes the text 1e-05 in a way that rcl reads as a double."""
+    """A text that looks like a number becomes a number: PyYAML writes the text 1e-05 so that rcl reads a double."""
     try:
         value = float(text)
     except ValueError:

@@ -47,19 +47,19 @@ STEP = 1e-3
 class ParameterCovariance:
     """Covariance of a model's numbers, as the fit states it.
 
-    It is held by a factor F, so that a file gives back what was written, bit for bit.
+    It is stored as a factor F, so that a file gives back the written numbers, bit for bit.
 
     Parameters
     ----------
     names : tuple of str
         ``"bouc_wen.A"``, …
     factor : tuple of float
-        F with F Fᵀ the covariance, row by row, as many columns as there are uncertain directions.
+        F, row by row, with the covariance F Fᵀ; it has one column for every uncertain direction.
 
     Raises
     ------
     ModelError
-        If the factor has not the same number of finite values for each of the names.
+        If the factor does not have the same number of finite values for every name.
 
     Examples
     --------
@@ -142,5 +142,5 @@ def _relative_slope(model: Model, name: str, value: float, step: float, z: Respo
 
 
 def _sections(model: Model) -> list[Section]:
-    """Of all linear dynamics of the chain."""
+    """Response of all linear dynamics of the chain."""
     return [section for block in model.at(model.sample_period).blocks for section in block.sections()]

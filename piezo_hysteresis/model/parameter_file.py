@@ -14,8 +14,8 @@
 
 """`parameter_file`: ROS 2 parameter YAML, read as rcl reads it and written so that rcl and PyYAML agree.
 
-The two disagree on numbers: ``1e-05`` is a double to rcl and a string to PyYAML, ``3`` never becomes a double. Numbers
-are therefore written with a decimal point, texts always quoted, and files are read by rcl's rules.
+The two disagree on numbers: ``1e-05`` is a double to rcl and a string to PyYAML, and ``3`` never becomes a double.
+Therefore numbers are written with a decimal point, texts are always quoted, and files are read by rcl's rules.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ _SPECIAL = re.compile(r"([-+]?)\.(inf|Inf|INF|nan|NaN|NAN)")
 
 
 LONGEST_TEXT = 1_000_000
-"""Characters of a parameter file at most: parsing takes a hundred times as much memory, and a second."""
+"""Largest number of characters of a parameter file: parsing it takes a hundred times as much memory, and a second."""
 _DEEPEST = 20
-"""Levels of a parameter file at most; the time that parsers take grows with the square of it."""
+"""Largest number of levels of a parameter file; the time of parsers grows with its square."""
 _MOST_EVENTS = 50_000
-"""Keys, values and brackets of a parameter file at most: a node that reads it keeps samples waiting meanwhile."""
+"""Largest number of keys, values and brackets of a parameter file: while a node reads it, samples wait."""
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """The parser in C, ten times faster, where PyYAML was built with it."""
 
@@ -134,7 +134,7 @@ def parameters(text: str, source: str = "parameter file") -> dict[str, dict[str,
 
 
 def _require_plain(text: str, source: str) -> None:
-    """Refuse deep or long files and, as rcl does, aliases: a few nested aliases can stand for an endless text."""
+    """Refuse deep or long files and, as rcl does, aliases: a few nested aliases can stand for a text of any length."""
     depth = 0
     for number, event in enumerate(yaml.parse(text, Loader=_LOADER)):
         if number > _MOST_EVENTS:

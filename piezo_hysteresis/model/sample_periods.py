@@ -42,7 +42,7 @@ def identified_periods(periods: Iterable[float]) -> Mapping[str, str]:
 
 
 def stated_period(model: Model, given: float | None) -> float:
-    """The period of samples that come without one: `given`, or the model's where it has one of its own.
+    """The period of samples without a stated one: `given`, or that of the model if it has one of its own.
 
     Raises
     ------

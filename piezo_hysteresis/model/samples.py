@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Samples that a model is given: one dimension, at least one, all finite."""
+"""Checks of the samples for a model: one dimension, at least one sample, all finite."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 def row(values: ArrayLike, name: str) -> Array:
-    """As float64, shape (n,); not a copy where the values are that already.
+    """As float64, shape (n,); without a copy where the values have this type already.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def row(values: ArrayLike, name: str) -> Array:
 
 
 def samples(values: ArrayLike, name: str) -> Array:
-    """`row`, finite; ModelError on a sample that is not, too."""
+    """As `row`; ModelError also on a sample that is not finite."""
     array = row(values, name)
     if not are_finite(array):
         raise not_finite(name, array)
@@ -48,5 +48,5 @@ def samples(values: ArrayLike, name: str) -> Array:
 
 
 def not_finite(name: str, values: Array, first: int = 0) -> ModelError:
-    """What to raise of samples that are not all finite; `first` is the number of the first one."""
+    """The error about samples that are not all finite; `first` is the number of the first sample."""
     return ModelError(f"{name}: sample {first + int((~np.isfinite(values)).argmax())} is not finite")

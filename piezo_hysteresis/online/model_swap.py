@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ModelSwap`: models on their way into a stream."""
+"""`ModelSwap`: new models of a stream, until they replace the present one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .warmup import Warmup
 
 
 class ModelSwap:
-    """One model that is being run over the history, and the newest of those that came meanwhile."""
+    """One model that is being run over the history, and the newest of the models that arrived meanwhile."""
 
     def __init__(self) -> None:
         self._running: Warmup | None = None
@@ -36,17 +36,17 @@ class ModelSwap:
 
     @property
     def newest(self) -> Model | None:
-        """The model that will be in force at the end; None if no other is on its way."""
+        """The model that will be used at the end; None if there is no new model."""
         if self._waiting is not None:
             return self._waiting[0]
         return None if self._running is None else self._running.model
 
     def request(self, model: Model, offset: float | None) -> None:
-        """Let a model, with its offset [m] if that is known, follow the one that is running; others no longer wait."""
+        """Use a model, with its offset [m] if known, after the one that is running; it replaces one that waits."""
         self._waiting = model, offset
 
     def advance(self, values: int, history: VoltageHistory, zero: SensorOffset) -> Warmup | None:
-        """Run on over the next piece of the history; what has reached its end, ready to take over.
+        """Run over the next piece of the history. Returns the run that has reached the end, if any.
 
         Parameters
         ----------
@@ -62,7 +62,7 @@ class ModelSwap:
         ModelError
             If the stream is faster than the model; it is dropped.
         DivergenceError
-            If the model runs away; it is dropped.
+            If the model diverges; it is dropped.
         """
         if self._running is None and self._waiting is not None:
             (model, offset), self._waiting = self._waiting, None

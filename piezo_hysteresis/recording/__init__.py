@@ -30,9 +30,9 @@
 ``cut`` ``damaged``   the file ends early, or parts of it cannot be decoded
 ``truncated``         a phase without its beginning, or one that begins on a branch of its loop
 ``history``           earlier phases were played and not recorded
-``moved``             the drive moved in the idle before the first phase
+``moved``             the drive moved in the phase ``idle`` before the first phase
 ``step_before``       the displacement jumps with the first sample: a step from rest was not recorded
-``rows_before``       rows in front of the chosen ones were read for the state of the stage
+``rows_before``       rows before the chosen ones were read to determine the initial state
 ``proposed``          names of phases that were proposed from the shape of the drive
 ``averaged``          a recording too long for the memory, averaged on reading
 ``columns`` ``held``  the assignment of channels in a file of other software
@@ -206,7 +206,7 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
 
 
 _SEEN = {".aws": " (the binary stream of an attocube interferometer: export it as text; its positions are in pm)"}
-"""What files of other software are, by the end of their names."""
+"""Descriptions of files of other software that cannot be read, by the ending of their names."""
 _BY_SUFFIX = {".csv": "csv", ".mat": "mat", ".mcap": "rosbag2"}
 """Format for each ending of a file name."""
 
@@ -230,6 +230,6 @@ def _format(path: Path, name: str | None) -> Format:
     seen = "a folder" if path.is_dir() else f"a file ending '{path.suffix}'"
     seen += _SEEN.get(path.suffix.lower(), "")
     raise RecordingError(
-        f"{path}: got {seen}, not a recording this package knows; expected one of {', '.join(FORMATS)}; "
+        f"{path}: got {seen}, not a recording in a known format; expected one of {', '.join(FORMATS)}; "
         "choose one by `format`, or export the data as text"
     )

@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Rows in front of the chosen ones: they bring the model into the state in which the stage was at the first one."""
+"""Rows before the chosen ones: they bring the model into the state of the stage at the first chosen row.
+
+Both are read by themselves, because phases, times and channels are found in the chosen rows alone. No number is read
+twice; only the lines of a text file in front of them are passed over twice.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +64,7 @@ def with_rows_before(read: Callable[[ReadOptions], Experiment], options: ReadOpt
     first_wanted = replace(wanted[0], continues=True, truncated=False, initial_voltage=None)
     later = end - wanted[0].start_time if has_no_clock else 0.0
     behind = (replace(r, start_time=r.start_time + later) for r in (first_wanted, *wanted.records[1:]))
-    message = f"the {count} rows before were read for the state of the stage; they are not fitted and not judged"
+    message = f"the {count} rows before were read to determine the initial state; they are neither fitted nor judged"
     if settled is not None:
         message += f"; the initial voltage of {settled:g} V is that of the first row of the file"
     return replace(wanted, records=(*ahead, *behind)).noting(Notice("rows_before", message, wanted[0].phase))

@@ -86,7 +86,7 @@ class Recalibrator:
         node.create_timer(_TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def end(self) -> None:
-        """Give up a fit that is under way."""
+        """End a running fit without its result."""
         if self._fit is not None:
             self._fit.close()
             self._fit = None
@@ -165,10 +165,10 @@ class Recalibrator:
 
     def _apply(self, fit: _Fit, outcome: RecalibrationOutcome) -> None:
         if self._predictor is not fit.predictor or fit.predictor.model is not fit.model:
-            raise IdentificationError("another model or another stream has taken over meanwhile; nothing was changed")
+            raise IdentificationError("another model or another stream is in use by now; nothing was changed")
         model, baseline = loads(outcome.model), self._changes.watch.baseline
         if baseline is None:
-            raise IdentificationError("the baseline has gone meanwhile; nothing was changed")
+            raise IdentificationError("the baseline was removed meanwhile; nothing was changed")
         is_new = model_hash(model) != model_hash(fit.model)
         folder, problem = self._changes.folder, ""
         try:

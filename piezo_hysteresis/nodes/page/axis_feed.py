@@ -82,7 +82,7 @@ class AxisFeed:
         reply: Reply[Answer] = Reply()
         client = self._clients[service]
         if not client.service_is_ready():
-            reply.set_result(Answer(False, f"nobody serves {self._prefix}/{service}; is the node running?"))
+            reply.set_result(Answer(False, f"no node serves {self._prefix}/{service}; is the node running?"))
             return reply
         self._waiting.append((time.monotonic(), reply, service))
         client.call_async(Trigger.Request()).add_done_callback(self._node.guarded(lambda done: _answer(reply, done)))
@@ -97,7 +97,7 @@ class AxisFeed:
                 _resolve(reply, Answer(False, f"{self._prefix}/{service} did not answer within {PATIENCE:g} s"))
 
     def report(self, status: DiagnosticStatus) -> bool:
-        """Take a status of /diagnostics if it belongs to this axis; returns whether it does."""
+        """Store a status of /diagnostics if it belongs to this axis; returns whether it does."""
         node = status.name.partition(":")[0]
         if f"/{node}".rpartition("/")[0] != self._prefix:
             return False

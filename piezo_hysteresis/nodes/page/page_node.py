@@ -39,8 +39,8 @@ PAGE: tuple[Row, ...] = (
     Setting("address", "127.0.0.1", "address to listen on; one that other machines reach needs token_file"),
     Setting("port", 5006, "port to listen on; 0 takes a free one", lower=0, upper=65535),
     Setting("token_file", "", "file with the token that a visitor has to give; empty: none"),
-    Setting("hosts", "", "names, with commas between, under which browsers reach the page besides address"),
-    Setting("axes", "", "namespaces to show, with commas between; empty: every axis that publishes samples"),
+    Setting("hosts", "", "further names, separated by commas, under which browsers reach the page"),
+    Setting("axes", "", "namespaces to show, separated by commas; empty: every axis that publishes samples"),
 )
 """Parameters of the page node, all read at start."""
 

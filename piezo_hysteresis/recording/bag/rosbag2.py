@@ -41,12 +41,12 @@ _BLOCK_DURATION = 0.01
 class Rosbag2:
     """rosbag2 directory, .mcap or .db3 file, as the nodes or ``ros2 bag record -a`` write them.
 
-    Phases recorded in one go continue each other: from the second one on `Record.continues` holds, also where the
-    `hold` between them is left out. During such a hold the drive keeps its last voltage until the `start_time` of the
-    next phase, so that slow states (creep) can be computed over it. A hold in which the drive moves is kept, because
-    the state depends on it. The first phase starts settled at the voltage of the `idle` before it. A phase after lost
-    samples continues and is `truncated`, because its state is known only approximately. The same holds for a phase
-    whose beginning is not in the bag.
+    Phases that were recorded without an interruption continue each other: from the second one on `Record.continues` is
+    true, also where the `hold` between them is left out. During such a hold the drive keeps its last voltage until the
+    `start_time` of the next phase, so that slow states (creep) can be computed over it. A hold in which the drive moves
+    is kept, because the state depends on it. The first phase starts settled at the voltage of the `idle` before it. A
+    phase after lost samples continues and is `truncated`, because its state is known only approximately. The same holds
+    for a phase whose beginning is not in the bag.
     """
 
     def recognises(self, path: Path) -> bool:

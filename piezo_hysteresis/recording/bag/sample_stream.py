@@ -44,7 +44,7 @@ LONGEST_SILENCE = 60.0
 
 @dataclass
 class _Run:
-    """Samples since one start of the driver: index and arrival (start, stop) of every piece in one go."""
+    """Samples since one start of the driver: index and arrival (start, stop) of every uninterrupted piece."""
 
     first: bool
     period: float

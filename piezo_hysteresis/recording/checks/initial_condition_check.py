@@ -125,7 +125,7 @@ def _noise(displacement: Samples) -> float:
 
 
 def steps_from(experiment: Experiment) -> dict[int, float]:
-    """Records whose displacement jumps while the drive is held from the first sample, with the level [V] of before.
+    """Records whose displacement jumps while the drive is held from the first sample, with the level [V] before.
 
     The stage follows a step that the record does not show. The jump and the gain of the stage give the level; it has to
     be near 0 V, or near a level at which other records rest when they begin.
@@ -158,7 +158,7 @@ def steps_from(experiment: Experiment) -> dict[int, float]:
 
 
 def _held(record: Record, span: float) -> int:
-    """Samples from the first one on in which the drive stays where it is; `span` is the range of the drive [V]."""
+    """Number of first samples in which the drive is held; `span` is the range of the drive [V]."""
     u = record.voltage[:_EXCERPT]
     moved = np.flatnonzero(np.abs(u - u[0]) > _STILL * span)
     return int(moved[0]) if moved.size else u.size
@@ -167,8 +167,8 @@ def _held(record: Record, span: float) -> int:
 def departures(experiment: Experiment) -> dict[int, float]:
     """Records that begin in motion, with the level [V] from which their first samples come.
 
-    A ramp from rest of which a sample, or the average of a slow one, is stored first begins beside that level. Levels
-    are 0 V and those at which other records rest when they begin.
+    If the first stored sample lies on a ramp from rest, or is an average over its beginning, the record begins beside
+    the level of the rest. Levels are 0 V and those at which other records rest when they begin.
     """
     begins_at_rest = (r for r in experiment if r.size > 1 and not r.continues and r.voltage[1] == r.voltage[0])
     levels, found = {r.settled_voltage for r in begins_at_rest}, dict[int, float]()

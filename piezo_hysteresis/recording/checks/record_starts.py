@@ -23,18 +23,18 @@ from ..segmentation.phases import steps_named
 from ..table.read_options import ReadOptions
 from .initial_condition_check import departures, is_within_its_loop, steps_from
 
-_WITHIN = "begins on a branch of its loop: what came before is not recorded; a settled stage needs `initial_voltage`"
+_WITHIN = "begins on a branch of its loop: earlier motion is not recorded; a settled stage needs `initial_voltage`"
 """Message about a record that begins in motion on its loop."""
 _CONTINUES = (
-    "continues a phase that was not read: its initial state is unknown, and a simulation is wrong at first; read the "
-    "whole experiment"
+    "continues a phase that was not read: its initial state is unknown, and a simulation begins with an error; read "
+    "the whole experiment"
 )
 """Message about a first record that continues a missing record."""
-_IN_MOTION = "{phases}: the first sample lies on a ramp from {levels}, taken as where the stage had settled"
+_IN_MOTION = "{phases}: the first sample lies on a ramp from {levels}; the stage is assumed to have settled there"
 """Message about records that begin on a ramp."""
 _STEP_BEFORE = (
-    "{phases}: the displacement jumps although the drive is held from the first sample on; taken as a step from "
-    "{levels}, where the stage had settled; otherwise give `initial_voltage`"
+    "{phases}: the displacement jumps although the drive is held from the first sample on; a step from {levels}, where "
+    "the stage had settled, is assumed; otherwise give `initial_voltage`"
 )
 """Message about records that begin after a step."""
 _INFERRED = (("in_motion", _IN_MOTION, departures), ("step_before", _STEP_BEFORE, steps_from))

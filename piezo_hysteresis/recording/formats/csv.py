@@ -34,7 +34,7 @@ from ..table.time_column import TimeColumn
 _ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
 """Ends of the names of text tables."""
 _ROWS = 1 << 15
-"""Rows that are written in one go."""
+"""Number of rows that are written together."""
 _LOOK = 1 << 12
 """Number of first bytes by which a text is distinguished from other files."""
 _EPOCH = 1e8

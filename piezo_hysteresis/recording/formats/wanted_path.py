@@ -86,7 +86,7 @@ def _from_csv(place: Path) -> tuple[Array, float | None]:
         try:
             return factor * np.array([float(row[k]) for row in rows[1:]])
         except (ValueError, IndexError):
-            raise RecordingError(f"{place}: column '{rows[0][k]}' holds something else than numbers") from None
+            raise RecordingError(f"{place}: column '{rows[0][k]}' contains cells that are not numbers") from None
 
     wanted = _checked(place, column("displacement"))
     if "time" not in at or wanted.size < 2:

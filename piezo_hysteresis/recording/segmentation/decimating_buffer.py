@@ -43,8 +43,8 @@ def averaged_notice(average: int, sample_period: float, phase: str = "") -> Noti
     return Notice(
         "averaged",
         f"the recording has more than {ENOUGH} samples; {average} were averaged into one, to a sample period of "
-        f"{sample_period:g} s; motion above {0.5 / sample_period:.3g} Hz is lost; to keep it, use "
-        "`rows` keeps a part at the full rate, `average` = 1 keeps everything",
+        f"{sample_period:g} s; motion above {0.5 / sample_period:.3g} Hz is lost; to keep it, "
+        "choose a part by `rows`, which is read at the full rate, or set `average` to 1",
         phase,
     )
 

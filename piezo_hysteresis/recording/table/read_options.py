@@ -72,8 +72,8 @@ class ReadOptions:
     phases : str or sequence of (float, str), optional
         Name of the only phase, or start time [s] and name of each one; default: names proposed from the data.
     average : int, optional
-        Samples averaged into one while they are read. Default 1, and in a recording that is too long for the memory
-        as few as it takes; 1 keeps every sample, or refuses.
+        Number of samples averaged into one while they are read. Default: 1, and for a recording that is too long for
+        the memory the smallest number that is enough. A given 1 keeps every sample, or the recording is refused.
     include : sequence of str
         Phases to keep that are otherwise left out: ``idle``, ``hold``.
 

@@ -44,7 +44,7 @@ class Cells:
     columns: dict[str, Samples]
     """The numbers, each of shape (n,); NaN where a cell is empty or no number."""
     marks: list[tuple[int, dict[str, str]]]
-    """The words and the first row kept at which they are those; empty without words."""
+    """First kept row of every combination of words, and the words; empty without words."""
     bad: int
     """Number of cells that do not hold a number."""
     average: int
@@ -122,7 +122,7 @@ def _parsed(lines: list[str], dialect: Dialect, columns: list[int]) -> tuple[Sam
     try:
         values = np.loadtxt(text, delimiter=dialect.delimiter, usecols=columns, ndmin=2, comments=None, quotechar='"')
         return values, 0
-    except (ValueError, IndexError):  # an empty or wrong cell somewhere: look at every one
+    except (ValueError, IndexError):  # a cell is empty or wrong: every cell is parsed by itself
         values = np.full((len(lines), len(columns)), np.nan)
         bad = 0
         for i, line in enumerate(lines):

@@ -43,7 +43,7 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
 
 
 def units_of(channel: str) -> Mapping[str, float]:
-    """Units that a channel or label may have, each with its SI value; empty for what has none.
+    """Units that a channel or label may have, each with its SI value; empty if it has none.
 
     >>> list(units_of("temperature_of_base")), dict(units_of("phase"))
     (['K', 'mK'], {})
