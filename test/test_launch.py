@@ -58,14 +58,8 @@ def test_every_argument_is_described(name, arguments):
 
 
 def test_replay_plays_no_command(tmp_path):
-    replay = load("replay")
-    context = launch.LaunchContext()
-    context.launch_configurations.update(
-        {**dict.fromkeys(("params_file", "model_file"), ""), "bag": str(tmp_path), "axis": "stage_x", "rate": "1.0"},
-        namespace="replay",
-        use_sim_time="true",
-    )
-    player = next(a for a in replay.actions(context) if type(a) is launch.actions.ExecuteProcess)
+    values = {"bag": str(tmp_path), "axis": "stage_x", "namespace": "replay", "rate": "1.0"}
+    player = load("replay").player_of(values)
     words = [part.text for word in player.cmd for part in word]
     assert words[words.index("--topics") + 1 : words.index("--remap")] == [
         "/stage_x/samples", "/stage_x/phase", "/stage_x/model",

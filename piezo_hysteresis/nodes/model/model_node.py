@@ -37,6 +37,7 @@ from ...parameter import Parameter, Row, Setting
 from ...recording.table.time_column import round_period
 from ..messages.samples import SampleReader
 from ..runtime.guarded_node import GuardedNode
+from ..runtime.launch_values import LISTENING
 from ..runtime.node_clock import now
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
@@ -89,6 +90,7 @@ class ModelNode(GuardedNode):
         subscribe(self, "model", self._on_model)
         subscribe(self, "samples", self._on_samples, deep=True, raw=True)
         self.create_service(Trigger, "~/zero", self._on_zero)
+        self.get_logger().info(LISTENING)
 
     def _on_samples(self, message: bytes) -> None:
         try:

@@ -34,6 +34,8 @@ SWITCH: dict[str, bool] = {
 }
 """Words for yes and no."""
 
+LISTENING = "listening on samples"
+"""Line in the log of a model node from which on it takes samples; a launch file waits for it."""
 
 CHOSEN = ("FASTDDS_BUILTIN_TRANSPORTS", "FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 """Variables by which a user chooses the transports of Fast DDS."""
