@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..density import density
 from ..palette import BLACK, BLUE, ORANGE
-from .points import LINE_POINTS, extremes, followed, loop_places, newest_cycles, with_gaps
+from .points import LINE_POINTS, extremes, followed, loop_places, newest_cycles, padded, with_gaps
 from .sample_window import Window
 
 Array = NDArray[np.float64]
@@ -62,6 +62,13 @@ PROMISED: dict[str, Any] = {"color": BLUE, "line_width": 1.4, "line_dash": [2, 3
 """Line of the free-run error that the model file states."""
 
 
+LINES = (
+    *(f"{name}{end}" for name in ("measured", "predicted", "residual") for end in ("_time", "")),
+    *("voltage", "loop_measured", "loop_predicted"),
+)
+"""Columns of the lines over voltage and time; they reach the browser in one message, so that they always agree."""
+
+
 class WindowFigures:
     """Draws a window of samples in the range of the time axes.
 
@@ -78,25 +85,22 @@ class WindowFigures:
 
     def __init__(self, time_label: str = "time before now [s]") -> None:
         self._time = Range1d(0.0, 1.0, bounds=None)
-        self._loop = ColumnDataSource({"voltage": [], "measured": [], "predicted": []}, name="loop_data")
-        self._measured = ColumnDataSource({"time": [], "measured": []}, name="measured_data")
-        self._predicted = ColumnDataSource({"time": [], "predicted": []}, name="predicted_data")
-        self._residual = ColumnDataSource({"time": [], "residual": []}, name="residual_data")
+        self._lines = ColumnDataSource({name: [] for name in LINES}, name="lines_data")
         self._limits = ColumnDataSource({"time": [], "noise": [], "minus_noise": [], "error": [], "minus_error": []})
         self._spectrum = ColumnDataSource({"frequency": [], "residual": []}, name="spectrum_data")
         self._moved = ColumnDataSource({"frequency": [], "displacement": []})
         self._white = ColumnDataSource({"frequency": [], "noise": []})
         self.loop = _figure("loop", "Hysteresis loop", "drive voltage [V]", "displacement [µm]")
-        self.loop.line("voltage", "measured", source=self._loop, **MEASURED)
-        self.loop.line("voltage", "predicted", source=self._loop, **PREDICTED)
+        self.loop.line("voltage", "loop_measured", source=self._lines, **MEASURED)
+        self.loop.line("voltage", "loop_predicted", source=self._lines, **PREDICTED)
         over_time = {"x_range": self._time}
         self.displacement = _figure("displacement", "Displacement", time_label, "displacement [µm]", **over_time)
-        self.displacement.line("time", "measured", source=self._measured, **MEASURED)
-        self.displacement.line("time", "predicted", source=self._predicted, **PREDICTED)
+        self.displacement.line("measured_time", "measured", source=self._lines, **MEASURED)
+        self.displacement.line("predicted_time", "predicted", source=self._lines, **PREDICTED)
         self.residual = _figure(
             "residual", "Residual: measured minus predicted", time_label, "residual [nm]", **over_time
         )
-        self.residual.line("time", "residual", source=self._residual, color=ORANGE, legend_label="residual")
+        self.residual.line("residual_time", "residual", source=self._lines, color=ORANGE, legend_label="residual")
         for name, style in (("noise", FLOOR), ("error", PROMISED)):
             self.residual.line("time", name, source=self._limits, **style)
             self.residual.line("time", f"minus_{name}", source=self._limits, **style)
@@ -146,13 +150,14 @@ class WindowFigures:
         time, residual = part.time - origin, part.residual
         narrowest = (self.shown[1] - self.shown[0]) / LINE_POINTS  # that can be seen
         followed_at_once = followed(part.time, max(narrowest, 1.5 * window.sample_period))
-        for source, name, values, scale in (
-            (self._measured, "measured", part.displacement, 1e6),
-            (self._predicted, "predicted", part.prediction, 1e6),
-            (self._residual, "residual", residual, 1e9),
+        lines: dict[str, Array] = {}
+        for name, values, scale in (
+            ("measured", part.displacement, 1e6),
+            ("predicted", part.prediction, 1e6),
+            ("residual", residual, 1e9),
         ):
             at, drawn = with_gaps(extremes(values), np.isfinite(values) & followed_at_once, time, values)
-            source.data = {"time": at, name: scale * drawn}
+            lines |= {f"{name}_time": at, name: scale * drawn}
         cycles = newest_cycles(part)
         u, y, p = with_gaps(
             loop_places(cycles),
@@ -161,7 +166,8 @@ class WindowFigures:
             cycles.displacement,
             cycles.prediction,
         )
-        self._loop.data = {"voltage": u, "measured": 1e6 * y, "predicted": 1e6 * p}
+        lines |= {"voltage": u, "loop_measured": 1e6 * y, "loop_predicted": 1e6 * p}
+        self._lines.data = padded(lines)
         self._draw_limits(noise, error)
 
     def _draw_limits(self, noise: float | None, error: float | None) -> None:

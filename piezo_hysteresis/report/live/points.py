@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
@@ -71,6 +73,12 @@ def with_gaps(places: NDArray[np.intp], valid: NDArray[np.bool_], *columns: Arra
     missing = np.concatenate(([0], np.cumsum(~valid)))
     after = 1 + np.flatnonzero(np.diff(missing[places]))
     return [np.insert(column[places], after, np.nan) for column in columns]
+
+
+def padded(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Columns of one length: the shorter ones end with NaN, which is not drawn."""
+    longest = max(column.size for column in columns.values())
+    return {name: np.pad(c, (0, longest - c.size), constant_values=np.nan) for name, c in columns.items()}
 
 
 def followed(time: Array, longest: float) -> NDArray[np.bool_]:

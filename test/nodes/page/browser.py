@@ -28,6 +28,8 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -128,6 +130,12 @@ class Browser:
             f"(() => {{ const s = globalThis.Bokeh?.documents[0]?.get_model_by_name({json.dumps(name + '_data')});"
             f" return s ? {column} : {{}}; }})()"
         )
+
+    def loop(self) -> dict[str, NDArray[np.float64]]:
+        """Points of the loop in the browser: ``voltage``, ``loop_measured``, ``loop_predicted``, without gaps."""
+        columns = self.source("lines")
+        held = {k: np.array(columns.get(k, []), float) for k in ("voltage", "loop_measured", "loop_predicted")}
+        return {name: column[np.isfinite(held["voltage"])] for name, column in held.items()}
 
     def click(self, label: str) -> None:
         """Press the button with a label, as a mouse does; again, if the page has moved it away under the mouse."""
