@@ -29,6 +29,7 @@ from piezo_hysteresis.discrepancy.residual.noise_floor import floors
 from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.record import Experiment
+from piezo_hysteresis.report.figures.comparison import compare_diagnosis
 
 PERIOD = 5e-4
 STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
@@ -138,6 +139,10 @@ def test_diagnose_names_a_filter_and_its_model_predicts_better(model, another_da
     assert found.reason.startswith("The stage is the same, but behind a low-pass")
     assert found.gap.after < 0.5 * found.gap.before
     assert found.answer()["effects"] == [effect]
+    shown = compare_diagnosis(found)  # the page
+    assert shown.before.percent == pytest.approx(found.gap.before, rel=1e-9)
+    assert shown.now.percent == pytest.approx(found.gap.after, rel=1e-9)
+    assert float(found.model.provenance["free_run_error_percent"]) == pytest.approx(found.gap.live, rel=1e-4)
 
 
 def test_diagnose_says_that_nothing_has_changed(model, another_day):

@@ -28,7 +28,7 @@ from ...model.model import Model
 from ...model.provenance import data_hash
 from ...record import Experiment, Notice, Record
 from ..diagnosis import Conclusion, Diagnosis
-from ..gap import measure_gap
+from ..gap import measure_gap, stating
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
 from .change_kinds import LEAVES, ParameterChange
@@ -89,7 +89,7 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
     return Diagnosis(
         conclusion=Conclusion.CHANGED_PARAMETER,
         reason=sentence_of(change),
-        model=changed,
+        model=stating(changed, gap.live, stroke(records)),
         baseline=model,
         selection=None,
         fit=None,

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ...discrepancy import Diagnosis
 from ...discrepancy.residual.noise_floor import floors, noise_floors
-from ...discrepancy.residual.residual import Errors, errors
+from ...discrepancy.residual.residual import Errors, errors, zero_per_phase
 from ...identification.fit.normal_equations import Nuisance
 from ...model.model import Model
 from ...record import Experiment
@@ -134,11 +134,15 @@ def compare(
 
 
 def compare_diagnosis(found: Diagnosis) -> ModelComparison:
-    """The experiment of a diagnosis, with the model before and, if an effect was named, after it."""
+    """The experiment of a diagnosis, with the model before and, if an effect or a change was named, after it.
+
+    As in the gap of the answer, the sensor zero of every record is free.
+    """
     models = {}
     if found.baseline is not None:
         models["before"] = found.baseline
-    if found.selection is not None and found.selection.accepted and found.model not in (None, found.baseline):
+    is_named = found.change is not None or (found.selection is not None and bool(found.selection.accepted))
+    if is_named and found.model not in (None, found.baseline):
         assert found.model is not None
         models["after"] = found.model
-    return compare(found.experiment, models)
+    return compare(found.experiment, models, {label: zero_per_phase(model) for label, model in models.items()})
