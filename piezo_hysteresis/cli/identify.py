@@ -28,7 +28,7 @@ from ..model.axes_samples import has_several_drives
 from ..report.json_file import write_json
 from ..report.tables.parameter_table import correlation_table, parameter_table
 from ..report.tables.table import Table
-from ..report.words import error_sentence
+from ..report.words import describes, error_sentence
 from . import several_axes
 from .options import reading_options
 from .options.destination import add_results, require_new_results
@@ -81,7 +81,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Identify, print and save; returns 0, or 1 where the fit did not converge.
+    """Identify, print and save; returns 0, or 1 where the verdict is that the model cannot be trusted.
 
     Raises
     ------
@@ -114,7 +114,8 @@ def run(args: argparse.Namespace) -> int:
     show_notices(found.notices)
     out.print(f"wrote {path}")
     out.print(verdict_line(found), style="bold")
-    return 0 if found.fit.converged else 1
+    severe = any(notice.severe for notice in found.notices)
+    return 0 if found.fit.converged and describes(found.free_run_percent) and not severe else 1
 
 
 def verdict_line(found: Identification) -> str:

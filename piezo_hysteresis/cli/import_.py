@@ -45,7 +45,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read, write, and print what was found; returns 0.
+    """Read, write, and print what was found; returns 0, or 1 with severe findings.
 
     Raises
     ------
@@ -88,6 +88,9 @@ def run(args: argparse.Namespace) -> int:
                 ],
             },
         )
+    if any(notice.severe for notice in experiment.notices):
+        console().print("Severe findings above: check the recording before you use it.", style="bold")
+        return 1
     return 0
 
 

@@ -84,7 +84,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="piezo", description="Identify models of piezo stages, check them, and find missing physical effects."
+        prog="piezo",
+        description="Identify models of piezo stages, check them, and find missing physical effects.",
+        epilog="exit status: 0 done; 1 the result cannot be trusted, the last line says why; 2 bad input",
     )
     parser.add_argument("--version", action="version", version=f"piezo_hysteresis {__version__}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)

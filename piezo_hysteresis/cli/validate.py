@@ -31,7 +31,7 @@ from ..report.figures.comparison import ModelComparison, compare
 from ..report.json_file import write_json
 from ..report.tables.error_table import error_table, frequency_table
 from ..report.tables.table import Table
-from ..report.words import error_sentence
+from ..report.words import describes, error_sentence
 from . import several_axes
 from .options import reading_options
 from .options.destination import add_results, require_new_results
@@ -51,7 +51,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the errors and the residual tests; returns 0.
+    """Print the errors and the residual tests; returns 0, or 1 where model or data cannot be trusted.
 
     Raises
     ------
@@ -77,7 +77,8 @@ def run(args: argparse.Namespace) -> int:
     assert comparison.now is not None
     verdict = f"{error_sentence(comparison.now.percent)}{_left(tests)}{_doubts(experiment)}"
     console().print(f"Verdict: {verdict}", style="bold")
-    return 0
+    severe = any(notice.severe for notice in experiment.notices)
+    return 0 if describes(comparison.now.percent) and not severe else 1
 
 
 def _left(tests: list[dict[str, Any]]) -> str:

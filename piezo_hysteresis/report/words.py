@@ -41,13 +41,18 @@ def duration(seconds: float) -> str:
     return f"{seconds * 1e9:.4g} ns"
 
 
+def describes(percent: float) -> bool:
+    """Whether a model with this free-run error [% of range] describes the stage at all."""
+    return percent < USELESS
+
+
 def error_sentence(percent: float) -> str:
     """A free-run error in words.
 
     >>> error_sentence(126.0)
     'The model does not describe this stage: its error is 126 % of the range. Check columns, units and sample period.'
     """
-    if not percent < USELESS:
+    if not describes(percent):
         return (
             f"The model does not describe this stage: its error is {percent:.3g} % of the range. Check columns, units "
             "and sample period."

@@ -233,6 +233,8 @@ def test_swapped_channels_are_found(tmp_path):
     (line,) = (line for line in done.stdout.splitlines() if line.startswith("leads"))
     assert "both are swapped" in done.stdout
     assert "severe" in line
+    assert done.stdout.splitlines()[-1] == "Severe findings above: check the recording before you use it."
+    assert done.returncode == 1
 
 
 def test_three_phases_in_one_file_become_three(tmp_path):
@@ -240,7 +242,8 @@ def test_three_phases_in_one_file_become_three(tmp_path):
     rest = np.zeros(500)
     ramp = np.interp(t % 1, [0, 0.5, 1], [0, 8, 0])
     drive = np.concatenate((rest, 5 - 5 * np.cos(4 * np.pi * t), rest, ramp, rest, np.repeat([0.0, 3, 6, 3, 0], 600)))
-    rows = np.column_stack((np.arange(drive.size) * 1e-3, drive, 5.0 * drive))
+    noise = np.random.default_rng(0).normal(scale=0.01, size=drive.size)
+    rows = np.column_stack((np.arange(drive.size) * 1e-3, drive, 5.0 * drive + noise))
     path = table(tmp_path / "three.csv", "time_s,voltage_V,displacement_um\n", rows)
     done = piezo("import", path, "-o", tmp_path / "out")
     assert done.returncode == 0, done.stderr

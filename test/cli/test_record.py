@@ -61,7 +61,7 @@ def test_a_protocol_is_recorded_phase_by_phase(piezo, tmp_path, memory):
     [
         ("stage: simulated", "expected a parameter file of the driver"),
         ("/**:\n  ros__parameters:\n    speed: 1.0\n", "speed is no parameter of the driver"),
-        ("/**:\n  ros__parameters:\n    stage: toaster\n", "expected one of simulated"),
+        ("/**:\n  ros__parameters:\n    stage: toaster\n", "got 'toaster', expected one of "),
         ("/**:\n  ros__parameters:\n    stage: gcs2\n    gcs2: {host: nowhere}\n", "max_slew_rate: got 0 V/s"),
     ],
 )
