@@ -16,7 +16,7 @@
 
 Residuals of four kinds, each 0.05 % of the range RMS, on a stage that is driven with a 20 Hz sine at 5 kHz, and white
 residuals with a slow scan of 1 Hz. The model is exact, so the residual is only noise; every stream has its own
-baseline. The cost is that of a model node with a driver at 50 kHz, with a baseline and without.
+baseline. The cost is measured on a model node with a driver at 50 kHz, with a baseline and without.
 
     scripts/run python -m benchmarks.change --hours 1 --changes 3
 """
@@ -56,7 +56,7 @@ SLOW = "white, 1 Hz"
 INTERVAL = 600.0
 """Wanted time between false alarms [s]."""
 FACTOR = 2.0
-"""Promised closeness of the measured interval to the wanted one."""
+"""Promised ratio of the measured interval to the wanted one."""
 RIGHT = 0.95
 """Promised share of changes whose group is right after 1 s."""
 GROWTH = 20.0
@@ -137,7 +137,7 @@ def alarms(hours: float) -> Figures:
 
 
 def _poisson(count: int) -> tuple[float, float]:
-    """95 % interval of the mean of a Poisson variable that was `count` once."""
+    """95 % interval of the mean of a Poisson variable, after one observation of `count`."""
     return float(chi2.ppf(0.025, 2 * count)) / 2 if count else 0.0, float(chi2.ppf(0.975, 2 * count + 2)) / 2
 
 
@@ -169,9 +169,11 @@ def found(changes: int) -> Figures:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
-    parser.add_argument("--hours", type=float, default=3.0, help="stream without a change per kind; 0: none")
+    parser.add_argument(
+        "--hours", type=float, default=3.0, help="hours without a change for each kind of residual; 0: none"
+    )
     parser.add_argument("--changes", type=int, default=6, help="changes of every group per kind of residual; 0: none")
-    parser.add_argument("--seconds", type=float, default=30.0, help="time over which the cost is taken; 0: not at all")
+    parser.add_argument("--seconds", type=float, default=30.0, help="seconds of the measurement of the cost; 0: none")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:

@@ -70,7 +70,7 @@ def cost(seconds: float) -> Figures:
             while not condition():
                 processes.check()
                 if time.monotonic() > deadline:
-                    raise TimeoutError(f"the model node said last: {heard[-1].message if heard else 'nothing'}")
+                    raise TimeoutError(f"last message of the model node: {heard[-1].message if heard else 'nothing'}")
                 rclpy.spin_once(node, timeout_sec=0.1)
 
         wait(lambda: heard and heard[-1].hardware_id)

@@ -45,7 +45,7 @@ LEAST = 0.95
 
 
 def played(stage: Nanopositioner, triangles: bool) -> Experiment:
-    """A recording: a step from rest, a hold, growing sines or triangles, at every frequency."""
+    """A recording: a step from rest, a hold, and growing sines or triangles, for every frequency."""
     drives = (growing_sine(f, PERIOD, (0.4, 0.7, 1.0), triangle=triangles) for f in FREQUENCIES)
     names = ("triangle",) * len(FREQUENCIES) if triangles else tuple(f"sine_{f:g}hz" for f in FREQUENCIES)
     return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in zip(names, drives, strict=True)))
@@ -90,7 +90,7 @@ def named(model: Model, stage: Nanopositioner, triangles: bool) -> tuple[str, fl
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """How many stages."""
+    """Number of stages."""
     parser.add_argument("--stages", type=int, default=8)
     parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
     parser.add_argument("--triangles", action="store_true", help="triangles instead of sines")

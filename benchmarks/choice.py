@@ -58,7 +58,7 @@ COARSE = 5
 
 @dataclass(frozen=True)
 class Outcome:
-    """One stage, answered."""
+    """One stage with its answer."""
 
     group: str
     truth: tuple[str, ...]
@@ -80,7 +80,7 @@ class Outcome:
 
     @property
     def is_wrong(self) -> bool:
-        """True if an effect was named with certainty that is not in the stage."""
+        """True if an effect that is not in the stage was named with certainty."""
         return self.end == "sure" and not set(self.families) <= set(self.right_families)
 
     @property
@@ -149,7 +149,7 @@ def answer(case: Case) -> Outcome:
 
 
 def wanted(groups: tuple[str, ...], seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
-    """Cases of the independent plant, the groups in turn, so that a run that was stopped has seen all."""
+    """Cases of the independent plant. The groups take turns, so that a stopped run contains all of them."""
     kinds: list[list[Case]] = []
     for group in groups:
         if group == "twins":
@@ -186,9 +186,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=1, help="seeds of every effect; other groups in proportion")
     parser.add_argument("--groups", nargs="+", choices=GROUPS, default=["effect_free", "effects"])
-    parser.add_argument("--only", default="", help="cases whose label holds this word")
-    parser.add_argument("--cases", type=int, help="stop after so many cases")
-    parser.add_argument("--all-noises", action="store_true", help="noise of 0.01, 0.05 and 0.2 %%; else 0.05 %%")
+    parser.add_argument("--only", default="", help="cases whose label contains this word")
+    parser.add_argument("--cases", type=int, help="largest number of cases")
+    parser.add_argument("--all-noises", action="store_true", help="noise of 0.01, 0.05 and 0.2 %%; otherwise 0.05 %%")
     parser.add_argument("--json", type=Path, help="outcomes as JSON, written after every case")
     parser.add_argument("--jobs", type=int, default=1, help="cases at a time, each on a core")
     options = parser.parse_args()

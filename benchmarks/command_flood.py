@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A process that sends commands of 16 MB without a pause, for as long as it lives: a driver decodes and refuses them.
+"""A process that sends commands of 16 MB without a pause until it is ended. A driver decodes and refuses them.
 
 scripts/run python -m benchmarks.command_flood --ros-args -r __ns:=/stage_x
 """
@@ -36,7 +36,7 @@ SAMPLES = 1_000_000
 
 
 def main() -> None:
-    """Flood `command`; a good waveform but for the step at its end."""
+    """Flood `command` with a waveform that is valid except for the step at its end."""
     rclpy.init()
     node = Node("flood")
     publisher = node.create_publisher(PointCloud2, "command", COMMAND)

@@ -110,7 +110,7 @@ def path(shape: str, frequency: float, stroke: float) -> np.ndarray:
 
 
 class Bench:
-    """A stage, its models, and what is measured on it.
+    """A stage, its models, and the measurements on it.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
     parser.add_argument("--stages", nargs="+", choices=STAGES, default=list(STAGES))
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--no-feedback", action="store_true", help="leave out the search for the gains of a PI")
+    parser.add_argument("--no-feedback", action="store_true", help="without the search for PI gains")
     parser.add_argument("--data", default=None, help="folder of measured data (default: PIEZO_DATA or ../shared/data)")
     parser.add_argument("--samples", type=int, default=200_000, help="of the speed test")
 

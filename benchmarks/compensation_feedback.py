@@ -41,7 +41,7 @@ COMPARED = 300
 TRIED = [(p, i) for p in (0.0, 0.1, 0.3, 0.6, 1.0) for i in (0.003, 0.01, 0.03, 0.1, 0.2, 0.4)]
 """Proportional and integral gains from the best of which the search starts."""
 EVALUATIONS = 80
-"""Largest number of gains that the search tries besides."""
+"""Largest number of further gains that the search tries."""
 
 
 @kernel

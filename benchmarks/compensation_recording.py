@@ -15,8 +15,8 @@
 """A measured piezo that was driven through another inverse: the command of our inverse, and its predicted error.
 
 In rows 11152 to 12151 of the record Test of picma-p885, the stage was driven through the authors' inverse. Our model is
-identified from the record Model, simulates Test up to that row, and is inverted from this state. There is no stage for
-a measurement: our error is a prediction, theirs a measurement.
+identified from the record Model, simulates Test up to that row, and is inverted from this state. The stage is not
+available: our error is a prediction, and that of the authors is a measurement.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ COLUMNS = ("quantity", "value")
 
 
 def recorded(folder: str | None) -> Figures:
-    """The table; a note where the data are not at hand."""
+    """The table; a note if the data are missing."""
     place = Path(folder or os.environ.get("PIEZO_DATA", "../shared/data"))
     file = place / "picma-p885" / "Test_Vi_Do_Di.dat"
     if not file.exists():
@@ -81,5 +81,5 @@ def _rms(values: np.ndarray) -> float:
 
 
 def _best_lag(wanted: np.ndarray, measured: np.ndarray) -> int:
-    """Rows by which shifting the path makes the measured one most alike."""
+    """Shift of the path, in rows, at which it agrees best with the measured one."""
     return min(range(10), key=lambda k: _rms(measured[k:] - wanted[: wanted.size - k]))

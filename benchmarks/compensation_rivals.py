@@ -58,7 +58,7 @@ def run_multiplicative(w, a, beta, gamma, p1, p2, low, high, v):
 
 
 def multiplicative(model: Model, wanted: np.ndarray, limits: Limits) -> np.ndarray:
-    """The multiplicative structure of Rakotondrabe 2011: the last state of the loop is taken off, no inversion."""
+    """The multiplicative structure of Rakotondrabe 2011: the last state of the loop is subtracted."""
     loop, scale = model["bouc_wen"], model.voltage_scale
     arx = model["arx"]
     assert isinstance(arx, Arx) and isinstance(loop, BoucWen)

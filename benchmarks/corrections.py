@@ -62,9 +62,9 @@ ABSENT = (
     "thermal_drift",
     "axis_coupling",
 )
-"""Effects whose family is taken out of the library."""
+"""Effects whose family is removed from the library."""
 WORSE = 1.05
-"""Error over that without the correction from which a record counts as worse."""
+"""Ratio of the error to that without the correction, from which a record counts as worse."""
 
 
 def _soft_stop(plant: Plant, u: Array, y: Array, t: Array) -> Array:
@@ -105,7 +105,7 @@ def _creep_of_level(plant: Plant, u: Array, y: Array, t: Array) -> Array:
 
 
 OUTSIDE = {f.__name__.strip("_"): f for f in (_soft_stop, _scale_error, _guide_friction, _two_bumps, _creep_of_level)}
-"""Effects that are in no catalogue and that a passive correction might hold."""
+"""Effects that are not in the catalogue and that a passive correction may describe."""
 
 
 def unseen(player: Plant, seed: int) -> Experiment:
@@ -134,7 +134,7 @@ def unseen(player: Plant, seed: int) -> Experiment:
     for rms in (0.5, 0.8):
         add("multisine", multisine(rms, rng, 30.0, 1000.0))
     add("noise", noise(0.07, 0.25, rng))
-    return Experiment(tuple(records), source="waveforms that took no part")
+    return Experiment(tuple(records), source="waveforms that were not used")
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class Outcome:
 
 
 def cases(seeds: int) -> Iterator[Case]:
-    """Every hidden thing once per seed."""
+    """Every hidden effect once for each seed."""
     for seed in range(seeds):
         for name, effect in {**OUTSIDE, **UNKNOWN}.items():
             extra = {"unknown": effect, "unknown_name": (name,)}
@@ -226,7 +226,7 @@ def main() -> None:
 
 
 def report(outcomes: list[Outcome]) -> Table:
-    """One row per hidden thing, and their sum."""
+    """One row for each hidden effect, and their sum."""
     table = Table("hidden", "unknown", "accepted", "form", "gap removed", "records worse by 5 %", "worst record")
     by_label: dict[str, list[Outcome]] = defaultdict(list)
     for outcome in outcomes:

@@ -96,7 +96,7 @@ def truth_of(plant: Plant, model: Model) -> dict[str, float]:
 
 
 def main() -> None:
-    """Diagnose every effect in stages of several seeds and count the intervals that hold the truth."""
+    """Diagnose every effect in stages of several seeds, and count the intervals that contain the true value."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--effects", nargs="+", choices=COMPARED, default=list(COMPARED))
@@ -122,7 +122,7 @@ def main() -> None:
                         said = "holds" if low <= truth[key] <= high else "excludes"
                         print(f"{key} seed {seed}: {low:.6g} to {high:.6g} {said} {truth[key]:.6g}", flush=True)
     held = np.abs(errors) <= 1.0
-    print(f"{held.sum()} of {held.size} intervals hold the truth; error over half width, rms {np.std(errors):.2f}")
+    print(f"{held.sum()} of {held.size} intervals contain the truth; error over half width, rms {np.std(errors):.2f}")
 
 
 if __name__ == "__main__":

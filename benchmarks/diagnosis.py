@@ -57,7 +57,7 @@ class FullRate:
 
 
 def stage() -> Plant:
-    """One that creeps."""
+    """A stage with creep."""
     return Plant.random(np.random.default_rng(5), hidden={"creep": ("logarithmic", 0.015)})
 
 
@@ -69,7 +69,7 @@ def cost(experiment: Experiment, effects: Collection[type[Effect]] = CATALOGUE) 
 
 
 def peak() -> float:
-    """Most memory this process has held so far [GB]."""
+    """Largest memory of this process so far [GB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
 
 
@@ -120,7 +120,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
 
 
 def distribution() -> Figures:
-    """Processor time over stages with one effect and with none, all of another form than the catalogue."""
+    """Processor time for stages with one effect and with none. All differ in form from the catalogue."""
     cost(next(cases(("quick",), 1)).experiment())
     spent = np.array([cost(case.experiment())[0] for case in cases(("quick",), 1)])
     half, most = np.quantile(spent, (0.5, 0.95)).tolist()

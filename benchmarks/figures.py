@@ -107,7 +107,7 @@ def console() -> Console:
 
 
 def show(figures: list[Figures]) -> None:
-    """Print tables, and what failed below each."""
+    """Print the tables, and below each the promises that were not kept."""
     out = console()
     for one in figures:
         out.print(one.table())
@@ -126,7 +126,7 @@ def alone(module: str) -> None:
     benchmark = sys.modules[module]
     parser = argparse.ArgumentParser(description=(benchmark.__doc__ or "").splitlines()[0])
     benchmark.arguments(parser)
-    parser.add_argument("--json", type=Path, help="write the figures there")
+    parser.add_argument("--json", type=Path, help="file for the figures")
     options = parser.parse_args()
     figures = benchmark.run(options)
     show(figures)

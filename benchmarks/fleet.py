@@ -58,7 +58,7 @@ ROOT = Path(__file__).parents[1]
 MOST = 0.02
 """Processor time beside one second of work that is promised [s]."""
 GROWTH = 1.5
-"""Cost per recording at the largest number over that at the smallest, at most."""
+"""Largest ratio of the cost per recording at the largest number to that at the smallest."""
 STAGES = 20
 """Stages among which the recordings are divided."""
 

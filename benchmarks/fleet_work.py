@@ -26,7 +26,7 @@ from piezo_hysteresis.record import Experiment
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Takes its time, and ends its process at a recording with a phase ``crash``.
+    """Waits for a fixed time, and ends its process at a recording with a phase ``crash``.
 
     Parameters
     ----------

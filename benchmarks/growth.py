@@ -51,7 +51,7 @@ Case = tuple[str, str, Sequence[int], Callable[[int], Work]]
 
 
 def switched_on(name: str) -> Effect:
-    """An effect of the catalogue, by a typical size away from absent."""
+    """An effect of the catalogue with a typical size."""
     kind = BY_NAME[name]
     on = {p.name: p.off + p.scale for p in kind.parameters if p.off is not None and not p.is_array}
     return kind(**on)
@@ -135,7 +135,7 @@ def draw(curves: Sequence[tuple[str, Sequence[int], Sequence[float]]], path: Pat
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
-    parser.add_argument("--figure", type=Path, help="draw the curves there")
+    parser.add_argument("--figure", type=Path, help="file for a figure of the curves")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:

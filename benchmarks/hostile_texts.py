@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Texts that are no models, made to cost a reader time, memory or its life: for tests and for the soak."""
+"""Texts that are no models and cost a reader time or memory, or crash it: for tests and for the soak."""
 
 from __future__ import annotations
 
 
 def hostile_texts(good: str) -> dict[str, str]:
-    """Texts by what they try, some of them changes of the text of a good model file."""
+    """Texts by their kind; some are changes of the text of a valid model file."""
     return {
         "nothing": "",
         "a zero byte": "\x00",

@@ -73,7 +73,7 @@ def whole(data: Experiment) -> Figures:
 
 
 def error(model: Model, data: Experiment) -> float:
-    """Free-run RMS of the last validation record, offset apart, noise included [% of its range]."""
+    """Free-run RMS of the last validation record, without its offset, with its noise [% of its range]."""
     record = data.records[-1]
     return 100.0 * float(np.std(record.displacement - model.simulate(record)[0]) / np.ptp(record.displacement))
 
@@ -151,7 +151,7 @@ def state(converged: bool) -> str:
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
     parser.add_argument("--seeds", type=int, default=4, help="260 000 samples each")
-    parser.add_argument("--limit", type=int, default=60, help="steps of scipy at most")
+    parser.add_argument("--limit", type=int, default=60, help="largest number of steps of scipy")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:

@@ -36,7 +36,7 @@ NATIVE = 2e-5
 
 Array = np.ndarray
 Unknown = Callable[["Plant", Array, Array, Array], Array]
-"""(plant, drive [V], reading [m], time [s]) → reading with something no catalogue holds."""
+"""(plant, drive [V], reading [m], time [s]) → reading with an effect that is not in the catalogue."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Plant:
 
     @classmethod
     def random(cls, rng: np.random.Generator, **fixed: Any) -> Plant:
-        """Parameters around the published ones, all of them different."""
+        """Parameters near the published ones, with another value for each."""
 
         def near(value: float, spread: float) -> float:
             return float(value * np.exp(rng.uniform(-spread, spread)))

@@ -44,7 +44,7 @@ LOOP = PublishedBoucWen()
 NUMBERS = np.array([LOOP[n] for n in ("A", "beta", "gamma", "p1", "p2")])
 SCALES = (10.0, 1e-5)
 PYTHON = 20
-"""Plain Python gets so many times fewer samples."""
+"""Ratio of the number of samples to that for plain Python."""
 CHAINS: dict[str, tuple[Effect, ...]] = {
     "Eq. (7)": (PublishedBoucWen(),),
     "Eq. (7) + delay + ARX(8,8)": (PublishedBoucWen(), ARX),
@@ -86,7 +86,7 @@ def own_loop(v: np.ndarray) -> Work:
 
 
 def own_chain(u: np.ndarray) -> Work:
-    """What a user calls: `Model.run`, checks and copies included."""
+    """`Model.run` as a user calls it, with its checks and copies."""
     model = Model((LOOP, ARX), PERIOD, *SCALES)
     return lambda: model.run(u, model.rest(float(u[0])))[0]
 
@@ -153,7 +153,7 @@ def compare(u: np.ndarray) -> Figures:
 
 
 def sensitivities(samples: int) -> Figures:
-    """Simulation of records, and what all sensitivities cost beside it."""
+    """Simulation of records, and the additional cost of all sensitivities."""
     data, rows = record(samples), []
     for name, effects in CHAINS.items():
         model = Model(effects, PERIOD)

@@ -46,7 +46,7 @@ LEVELS = (100, 200, 300)
 PROMISED = (0.087, 0.131, 0.169)
 """Largest error at every level [µm]."""
 FITTED = 4
-"""Realisations that fit; the others judge."""
+"""Number of realisations that are fitted; the others are test records."""
 PERIOD = 8192
 """Samples in a period of the drives."""
 RATE = 6400.0
@@ -102,9 +102,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
-    """Fit, predict what was left out, and compare."""
+    """Fit, predict the test records, and compare."""
     folder = options.data / "fsm-mirror"
-    title = "Fine steering mirror, three axes: RMSE on what was not fitted [µm]"
+    title = "Fine steering mirror, three axes: RMSE on records that were not fitted [µm]"
     if not folder.is_dir():
         print(f"mirror: skipped, no measured data in {folder}; give their folder with --data or PIEZO_DATA")
         return []

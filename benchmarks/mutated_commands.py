@@ -24,7 +24,7 @@ from rclpy.serialization import serialize_message
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud
 
 HIGHEST = 0.01
-"""Of the commands before they are changed [V]: what is still one moves the stage no further."""
+"""Largest voltage of the commands before they are changed [V], which limits the motion by those that remain valid."""
 SIZES = (0, 1, 7, 8, 15, 16, 2**16, 2**31, 2**32 - 1)
 
 

@@ -45,7 +45,7 @@ VISIBLE = 1.5
 
 @dataclass(frozen=True)
 class Outcome:
-    """One case, answered."""
+    """One case with its answer."""
 
     group: str
     truth: tuple[str, ...]
@@ -139,7 +139,7 @@ def confusion(outcomes: list[Outcome]) -> Table:
 
 
 def figures(outcomes: list[Outcome]) -> Table:
-    """Shares of every group; what is right counts among the cases all of whose effects can be seen."""
+    """Shares of every group. Right answers are counted among the cases all of whose effects are visible."""
     table = Table("group", "cases", "visible", "families right", "names right", "unknown", "false family")
     for group in GROUPS:
         members = [o for o in outcomes if o.group == group]
@@ -182,9 +182,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=5, help="seeds of every effect; other groups in proportion")
     parser.add_argument("--quick", action="store_true", help="one seed at the middle noise")
-    parser.add_argument("--cases", type=int, help="stop after so many cases")
+    parser.add_argument("--cases", type=int, help="largest number of cases")
     parser.add_argument("--groups", nargs="+", choices=(*GROUPS, "quick"), default=list(GROUPS))
-    parser.add_argument("--only", default="", help="cases whose label holds this word")
+    parser.add_argument("--only", default="", help="cases whose label contains this word")
     parser.add_argument("--json", type=Path, help="outcomes as JSON")
     parser.add_argument("--jobs", type=int, default=1, help="cases at a time, each on a core")
     options = parser.parse_args()
@@ -196,7 +196,7 @@ def main() -> None:
     for k, (case, found) in enumerate(zip(wanted, answers, strict=True), 1):
         try:
             outcome = found.result()
-        except Exception as error:  # a crash is counted, and the benchmark goes on
+        except Exception as error:  # a crash is counted, and the benchmark continues
             out.print(f"{k}/{len(wanted)} {case.label} seed {case.seed}: [red]{error!r}")
             crashes += 1
             continue

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Cases of the naming benchmark: what is hidden, in which stage, at which noise, and what an answer would be right."""
+"""Cases of the naming benchmark: the hidden effects, the stage, the noise, and the right answer."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Case:
 
     @property
     def library(self) -> tuple[type[Effect], ...]:
-        """What the finder may choose from."""
+        """Effects from which the gap finder may choose."""
         return tuple(e for e in CATALOGUE if e.family not in self.without)
 
     @property
@@ -109,7 +109,7 @@ class Case:
         return plant, seed
 
     def experiment(self) -> Experiment:
-        """Its data."""
+        """The recorded data."""
         player, seed = self.player()
         return poor(player, seed) if self.group == "poor" else rich(player, seed, self.layout)
 
@@ -222,7 +222,7 @@ def _wander(plant: Plant, u: np.ndarray, y: np.ndarray, t: np.ndarray) -> np.nda
 
 
 UNKNOWN = {f.__name__.strip("_"): f for f in (_interpolation, _line, _telegraph, _breathing_gain, _wander)}
-"""Effects that are in no catalogue."""
+"""Effects that are not in the catalogue."""
 
 
 def _uncatalogued(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
@@ -270,7 +270,7 @@ def _packaged(case: Case, seed: int) -> PlantParameters:
 
 
 def _draw(name: str, rng: np.random.Generator) -> Any:
-    """Size of an effect in the independent plant: large enough to matter, small enough to be real."""
+    """Size of an effect in the independent plant: large enough to be visible, small enough to be realistic."""
 
     def size(low: float, high: float) -> float:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))

@@ -31,7 +31,7 @@ FULL = 10.0
 
 
 class Player(Protocol):
-    """What plays a phase from rest and returns its record."""
+    """A function that plays a phase from rest and returns its record."""
 
     volt: float
 
@@ -72,7 +72,7 @@ class ProtocolVariant:
     hold : float
         Length of its steps [s].
     with_steps : bool
-        Whether step phases are there.
+        Whether there are step phases.
     """
 
     shift: float = 0.0
@@ -161,7 +161,7 @@ def rich(plant: Player, seed: int, layout: ProtocolVariant | None = None) -> Exp
 
 
 def poor(plant: Player, seed: int) -> Experiment:
-    """What the paper records: a step, noise, a triangle, and sines."""
+    """The phases of the paper: a step, noise, a triangle, and sines."""
     kept, seen = [], set[str]()
     for record in rich(plant, seed):
         if record.phase.split("_")[0] in ("step", "noise", "triangle", "sine") and record.phase not in seen:

@@ -33,7 +33,7 @@ from piezo_hysteresis.record import Record
 Array = np.ndarray
 
 FINER = 8
-"""Steps of the plant per sample, about."""
+"""Approximate number of steps of the plant per sample."""
 TURN = 0.3
 """Time at which creep turns from its fast rate to its slow one [s]."""
 DRIFT = 10.0

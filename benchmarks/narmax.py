@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Identification beside SysIdentPy, which fits polynomial NARX models; left out where the package is not installed.
+"""Identification compared with SysIdentPy, which fits polynomial NARX models; skipped if it is not installed.
 
 Both get the records of one experiment, in volts and normalised displacement, and predict its validation record in free
 run. Theirs is a NARX polynomial of second degree with lags around the dead time, 12 or 20 terms chosen by FROLS and the
@@ -62,7 +62,7 @@ def against_sysidentpy(data: Experiment) -> Figures | None:
         return spent
 
     hysteresis = PublishedBoucWen
-    own("identify, the whole of it", lambda: identify(data, gain=gain, hysteresis=hysteresis, **scales).model)
+    own("identify, complete", lambda: identify(data, gain=gain, hysteresis=hysteresis, **scales).model)
     steps = own("three steps as published", lambda: three_steps(data.records, hysteresis=hysteresis, **scales).model)
     theirs = []
     for terms in TERMS:
@@ -71,7 +71,7 @@ def against_sysidentpy(data: Experiment) -> Figures | None:
         rows.append((f"SysIdentPy, FROLS, {terms} terms", spent, size / spent / 1e6, error))
     rows.append((f"ratio to the three steps, {TERMS[0]} terms", theirs[0] / steps, None, None))
     columns = ("what", "processor s", "M samples/s", "free run, held out, % of range")
-    return Figures(f"Beside SysIdentPy {sysidentpy.__version__}, {size:.1e} samples", columns, rows)
+    return Figures(f"Compared with SysIdentPy {sysidentpy.__version__}, {size:.1e} samples", columns, rows)
 
 
 def _narx(fitted: Sequence[Record], held_out: Record, terms: int) -> tuple[float, float]:

@@ -56,7 +56,7 @@ SETTLE = 5.0
 
 
 class Listener:
-    """Takes predictions of one namespace and notes how late they are."""
+    """Receives the predictions of one namespace and measures their delay."""
 
     def __init__(self, namespace: str) -> None:
         self.node, self.executor = Node("listener", namespace=namespace), make_executor()

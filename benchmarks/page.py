@@ -47,9 +47,9 @@ PERIOD = 2e-5
 MOST_TIME, MOST_MEMORY = 20.0, 300.0
 """What is promised: % of a core, MB."""
 LOOK = 5.0
-"""Time between two looks at the memory [s]."""
+"""Time between two readings of the memory [s]."""
 SETTLED = 180.0
-"""Time after which what is drawn has been drawn once, and the memory should remain as it is [s]."""
+"""Time after which everything was drawn once, so that the memory should remain constant [s]."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

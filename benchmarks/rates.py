@@ -85,7 +85,7 @@ def lag_holds(found: Identification, stage: Nanopositioner) -> bool:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """How many stages."""
+    """Number of stages."""
     parser.add_argument("--stages", type=int, default=6)
     parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
 
@@ -110,7 +110,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
         if median > promised:
             failures.append(f"{what}: {median:.3g} %, promised {promised}")
     columns = ("left out", "median", "largest", "promised", "interval holds the lag")
-    return [Figures("Free-run error on what was left out, % of range", columns, table, tuple(failures))]
+    return [Figures("Free-run error on the records that were left out, % of range", columns, table, tuple(failures))]
 
 
 if __name__ == "__main__":

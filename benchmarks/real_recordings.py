@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A measured piezo: what each model reaches on the recording it was fitted to and on another, in free run.
+"""A measured piezo: free-run error of several models, on the recording to which they were fitted and on another one.
 
 Rows 0 to 7000 of the Model record of picma-p885 fit and choose everything; the whole Test record is predicted from
 0 V. One constant is free per record, nothing else. Errors are RMS in % of the range of the record.
@@ -164,7 +164,7 @@ def predictions(record: Record) -> Iterator[tuple[str, Prediction | None]]:
     yield "classical Bouc-Wen and lag", classical(modified, record)
     yield "modified Bouc-Wen and lag (identify --no-memory)", free_run(modified)
     yield IDENTIFIED, free_run(identify(whole, memory=True).model)
-    for name, effects in ((WITH_DRIFT, (ThermalDrift,)), ("what diagnose chooses", CATALOGUE)):
+    for name, effects in ((WITH_DRIFT, (ThermalDrift,)), ("the model of diagnose", CATALOGUE)):
         found = diagnose(whole, effects=effects)
         assert found.model is not None and found.selection is not None
         names = " + ".join(step.best.effect.public_name() for step in found.selection.accepted)
@@ -179,7 +179,7 @@ def repeatability(record: Record) -> float:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Where the data are."""
+    """Declare the options."""
     parser.add_argument("--data", default=os.environ.get("PIEZO_DATA", "../shared/data"), help="holds picma-p885")
 
 

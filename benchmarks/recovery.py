@@ -15,8 +15,8 @@
 """Recovery benchmark: does identification return the published model from its own data?
 
 Data by Eq. (5) to (7) at 20 µs with the published coefficients, v = V/10, white noise of 0.05 % of the full stroke.
-Beside the joint identification stands what the plain published three steps reach: driven by noise, the hysteresis
-state forgets, and G takes the blame.
+The joint identification is compared with the published three steps alone. In their noise record the influence of
+earlier hysteresis decays, and this changes the estimate of G.
 
     python -m benchmarks.recovery --seeds 100
 """
@@ -134,7 +134,7 @@ def recover(seed: int) -> Recovery:
 
 
 def coverage(results: list[Recovery]) -> float:
-    """Share of 95 % intervals of the five numbers that hold the truth [%]."""
+    """Share of 95 % intervals of the five numbers that contain the true value [%]."""
     return 100.0 * float(np.mean(np.abs(np.concatenate([r.deviates for r in results])) <= 1.96))
 
 

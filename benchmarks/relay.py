@@ -15,7 +15,7 @@
 """The limit of streaming: three processes that hand blocks on by rclpy alone, without computing or writing anything.
 
 A source publishes blocks of the size and at the pace of the driver, a relay publishes each one again, and this process
-takes both. What the nodes need beyond that is theirs.
+receives both. The difference to the benchmark of streaming is the cost of the nodes.
 
     scripts/run python -m benchmarks.relay source 500   (one of the processes, with blocks of 500 samples)
 """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How long until the voltage falls after a stop, and until a device is safe when its driver dies.
+"""Time from a stop until the voltage falls, and from the death of a driver until its device is safe.
 
     scripts/run python -m benchmarks.safety_times [BACK_END...]
 

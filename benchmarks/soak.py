@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`make soak`: 50 kHz with faults at random; counts everything in and out, and prints the balance.
+"""`make soak`: 50 kHz with random faults; counts all samples that were sent and received, and prints the balance.
 
-A driver with a stage that notes every voltage it is given, a model node and a recorder run as processes; this one
-commands loops without a pause, hears everything, and lets one fault after the other strike. After each of them samples
-must flow and predictions be good again. The exit code is 1 where a promise was broken. The seed fixes which faults
-come, when and for how long.
+A driver whose stage logs every voltage that it receives, a model node and a recorder run as processes. This process
+sends commands without a pause, receives everything, and causes one fault after the other. After each fault, samples
+must arrive and predictions must be right again. The exit code is 1 if a promise was broken. The seed determines the
+faults, their times and their durations.
 
     make soak SOAK="--minutes 1 --seed 3"
     make soak SOAK="--minutes 10 --rate 100000 --no-faults"
@@ -221,7 +221,7 @@ class Soak:
         if not self.has_faults:
             rows += [(f"growth of {name}, MB/min", self._growth(name)) for name in self.soaked.starts]
         rows += [("promises broken", counts["promises broken"])]
-        return Figures("Soak: what went in and what came out", ("", "count"), rows, tuple(self.keeper.broken))
+        return Figures("Soak: samples sent and received", ("", "count"), rows, tuple(self.keeper.broken))
 
 
 def main() -> int:
@@ -232,7 +232,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=10.0, help="default: 10")
     parser.add_argument("--seed", type=int, default=0, help="fixes the faults; default: 0")
     parser.add_argument("--rate", type=float, default=50e3, help="samples per second; default: 50000")
-    parser.add_argument("--no-faults", dest="faults", action="store_false", help="let nothing strike")
+    parser.add_argument("--no-faults", dest="faults", action="store_false", help="cause no faults")
     options = parser.parse_args()
     if not options.faults and options.minutes < 5:
         parser.error(f"--no-faults: got --minutes {options.minutes:g}, expected at least 5")

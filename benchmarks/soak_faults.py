@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The faults of the soak: each strikes, lasts a moment, and leaves; what must hold is checked elsewhere."""
+"""The faults of the soak. Each one begins, lasts for a moment, and ends; the promises are checked elsewhere."""
 
 from __future__ import annotations
 

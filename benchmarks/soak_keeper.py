@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Keeper`: hears everything in the soak and keeps the balance: what went in, what came out, what was wrong."""
+"""`Keeper`: receives everything in the soak and counts samples that were sent, received, or wrong."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ class Keeper:
         self.counts["samples predicted"] += size
         self.is_good = bool(cloud.is_dense)
         if not cloud.is_dense:
-            self.counts["predictions flagged as not to be trusted"] += size
+            self.counts["predictions marked as not reliable"] += size
         elif worst > self._false:
             self.counts["false predictions published as good"] += size
             self.break_promise(f"prediction {self.predicted} is off by {worst * 1e9:.0f} nm and published as good")

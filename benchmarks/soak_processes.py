@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Soaked`: the processes under fire; each can be killed, stopped and started again."""
+"""`Soaked`: the processes of the soak; each can be killed, stopped and started again."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`StageLog`: the voltages that a stage was given, as the watched driver wrote them down."""
+"""`StageLog`: the voltages that a stage received, from the log of the watched driver."""
 
 from __future__ import annotations
 

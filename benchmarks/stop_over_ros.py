@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From a call of `~/stop` over ROS until the voltage at the wire falls, the driver being a node process."""
+"""Time from a call of `~/stop` over ROS until the voltage at the wire falls; the driver is a node process."""
 
 from __future__ import annotations
 

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The process that has a waveform played over and over while a stream is recorded.
+"""The process that has a waveform played again and again while a stream is recorded.
 
-Packing and sending megabytes would keep a recorder from the blocks that come meanwhile.
+It is a process of its own, because a recorder that packs and sends megabytes would miss blocks meanwhile.
 
     scripts/run python -m benchmarks.stream_sender /stage_x 2e-5 waveform.npy
 """

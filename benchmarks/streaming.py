@@ -12,15 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Streaming over DDS: driver, model node and a recorder as processes of their own; nothing may be lost.
+"""Streaming over DDS: driver, model node and a recorder as separate processes; no sample may be lost.
 
-The driver plays sines and slow loops, one after the other, which a fourth process sends; this one is the recorder. It
-writes every topic to a bag, at the first rate once more the samples and predictions alone, and counts the samples in it
-afterwards. Latency counts from the last sample of a block to its residual in the recorder's hands. Beside it stands
-what three processes take that hand on as much by rclpy alone.
+A fourth process sends sines and slow loops, which the driver plays one after the other; this process is the recorder.
+It writes every topic to a bag, at the first rate once more the samples and predictions alone, and counts the samples in
+the bag afterwards. Latency is the time from the last sample of a block to its residual in the recorder. For comparison,
+three processes hand on the same data by rclpy alone.
 
-The exit code is 1 where a sample is missing, doubled, or was played at another voltage than was commanded, up to
-500 kHz; beyond, the highest rate is sought that loses nothing. All processes take `config/large_blocks.xml`.
+The exit code is 1 if, up to 500 kHz, a sample is missing, doubled, or was played at another voltage than commanded.
+Beyond that, the highest rate without a loss is searched. All processes use `config/large_blocks.xml`.
 
     python -m benchmarks.streaming --rate 50e3 200e3 --seconds 30
 """
@@ -230,7 +230,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="of the first rate, with all topics and with blocks alone; 8 of the others",
     )
     parser.add_argument("--axes", type=int, default=2, help="at once, at the first rate; 1 leaves it out")
-    parser.add_argument("--no-search", action="store_true", help="do not seek the highest rate")
+    parser.add_argument("--no-search", action="store_true", help="do not search for the highest rate")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:

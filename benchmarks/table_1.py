@@ -16,8 +16,8 @@
 
 The stage is taken as the published model with one more effect. Two models predict its sines 3.5 + 2.5 sin(2πft) V: the
 published cascade, and the hysteresis alone times the dc gain of G. The five numbers of the loop were fitted at 1 Hz, so
-whatever of the effect they can imitate there is taken out, to first order. The error, RMS over peak-to-peak, is added
-in quadrature to the 0.90 % that both rows show at 1 Hz, and the numbers of the effect are fitted to the twelve
+the part of the effect that they can imitate at 1 Hz is removed, to first order. The error, RMS over peak-to-peak, is
+added in quadrature to the 0.90 % that both rows show at 1 Hz, and the numbers of the effect are fitted to the twelve
 published percentages.
 
     python -m benchmarks.table_1

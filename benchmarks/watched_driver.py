@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A driver whose stage notes every voltage it is given, sample by sample, before it does anything with it.
+"""A driver whose stage logs every voltage that it receives, sample by sample, before it uses it.
 
     python watched_driver.py LOG --ros-args …
 
-Where a file LOG.clock is there, the clock of the computer is off by the seconds in it, for this process alone.
+If there is a file LOG.clock, the clock of the computer is wrong by the seconds in it, for this process only.
 
-A start of the process is a NaN in the log; a driver that is killed can leave no sample out, since the samples of a
-block are with the operating system before the stage sees them.
+A start of the process is a NaN in the log. A killed driver cannot leave a sample out, because the operating system gets
+the samples of a block before the stage does.
 """
 
 import sys

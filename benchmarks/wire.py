@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A driver's session on every back end, and what the device really puts out, sample by sample."""
+"""A driver's session on every back end, and the real output of the device, sample by sample."""
 
 from __future__ import annotations
 

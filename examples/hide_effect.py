@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Write the plant file of a simulated stage in which a physical effect is hidden, and say nothing.
+"""Write the plant file of a simulated stage with a hidden physical effect, and print nothing.
 
-No two stages are alike: loop, gain and mechanics differ from those of the paper as well, which identification has to
-find. The demo starts this before the driver, gives the driver the path, and reads the file only after the verdict.
+No two stages are alike: loop, gain and mechanics also differ from those of the paper, and identification has to find
+them. The demo starts this before the driver, gives the driver the path, and reads the file only after the verdict.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ INDIVIDUAL = (
     "structure.frequency1",
     "structure.damping1",
 )
-"""What differs from stage to stage, by some per cent."""
+"""Quantities that differ from stage to stage by some per cent."""
 
 
 def individual_stage(seed: int) -> PlantParameters:

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A back end for a device of your own: everything the driver needs, from two functions that your lab has already.
+"""A back end for a device of your own: everything that the driver needs, from two functions.
 
-`put(volts)` sets the drive, `get()` reads the sensor in metres. Whoever has those two has a stage, paced by the clock
-of this machine: for sample periods of a millisecond or more. A device with a clock or a memory of its own is written
-the same way: `stage/daqmx/stage.py` streams on a hardware clock, `stage/gcs2/stage.py` uploads, plays and reads back.
+`put(volts)` sets the drive, and `get()` reads the sensor in metres. The clock of this machine sets the pace, for sample
+periods of a millisecond or more. Back ends of devices with a clock or a memory are written in the same way:
+`stage/daqmx/stage.py` streams on a hardware clock, and `stage/gcs2/stage.py` uploads, plays and reads back.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class OwnStage:
         voltage_max: float,
         max_slew_rate: float,
     ) -> None:
-        # 1. Say what the device is and what it may be asked for; everything else is refused before anything moves.
+        # 1. Describe the device and its limits; everything outside them is refused before anything moves.
         self._description = Description(
             name=name,
             streaming=True,
@@ -79,25 +79,25 @@ class OwnStage:
 
     @property
     def sample_period(self) -> float:
-        """Sample period in force [s]."""
+        """Present sample period [s]."""
         return self._sample_period
 
     @property
     def voltage(self) -> float:
-        """Drive voltage in force [V]."""
+        """Present drive voltage [V]."""
         return self._voltage
 
     def configure(self, sample_period: float) -> None:
-        """Sample every so many seconds [s]."""
+        """Set the sample period [s]."""
         self._require_open()
         self._sample_period = self._description.check_sample_period(sample_period)
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
-        """Hold the limits of the driver from now on: what leaves this machine passes the limiter, always."""
+        """Use the limits of the driver from now on; every voltage passes the limiter before it leaves this machine."""
         self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
 
-    # 2. The fast path: as many samples back as were given, each measured while its voltage was applied. If the device
-    #    fails in the midst of it, raise StageError; the driver then calls `safe`.
+    # 2. The fast path returns as many samples as were given, each measured while its voltage was applied. If the device
+    #    fails meanwhile, raise StageError; the driver then calls `safe`.
     def exchange(self, voltage: Samples) -> Acquired:
         """Apply a block of drive voltages [V], one per sample period."""
         self._require_open()
@@ -118,7 +118,7 @@ class OwnStage:
         self._go(self._limiter.goal(voltage))
 
     def read_voltage(self) -> float:
-        """The voltage in force [V]: nothing measures it here."""
+        """The present voltage [V]; it is not measured here."""
         return self._voltage
 
     def read_displacement(self) -> float:
@@ -126,8 +126,8 @@ class OwnStage:
         self._require_open()
         return self._get()
 
-    # 4. The way to safety: harmless when repeated, and it must work in every state. Where it fails, raise StageError
-    #    with what is known about the voltage.
+    # 4. The way to the safe voltage may be repeated, and must work in every state. If it fails, raise StageError and
+    #    state what is known about the voltage.
     def safe(self) -> None:
         """Go to 0 V."""
         if not self._closed and self._voltage != self._limiter.safe_voltage:

@@ -14,8 +14,9 @@
 
 """Play a bag where there is no `ros2 bag play`: `python play_bag.py BAG [--rate 2] [--topics /samples /model]`.
 
-Every message goes out as it was recorded, on its own topic (`--ros-args -r /samples:=/replay/samples` renames it), and
-/clock follows the times of the bag: start the nodes with use_sim_time. A recorded `command` moves no stage, it is old.
+Every message is published as it was recorded, on its own topic (`--ros-args -r /samples:=/replay/samples` renames it).
+/clock follows the times of the bag, so start the nodes with use_sim_time. A recorded `command` is too old to move a
+stage.
 """
 
 import argparse

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Read an experiment, whatever its format, and say what is in it: `python read_experiment.py PATH`."""
+"""Read an experiment of any format and list its phases: `python read_experiment.py PATH`."""
 
 import sys
 

@@ -51,7 +51,7 @@ finished = Future()
 
 
 def on_status(status: DiagnosticStatus) -> None:
-    """Print what the driver says about our waveform."""
+    """Print the status of the driver about our waveform."""
     state = {value.key: value.value for value in status.values}["state"]
     if status.name == "my_sine":
         print(f"{status.name}: {state}" + (f", {status.message}" if state == "refused" else ""))

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`make demo`: a stage with something hidden in it, identified, followed live, found out and driven, over real ROS 2.
+"""`make demo`: a stage with a hidden effect is identified, followed live, diagnosed and driven, over real ROS 2.
 
-Driver, model, identification and compensation node run as processes of their own. The effect is drawn by a seed and
-written to a plant file that only the driver reads; it is shown here after the verdict.
+Driver, model, identification and compensation node run as separate processes. A seed determines the effect. It is
+written to a plant file that only the driver reads, and shown here after the verdict.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Demo:
             "driver_node",
             real_time_factor=speed,
             block_duration=0.01 * speed,  # 100 messages a second, as in real time
-            command_max_age=30.0,  # 80 MB of staircase take their time on a busy machine
+            command_max_age=30.0,  # to send 80 MB of staircase takes long on a busy machine
             simulated__plant_file=plant,
             simulated__seed=seed,
         )
@@ -93,7 +93,7 @@ class Demo:
         processes.start("identification_node", protocol=protocol, experiment_root=self.folder / "experiments")
         processes.start(
             "compensation_node",
-            approximate=True,  # whatever is hidden: what cannot be inverted is in the expected error
+            approximate=True,  # an effect without an inverse is left out, and contained in the expected error
             approach=scan.APPROACH,
             way_back=scan.APPROACH,
             learning_rounds=scan.ROUNDS,
@@ -104,13 +104,13 @@ class Demo:
         return Bench(NAMESPACE, LIMITS.sample_period, processes.check)
 
     def show_page(self, bench: Bench, log: Path) -> None:
-        """Say where a browser shows the stage while the demo runs."""
+        """Print the address of the live page, which shows the stage while the demo runs."""
         bench.wait(lambda: "http://" in log.read_text(), "the live page", PATIENCE)
         address = log.read_text().partition("http://")[2].split()[0]
         self.say(f"live page: http://{address} in a browser on this machine, while the demo runs")
 
     def look(self, bench: Bench, name: str, model: Model) -> None:
-        """Play the probe and show what the model node, which follows `model`, leaves of it."""
+        """Play the probe and show the residual of the model node, which follows `model`."""
         trace = bench.play(np.concatenate(list(self.parts.values())), "probe")
         self.traces[name] = trace
         before = next(iter(self.traces.values())).rms
@@ -119,7 +119,7 @@ class Demo:
         self.say(f"[bold]live residual {trace.rms * 1e9:7.1f} nm[/bold] rms  {bar}  {name}: {chain}")
 
     def plan(self, bench: Bench) -> str:
-        """What the identification node is going to play; nothing moves."""
+        """The plan of the identification node; nothing moves."""
         while not (answer := bench.call("plan")).success:
             self.say(answer.message)
             bench.pause(1.0)
@@ -191,22 +191,22 @@ class Demo:
         self.say(f"written: {os.path.relpath(self.folder)}/report.html, residual.png, scan.png, scan.csv")
 
     def reveal(self) -> None:
-        """What the stage was hiding."""
+        """Print the hidden effect."""
         with (self.folder / "plant.yaml").open() as plant:
             self.say(f"[bold]the plant file opens: {plant.readline().removeprefix('# ').strip()}[/bold]")
         self.say("like every simulated stage it also has an amplifier with a pole of its own, at 10 kHz")
         if self.conclusion == "nothing_missing":
-            self.say("the identified model had taken it in already: its residual was at the noise before the search")
+            self.say("the identified model contained it already: its residual was at the noise before the search")
 
 
 def interrupt(number: int, frame: object) -> None:
-    """End like Ctrl-C, the nodes first; rclpy may turn what is raised here into an error of its own."""
+    """End like Ctrl-C, the nodes first; rclpy may replace the exception that is raised here by another one."""
     signalled.append(number)
     raise KeyboardInterrupt
 
 
 def main() -> int:
-    """Run the demo; 0 when it went through, whatever the verdict."""
+    """Run the demo; returns 0 if it was completed, for every verdict."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1, help="draws the hidden effect (default: 1)")
     parser.add_argument("--effect", help="hide this effect; the seed then draws its size only")

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Bench`: what a person at the bench has of the stage: services, waveforms, the live residual. ROS messages only."""
+"""`Bench`: access to the stage as a user has it: services, waveforms, the live residual. It uses ROS messages only."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ KEPT = 3000
 
 @dataclass
 class Trace:
-    """What the model node said while a waveform was played.
+    """Output of the model node while a waveform was played.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Trace:
     residual : (n,) ndarray
         Measured minus predicted displacement [m].
     live_rms : list of float
-        What `residual_rms` showed meanwhile [m].
+        Values of `residual_rms` meanwhile [m].
     """
 
     time: Array
@@ -81,7 +81,7 @@ class Recording:
         self._blocks: deque[SampleBlock] = deque(maxlen=KEPT)
 
     def take(self, message: bytes) -> None:
-        """Take in a message of `samples`."""
+        """Add a message of `samples`."""
         self._blocks.append(self._reader.read(message))
 
     def holds(self, index: int) -> bool:
@@ -186,7 +186,7 @@ class Bench:
         """The model published after the first `before` ones, once the model node predicts with it."""
         self.wait(lambda: len(self.models) > before, "a new model", 60.0)
         model = loads(self.models[-1])
-        self.wait(lambda: self._followed == hash_number(model), "the model node to change over", 60.0)
+        self.wait(lambda: self._followed == hash_number(model), "the model node to use it", 60.0)
         return model
 
     def pause(self, duration: float) -> None:
@@ -210,7 +210,7 @@ class Bench:
         RuntimeError
             If the driver does not play it to its end.
         TimeoutError
-            If that, or its prediction, takes too long.
+            If the waveform, or its prediction, takes too long.
         """
         self._live_rms = []
         self.wait(lambda: bool(self._live_rms), "a prediction by the model node", 60.0)

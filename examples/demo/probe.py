@@ -24,7 +24,7 @@ from piezo_hysteresis.identification.protocol.excitation import hold, mixture, s
 
 
 def probe(limits: DriveLimits) -> dict[str, NDArray[np.float64]]:
-    """Slow loops, a fast sine, levels held, and a random mixture [V], by name: 8 s that no fit has seen."""
+    """Slow loops, a fast sine, levels held, and a random mixture [V], by name: 8 s that are not used in any fit."""
     parts = {
         "slow loops": triangle(limits, (1.0, 0.6), 1.0),
         "200 Hz": sine(limits, 200.0, 0.3, centre=0.5, amplitude=0.4),

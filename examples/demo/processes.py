@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Processes`: the nodes of the demo as processes of their own, ended by their own id on every way out."""
+"""`Processes`: the nodes of the demo as separate processes. Each is ended by its id, however the demo ends."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SET_PARENT_DEATH_SIGNAL = 1
 
 
 def _end_with_parent() -> None:
-    """Should the demo be killed outright, its nodes get SIGTERM from the kernel, and the stage is left safe."""
+    """If the demo is killed, the kernel sends SIGTERM to its nodes, and the stage goes to its safe voltage."""
     ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGTERM)
 
 
@@ -80,7 +80,7 @@ class Processes:
         for name, process in self._running.items():
             if process.poll() is not None:
                 log = self._logs / f"{name}.log"
-                raise RuntimeError(f"{name} ended with code {process.returncode}; its last words are in {log}")
+                raise RuntimeError(f"{name} ended with code {process.returncode}; the end of its log is in {log}")
 
     def __enter__(self) -> Self:
         return self

@@ -14,7 +14,7 @@
 
 """The end of the demo: the same scan with a linear gain, with the inverse of each model, and after learning.
 
-The compensation node plans and plays; this side only sends the path in metres and reads what the sensor says.
+The compensation node plans and plays. This module only sends the path in metres and reads the sensor.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Run:
     expected : float
         Rms error that was expected before it was played [m].
     note : str
-        Why it was refused, or what learning says of its rounds; empty elsewhere.
+        Reason of a refusal, or result of the rounds of learning; empty otherwise.
     """
 
     method: str
@@ -91,7 +91,7 @@ class Run:
 
 
 class Scan:
-    """Plays the scan with every method and keeps what was measured.
+    """Plays the scan with every method and keeps the measurements.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class Scan:
             self.runs[name].append(Run("linear gain", measured - wanted, expected))
 
     def follow(self, method: str) -> None:
-        """Send every path to the compensation node, which drives it through the inverse of the model in force."""
+        """Send every path to the compensation node, which drives it through the inverse of its present model."""
         for name, wanted in self.wanted.items():
             phase = f"{method.split()[0]}_{name}"
             status = self._bench.follow(wanted, phase)
@@ -134,7 +134,7 @@ class Scan:
             self.runs[name].append(self._run(method, wanted, values_of(status), refused))
 
     def learn(self, method: str) -> None:
-        """Send the paths once more, and let the node correct what it measures; the best round counts, as there."""
+        """Send the paths once more, and let the node correct the measured error; the best round counts."""
         for name, wanted in self.wanted.items():
             best = end = self._bench.follow(wanted, f"learning_{name}")
             if values_of(best)["state"] == "done":
@@ -150,7 +150,7 @@ class Scan:
         return Run(method, measured - wanted, float(values["expected"]), note)
 
     def show(self, console: Console) -> None:
-        """One table: the error expected beside the one that was measured, of both paths."""
+        """One table: the expected and the measured error of both paths."""
         span = 1e6 * (HIGH - LOW) * self.stroke
         table = Table(title=f"Error of a scan over {span:.3g} µm, rms in % of it, the noise of the sensor included")
         table.add_column("drive", no_wrap=True)

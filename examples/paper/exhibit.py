@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Exhibit`: a figure, and beside it the numbers that a test holds it to."""
+"""`Exhibit`: a figure, and the numbers that a test compares."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ class Exhibit:
     name : str
         File name without ending, e.g. ``"figure_1"``.
     figure : matplotlib.figure.Figure
-        What to look at.
+        The picture.
     numbers : dict
-        What to check: name with unit to a number or a list of numbers.
+        Numbers that a test checks: name with unit to a number or a list of numbers.
     """
 
     name: str

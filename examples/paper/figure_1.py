@@ -14,7 +14,7 @@
 
 """Fig. 1: the modified Bouc-Wen loop beside the classical one.
 
-The classical operator is symmetric under a half turn; the cubic of the modified one bends both branches the same way.
+The classical operator is symmetric under a half turn. The cubic term of the modified one bends both branches alike.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@
 
 """Fig. 5: frequency response measured with noise, beside the ARX model of step 2.
 
-They agree, as in the paper; and both are wrong at low frequency. Noise keeps the Bouc-Wen state near zero, where the
-slope of the loop is p2 + A; slow content lets the state relax, the slope tends to p2, and G takes the difference.
+They agree, as in the paper, and both are wrong at low frequency. Noise keeps the Bouc-Wen state near zero, where the
+slope of the loop is p2 + A. At low frequency the state relaxes and the slope tends to p2. G contains the difference.
 """
 
 from __future__ import annotations

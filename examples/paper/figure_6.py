@@ -14,8 +14,9 @@
 
 """Fig. 6: the triangle of several amplitudes, and the MBW loop fitted to it in step 3.
 
-At 1 Hz the stage is its dc gain K and its delay d, so w(i) = y(i + d)/K. The paper reaches 0.73 %. A Bouc-Wen stage is
-fitted down to its noise; a Prandtl-Ishlinskii one, which Bouc-Wen can only approach, keeps a residual as a piezo does.
+At 1 Hz the stage acts as its dc gain K and its delay d, so w(i) = y(i + d)/K. The paper reaches 0.73 %. A Bouc-Wen
+stage is fitted down to its noise. Bouc-Wen can only approach a Prandtl-Ishlinskii stage: a residual remains, as for a
+real piezo.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Fig. 9: a triangle of 100 Hz, fitted by nobody: the dynamic model and MBW alone against the measurement."""
+"""Fig. 9: a triangle of 100 Hz that was not fitted: the dynamic model and MBW alone against the measurement."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from two_stages import alone, experiment, joint, last_period
 
 
 def figure_9() -> Exhibit:
-    """The last two periods, and what each model leaves."""
+    """The last two periods, and the residual of each model."""
     record = experiment("bouc_wen").named("triangle_100hz")[0]
     end = last_period(record, 100.0, level=1.0).stop
     part = slice(end - 2 * round(0.01 / record.sample_period), end)

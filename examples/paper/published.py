@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the paper prints: its coefficients, its input, its table. Everything else is computed.
+"""The printed numbers of the paper: its coefficients, its input, its table. Everything else is computed.
 
 Paper: "Modeling of Rate-Dependent Hysteresis in Piezoelectric Actuators Using a Hammerstein-Like Structure with a
 Modified Bouc-Wen Model".

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Table 1, row of MBW alone: how much of it is nothing but the lag of G.
+"""Table 1, row of MBW alone: the part that is caused by the lag of G alone.
 
-The published model is taken as the truth; MBW alone is its hysteresis with the dc gain of G instead of G. What is left
-is the phase lag of G. In quadrature with the published row of the dynamic model it gives the published row of MBW.
+The published model is taken as the truth; MBW alone is its hysteresis with the dc gain of G instead of G. The
+difference is the phase lag of G. In quadrature with the published row of the dynamic model it gives the row of MBW.
 """
 
 from __future__ import annotations

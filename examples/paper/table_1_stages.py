@@ -15,8 +15,8 @@
 """Table 1 on the simulated stages: free-run error of the dynamic model and of MBW alone, on sines held out of the fit.
 
 On the Bouc-Wen stage the dynamic model is as good as the sensor, 0.05 % of the full stroke. On the Prandtl-Ishlinskii
-stage, as on a real piezo, a Bouc-Wen model keeps what its loop cannot follow; what grows with frequency in MBW alone is
-the lag of G in both.
+stage, as on a real piezo, a Bouc-Wen model has a residual that its loop cannot describe. In both stages the error of
+MBW alone grows with frequency because of the lag of G.
 """
 
 from __future__ import annotations

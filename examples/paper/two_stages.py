@@ -42,7 +42,7 @@ from piezo_hysteresis.stage.simulated import SimulatedStage
 
 OPERATORS = ("bouc_wen", "prandtl_ishlinskii")
 VALIDATION = (*(f"sine_{f:g}hz" for f in published.FREQUENCIES), "triangle_100hz", "validation")
-"""Phases that nothing is fitted to."""
+"""Phases that are not fitted."""
 TITLES = {"bouc_wen": "Bouc-Wen stage", "prandtl_ishlinskii": "Prandtl-Ishlinskii stage"}
 
 
