@@ -46,6 +46,8 @@ SLOWEST = 2e-3
 """Longest sample period of averaged slow records [s]; mains hum stays visible."""
 FAITHFUL = 3e-4
 """Largest RMS deviation of the drive from straight lines between its block averages, relative to its range."""
+PATH_LOST = 0.01
+"""Largest share of the path of the drive, Σ |Δu|, that its block averages may lose; a loop remembers every turn."""
 FAST = 1e-3
 """Smallest curvature of a fast drive: mean second difference over standard deviation; slow loops have 1e-5."""
 SMOOTH = 2e-3
@@ -94,7 +96,10 @@ def less(records: Sequence[Record], changes: Sequence[Array]) -> tuple[Record, .
 
 
 def slowed(record: Record) -> Record:
-    """The record at a longer sample period, if it is long and block averages describe its drive.
+    """The record at a longer sample period, if it is long, its drive is slow, and block averages describe the drive.
+
+    A record that excites the dynamics is not averaged, because at a longer period the model describes the dynamics by a
+    lag only.
 
     Parameters
     ----------
@@ -111,7 +116,8 @@ def slowed(record: Record) -> Record:
 
 
 def _averaged(record: Record, factor: int) -> Record:
-    return record.decimate(factor) if factor > 1 and not _differs(record, factor) else record
+    is_described = factor > 1 and excitation_content(record).is_slow and not _differs(record, factor)
+    return record.decimate(factor) if is_described else record
 
 
 def _differs(record: Record, factor: int) -> bool:
@@ -121,14 +127,16 @@ def _differs(record: Record, factor: int) -> bool:
     means = u[: blocks * factor].reshape(blocks, factor).mean(axis=1)
     middles = factor * np.arange(blocks) + (factor - 1) / 2.0
     lines = np.interp(np.arange(u.size), middles, means)
-    return bool(np.sqrt(np.mean((u - lines) ** 2)) > FAITHFUL * float(np.ptp(u)))
+    path, kept = (float(np.abs(np.diff(x)).sum()) for x in (u[int(middles[0]) : int(middles[-1]) + 2], means))
+    deviates = bool(np.sqrt(np.mean((u - lines) ** 2)) > FAITHFUL * float(np.ptp(u)))
+    return deviates or kept < (1.0 - PATH_LOST) * path
 
 
 def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
     """Every record with about `most` samples: slow ones averaged, fast ones cut if the beginning represents all.
 
-    A record is not cut if another one continues it, or if its drive changes. A record that excites the dynamics is not
-    averaged, because at a longer period the model describes the dynamics by a lag only.
+    A record is not cut if another one continues it, or if its drive changes. Only slow drives are averaged, as by
+    `slowed`.
 
     Parameters
     ----------
@@ -139,13 +147,9 @@ def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
     """
     followed = [*(r.continues for r in records[1:]), False]
     return tuple(
-        r[:most] if r.size > most and not goes_on and _is_alike(r, most) else _thinned(r, most)
+        r[:most] if r.size > most and not goes_on and _is_alike(r, most) else _averaged(r, r.size // most)
         for r, goes_on in zip(records, followed, strict=True)
     )
-
-
-def _thinned(record: Record, most: int) -> Record:
-    return _averaged(record, record.size // most) if excitation_content(record).is_slow else record
 
 
 def _is_alike(record: Record, most: int) -> bool:

@@ -29,6 +29,7 @@ from piezo_hysteresis.discrepancy.residual.sampling import (
     slowed,
     voltage_noise,
 )
+from piezo_hysteresis.identification.records.excitation_content import excitation_content
 from piezo_hysteresis.record import Record
 
 FAST = 2e-5
@@ -55,6 +56,18 @@ def test_averages_that_do_not_describe_the_drive_are_not_used():
     assert slowed(sine(200.0, FAST, 1.0)).sample_period < 1e-3 / 2
     noise = Record(RANDOM.normal(size=50_000), RANDOM.normal(size=50_000), FAST)
     assert slowed(noise) is noise
+
+
+def test_averages_that_lose_the_turns_of_the_drive_are_not_used():
+    """A triangle that turns at every sample for 4 % of the time: slow by its spectrum, but a loop feels every turn."""
+    speed = np.repeat(np.tile((1.0, -1.0), 3), 16_000)
+    shaken = np.arange(speed.size) % 1_000 < 40
+    speed[shaken] *= np.where(np.arange(speed.size)[shaken] % 2, 1.0, -1.0)
+    wander = np.cumsum(speed) / 16_000
+    record = Record(wander, wander * 1e-6, FAST)
+    assert excitation_content(record).is_slow
+    assert slowed(record) is record
+    assert shortened([record], 6_000)[0] is record
 
 
 def test_noise_is_cut_and_a_chirp_is_not():
