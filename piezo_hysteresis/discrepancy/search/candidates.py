@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from ...effects import Arx, Effect, MainsHum, Offset
 from ...errors import DivergenceError, ModelError, ParameterError
+from ...identification.fit.bounded_step import room
 from ...identification.fit.fit import Fit, gauge
 from ...identification.fit.normal_equations import Gram, grams
 from ...model.model import Model
@@ -110,23 +111,33 @@ def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
 
 def score_model(model: Model, training_data: TrainingData) -> Score:
     """Score of a fitted model on records left out."""
-    return cross_validate(*_products(model, training_data), training_data.alone)
+    products, floors, columns, limits = _products(model, training_data)
+    return cross_validate(products, floors, columns, training_data.alone, limits)
 
 
 def score_baseline(model: Model, training_data: TrainingData) -> tuple[TrainingData, Score]:
     """The training data and the score. A record that alone determines a parameter of the model is never left out."""
-    products = _products(model, training_data)
-    alone = indispensable(*products)
-    return replace(training_data, alone=alone), cross_validate(*products, alone)
+    products, floors, columns, limits = _products(model, training_data)
+    alone = indispensable(products, floors, columns)
+    return replace(training_data, alone=alone), cross_validate(products, floors, columns, alone, limits)
 
 
-def _products(model: Model, training_data: TrainingData) -> tuple[list[Gram], Array, Array]:
+def _products(
+    model: Model, training_data: TrainingData
+) -> tuple[list[Gram], Array, Array, tuple[Array, Array]]:
     names = free_numbers(model, training_data)
-    return (
-        grams(model, training_data.records, names, training_data.nuisance),
-        training_data.floors,
-        directions(model, names),
-    )
+    products = grams(model, training_data.records, names, training_data.nuisance)
+    columns = directions(model, names)
+    return products, training_data.floors, columns, _room(model, names, columns)
+
+
+def _room(model: Model, names: Sequence[str], columns: Array) -> tuple[Array, Array]:
+    """Smallest and largest step along every column before a parameter leaves its bounds."""
+    values = model.values()
+    theta = np.array([values[n] for n in names])
+    lower, upper = (np.array([getattr(model.row(n), end) for n in names]) for end in ("lower", "upper"))
+    moves = columns[: len(names)]
+    return room(lower, theta, moves, -np.inf), room(upper, theta, moves, np.inf)
 
 
 def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:
@@ -181,9 +192,9 @@ def _screen_off(model: Model, training_data: TrainingData, base: list[str], memb
     for effect in members:
         wanted = [kept + names.index(n) - len(base) for n in own[effect.name]]
         part = columns[:, [*range(kept), *wanted]]
-        found.append(
-            Candidate(effect, training_data, cross_validate(products, training_data.floors, part, training_data.alone))
-        )
+        limits = _room(extended, names, part)
+        score = cross_validate(products, training_data.floors, part, training_data.alone, limits)
+        found.append(Candidate(effect, training_data, score))
     return found
 
 
@@ -205,9 +216,8 @@ def _screen_moves(model: Model, training_data: TrainingData, base: list[str], mo
     kept = columns.shape[1] - len(usable)
     found = []
     for k, effect in enumerate(usable):
-        score = cross_validate(
-            products, training_data.floors, columns[:, [*range(kept), kept + k]], training_data.alone
-        )
+        part = columns[:, [*range(kept), kept + k]]
+        score = cross_validate(products, training_data.floors, part, training_data.alone, _room(model, base, part))
         if score.step[-1] > 0.0:  # otherwise the effect with opposite sign would improve the prediction
             found.append(Candidate(effect, training_data, score))
     return found

@@ -79,7 +79,11 @@ class Score:
 
 
 def cross_validate(
-    grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array, alone: Collection[int] = ()
+    grams: Sequence[Gram],
+    floors: Sequence[float] | Array,
+    columns: Array,
+    alone: Collection[int] = (),
+    room: tuple[Array, Array] | None = None,
 ) -> Score:
     """Score of a model extended by `columns`; every record is judged with parameters from the others.
 
@@ -93,8 +97,18 @@ def cross_validate(
         Directions of the parameters as combinations of the rows of `grams`; zero in the last row, the residual.
     alone : collection of int
         Indices of records that are the only ones of their kind; they are judged with the parameters from all records.
+    room : tuple of two (q,) ndarray, optional
+        Smallest and largest step along every direction. A direction at a bound is held there if the records together
+        pull it outwards: an amplifier does not lead, even where a negative time constant would improve the prediction.
     """
     counted, products = _counted(grams, floors)
+    if room is not None:
+        columns, held = columns.copy(), True
+        while held:
+            step = _step(products, columns)
+            outwards = ((step < 0.0) & (room[0] >= 0.0)) | ((step > 0.0) & (room[1] <= 0.0))
+            columns[:, outwards] = 0.0
+            held = bool(outwards.any())
     hessians = np.array([columns.T @ p @ columns for p in products])
     slopes = np.array([columns.T @ p[:, -1] for p in products])
     power = np.array([p[-1, -1] for p in products])
@@ -130,6 +144,13 @@ def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, column
     whitened = vectors[:, known] / np.sqrt(values[known]) * scale[:, None]
     shares = [float(np.linalg.eigvalsh(whitened.T @ h @ whitened)[-1]) for h in hessians]
     return tuple(i for i, share in zip(counted, shares, strict=True) if share > SPOILT * grams[i].size * (1.0 - share))
+
+
+def _step(products: Sequence[Array], columns: Array) -> Array:
+    """Linearised change of the parameters from all records."""
+    total = np.sum(products, axis=0)
+    hessian, slope = columns.T @ total @ columns, columns.T @ total[:, -1]
+    return np.asarray(_solve(hessian[None], slope[None], _scale(hessian))[0])
 
 
 def _counted(grams: Sequence[Gram], floors: Sequence[float] | Array) -> tuple[list[int], list[Array]]:

@@ -96,3 +96,14 @@ def test_no_single_bad_record_decides():
 
 def test_below_the_floor_nothing_is_gained():
     assert Score(np.array([0.2, 0.9]), np.empty(0)).cost == 0.0
+
+
+def test_a_direction_at_its_bound_is_held_where_the_data_pull_it_outwards(problem):
+    designs, measured = problem
+    low, high = np.array([-np.inf, 0.0, -np.inf]), np.full(3, np.inf)
+    score = cross_validate(products(designs, measured), FLOORS, COLUMNS, room=(low, high))
+    others = cross_validate(products(designs, measured), FLOORS, COLUMNS[:, [0, 2]])
+    assert score.step[1] == 0.0, "the data want -2"
+    np.testing.assert_allclose(score.ratios, others.ratios, rtol=1e-9)
+    inwards = cross_validate(products(designs, measured), FLOORS, COLUMNS, room=(-high, -low))
+    np.testing.assert_array_equal(inwards.ratios, cross_validate(products(designs, measured), FLOORS, COLUMNS).ratios)
