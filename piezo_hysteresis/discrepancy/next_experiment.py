@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import DivergenceError
 from ..identification.fit.fit import gauge
 from ..identification.fit.normal_equations import grams
 from ..identification.protocol import excitation
@@ -121,6 +122,8 @@ def distances(
 ) -> dict[str, float]:
     """Mean squared difference of two models on every drive, after the first has adjusted its parameters, in floors².
 
+    It is 0 if one of the models diverges, because the drive is then far outside what the models describe.
+
     Parameters
     ----------
     first, second : Model
@@ -137,7 +140,11 @@ def distances(
     floor = float(np.min(training_data.floors))
     found = {}
     for name, record in drives.items():
-        (difference,) = (a - b for a, b in zip(second.simulate(record), first.simulate(record), strict=True))
+        try:
+            (difference,) = (a - b for a, b in zip(second.simulate(record), first.simulate(record), strict=True))
+        except DivergenceError:
+            found[name] = 0.0
+            continue
         (gram,) = grams(first, [record], free, training_data.nuisance, [difference[None, :]])
         total = gram.matrix[:-1, :-1] / (gram.size * floor * floor)
         q = len(free)
