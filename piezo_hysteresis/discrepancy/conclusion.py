@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..errors import DivergenceError
 from ..identification.fit.fit import Fit, Progress
 from ..identification.fit.normal_equations import Nuisance
 from ..record import Experiment
@@ -76,9 +77,14 @@ def concluded(
         unseen = bool(setup.test_records)
         return measure_gap(models, records, chosen, least.tolist(), setup.span, nuisances, unseen)
 
-    gap = gap_of(final, final_training_data.nuisance)
-    falls = not named or gap.falls
-    if named and not falls:
+    falls = True
+    if named:
+        try:
+            gap = gap_of(final, final_training_data.nuisance)
+            falls = gap.falls
+        except DivergenceError:  # on a test record, which moves further than those that were fitted
+            falls = False
+    if not named or not falls:
         named, final, final_training_data = False, first, training_data
         gap = gap_of(first, training_data.nuisance)
     fitted = replace(final_training_data, records=whole)

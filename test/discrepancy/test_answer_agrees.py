@@ -21,7 +21,9 @@ import pytest
 
 from benchmarks.naming_cases import Case
 from examples.hide_effect import HIGHEST_VOLTAGE, individual_stage
-from piezo_hysteresis.discrepancy import Verdict, diagnose
+from piezo_hysteresis.discrepancy import Verdict, conclusion, diagnose
+from piezo_hysteresis.discrepancy.gap import measure_gap
+from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.protocol import protocol
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.record import Experiment
@@ -49,6 +51,19 @@ def test_hum_is_explained_in_the_recordings_and_not_predicted_live():
     assert found.names == ("mains_hum",)
     assert found.gap.after < 1.3 * found.gap.floor
     assert found.gap.live > 0.5 * found.gap.before
+
+
+def test_a_model_that_diverges_on_a_test_record_is_not_named(monkeypatch):
+    def measured(models, *others):
+        if "mains_hum" in models[1]:
+            raise DivergenceError("arx", 0, 0.0)
+        return measure_gap(models, *others)
+
+    monkeypatch.setattr(conclusion, "measure_gap", measured)
+    found = diagnose(HUM.experiment())
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.names == ()
+    assert "mains_hum" not in found.model
 
 
 @pytest.mark.soak

@@ -122,9 +122,7 @@ def score_baseline(model: Model, training_data: TrainingData) -> tuple[TrainingD
     return replace(training_data, alone=alone), cross_validate(products, floors, columns, alone, limits)
 
 
-def _products(
-    model: Model, training_data: TrainingData
-) -> tuple[list[Gram], Array, Array, tuple[Array, Array]]:
+def _products(model: Model, training_data: TrainingData) -> tuple[list[Gram], Array, Array, tuple[Array, Array]]:
     names = free_numbers(model, training_data)
     products = grams(model, training_data.records, names, training_data.nuisance)
     columns = directions(model, names)
