@@ -92,6 +92,17 @@ class NearestPath:
     amplitude: float | None
     band: float | None
 
+    def conditions(self) -> str:
+        """Changes after which the path can be reached, joined by "or"; empty if there is none."""
+        ways = []
+        if self.offset is not None:
+            ways.append(f"if it is shifted by {1e6 * self.offset:+.4g} µm")
+        if self.amplitude is not None:
+            ways.append(f"if its amplitude about the middle is reduced to {100.0 * self.amplitude:.4g} %")
+        if self.band is not None:
+            ways.append(f"if its components above {self.band:.3g} Hz are removed")
+        return " or ".join(ways)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Reachability:

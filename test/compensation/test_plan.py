@@ -150,5 +150,6 @@ def test_the_nearest_band_is_reachable_and_not_much_lower_than_it_must_be(seed: 
     assert {p.limit for p in found.parts} == {"max_slew_rate"}
     band = found.nearest.band if found.nearest else None
     assert band is not None and band < 1000.0
+    assert f"components above {band:.3g} Hz are removed" in found.nearest.conditions()
     assert reachable(model, limits, below(band), search=False).is_whole
     assert not reachable(model, limits, below(2.5 * band), search=False).is_whole

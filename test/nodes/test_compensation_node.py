@@ -119,7 +119,7 @@ def test_an_unreachable_trajectory_is_refused_and_nothing_moves(lab):
         ("gap", np.append(scan(), np.nan), PERIOD, "expected finite"),
         ("slow", scan(), 2 * PERIOD, "period"),
         ("long", np.zeros(30_000), PERIOD, "longest_trajectory"),
-        ("high", scan(0.2, 1.6), PERIOD, "out of reach"),
+        ("high", scan(0.2, 1.6), PERIOD, "not reachable"),
         ("low", scan(0.0, 0.7), PERIOD, "voltage_min"),
     ):
         node.send(wanted, phase, period)
@@ -142,7 +142,7 @@ def test_a_displacement_is_set_and_a_slow_integral_removes_the_remaining_error(l
 
     lab.wait(settled, "the displacement that was set")
     publisher.publish(Float64(data=5.0 * STROKE))
-    assert "out of reach" in node.until("set_displacement", "refused").message
+    assert "not reachable" in node.until("set_displacement", "refused").message
 
 
 def test_stop_takes_the_stage_to_its_safe_voltage(lab):

@@ -42,7 +42,7 @@ def test_a_path_is_followed_refused_and_cancelled_by_action(lab):
     assert {"planning", "playing"} <= {f.state for f in played.feedback}
     assert {f.phase for f in played.feedback} == {"path"}
 
-    for wanted, reason in ((scan(0.2, 1.6), "out of reach"), ([np.nan], "finite"), ([], "at least one")):
+    for wanted, reason in ((scan(0.2, 1.6), "not reachable"), ([np.nan], "finite"), ([], "at least one")):
         refused = track(lab, wanted).result()
         assert refused.status == GoalStatus.STATUS_ABORTED
         assert reason in refused.result.message

@@ -75,9 +75,5 @@ def described(plan: Plan) -> str:
 def why_not(plan: Plan) -> str:
     """Reason why a path is refused, and the nearest reachable path."""
     part, nearest = plan.reachability.parts[0], plan.reachability.nearest
-    ways = []
-    if nearest is not None and nearest.offset is not None:
-        ways.append(f"moved by {1e6 * nearest.offset:+.4g} µm")
-    if nearest is not None and nearest.amplitude is not None:
-        ways.append(f"with {100.0 * nearest.amplitude:.4g} % of its amplitude")
-    return f"not reachable: {part}" + (f"; it becomes reachable {' or '.join(ways)}" if ways else "")
+    ways = "" if nearest is None else nearest.conditions()
+    return f"not reachable: {part}" + (f"; the whole path can be reached {ways}" if ways else "")

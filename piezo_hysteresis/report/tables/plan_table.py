@@ -71,16 +71,10 @@ def refusal(found: Plan) -> list[str]:
     nearest = found.reachability.nearest
     if nearest is None:
         return lines
-    ways = []
-    if nearest.offset is not None:
-        ways.append(f"if it is shifted by {1e6 * nearest.offset:+.4g} µm")
-    if nearest.amplitude is not None:
-        ways.append(f"if its amplitude about the middle is reduced to {100.0 * nearest.amplitude:.4g} %")
-    if nearest.band is not None:
-        ways.append(f"if its components above {nearest.band:.3g} Hz are removed")
+    conditions = nearest.conditions()
     return [
         *lines,
-        f"the whole path can be reached {', or '.join(ways)}" if ways else "no shift or scale makes the path reachable",
+        f"the whole path can be reached {conditions}" if conditions else "no change makes the path reachable",
     ]
 
 
