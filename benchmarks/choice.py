@@ -124,7 +124,7 @@ def answer(case: Case) -> Outcome:
     live, chosen = live_run(case, True)
     seconds = time.process_time() - begun
     fixed = live_run(case, False)[0].time if chosen else live.time
-    found, told = live.found, live.updates[-1]
+    found, update = live.found, live.updates[-1]
     assert found is not None
     z = None if live.separation is None else (live.separation.expected_z, live.separation.needed_z)
     return Outcome(
@@ -142,7 +142,7 @@ def answer(case: Case) -> Outcome:
         fixed_time=fixed,
         chosen=chosen,
         z=z,
-        probability=told.probabilities[told.likeliest],
+        probability=update.probabilities[update.likeliest],
         seconds=seconds,
         trace=tuple(f"{u.time:.1f} s: {u.sentence()}" for u in live.updates),
     )

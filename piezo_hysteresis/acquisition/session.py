@@ -171,7 +171,7 @@ class DriverSession:
         Raises
         ------
         StageError
-            If the ramp was not finished in time. The stage has then been told to go there by itself.
+            If the ramp was not finished in time. The stage was then asked to go there by itself.
         """
         acquisition, self._acquisition = self._acquisition, None
         if acquisition is None:

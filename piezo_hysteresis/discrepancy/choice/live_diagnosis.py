@@ -127,8 +127,8 @@ class LiveDiagnosis:
         found = diagnose(experiment, effects=self.effects, progress=progress, explicit_step=self.explicit_step)
         time = self.time + sum(p.duration for p in self.due)
         untested = self._untested_by(found, time)
-        told = probabilities(found, {e.public_name() for e in self.effects}, untested)
-        update = Update(time, self.due_name, told)
+        by_name = probabilities(found, {e.public_name() for e in self.effects}, untested)
+        update = Update(time, self.due_name, by_name)
         after = replace(
             self, time=time, updates=(*self.updates, update), found=found, separation=None, untested=untested
         )

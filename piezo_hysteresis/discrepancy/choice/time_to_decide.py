@@ -134,14 +134,14 @@ def best_drive(
         for repeats in REPEATS:
             if repeats * phase.duration > time_left:
                 break
-            told = [
+            log_odds = [
                 expected_log_odds(found[str(k)], a.score.excess, repeats)
                 for (a, _), found in zip(pairs, by_pair, strict=True)
             ]
-            worst = int(np.argmin(told))
+            worst = int(np.argmin(log_odds))
             names = (pairs[worst][0].effect.public_name(), pairs[worst][1].effect.public_name())
             found_one = Separation(
-                names, phase.name, repeats, repeats * phase.duration, z_of(told[worst]), z_of(missing)
+                names, phase.name, repeats, repeats * phase.duration, z_of(log_odds[worst]), z_of(missing)
             )
             options.append((found_one, phase))
     if not options:

@@ -81,7 +81,7 @@ class GuardedNode(Node):
     def reported(self, status: DiagnosticStatus) -> DiagnosticArray:
         """A stamped status for /diagnostics with the faults so far. A recent fault raises its level."""
         fault = self.recent_fault
-        told = diagnostic(
+        merged = diagnostic(
             max(status.level, DiagnosticStatus.WARN) if fault else status.level,
             status.name,
             f"{status.message}; {fault}" if fault else status.message,
@@ -89,7 +89,7 @@ class GuardedNode(Node):
             **values_of(status),
             faults=self.faults,
         )
-        array = DiagnosticArray(status=[told])
+        array = DiagnosticArray(status=[merged])
         array.header.stamp = self.get_clock().now().to_msg()
         return array
 

@@ -30,7 +30,7 @@ _DRIVE_MOVES = 0.05
 _DRIVE_RETURNS = 0.01
 """The same at an extreme of the displacement, counted beyond both ends of the run."""
 _RETURN = 0.03
-"""Share of the range by which the displacement must go on and come back while the voltage stands."""
+"""Share of the range by which the displacement must continue and return while the voltage is constant."""
 _ARC = 0.9
 """Correlation with one arc from which the displacement shows a cut-off turning point."""
 _MISSED = 0.3
@@ -94,7 +94,7 @@ def _stuck(record: Record) -> list[Notice]:
 
 
 def _clipped_voltage(record: Record) -> list[Notice]:
-    """Voltage that is constant at its extreme while the displacement goes on and returns: it is clipped."""
+    """Voltage that is constant at its extreme while the displacement continues and returns: it is clipped."""
     y, u = record.displacement, record.voltage
     samples = 0
     direction = np.sign(np.dot(u - u.mean(), y - y.mean()) or 1.0)

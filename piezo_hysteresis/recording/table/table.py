@@ -150,7 +150,7 @@ def table_records(
     Returns
     -------
     records : list of Record
-        A labelled record continues the one before where the table says so, or else where time goes on without a gap.
+        A labelled record continues the one before if the table says so, or else if the time continues without a gap.
     notices : list of Notice
 
     Raises

@@ -33,7 +33,7 @@ class Section:
     Parameters
     ----------
     part : bokeh UIElement
-        What stands in it; it needs a name.
+        Content of the box; it needs a name.
     title : str
         Heading of the box.
     classes : str

@@ -152,7 +152,7 @@ class Simulation:
         initial_voltage : float, optional
             Voltage at which the stage has settled before [V]; default the first voltage.
         continues : bool
-            True to go on from the state the stage is in.
+            True to continue from the present state of the stage.
         average : int
             Slow phases: simulated at the sample period of the stage, then averaged over blocks of so many samples.
 
