@@ -52,7 +52,7 @@ def creeping(model: Model) -> tuple[float, float]:
 def test_the_wander_has_the_variance_of_a_random_walk():
     record = STAGE.play(growing_sine(1.0, PERIOD, (0.5, 1.0), cycles=5), PERIOD)
     pieces = pieces_of([record], [0])
-    rows = np.hstack(slow_rows(pieces, [0], 2e-5))
+    rows = np.hstack(slow_rows(pieces, 2e-5))
     assert rows.shape == (1 + WAVES, record.size)
     np.testing.assert_array_equal(rows[0], 1.0)
     variance = (rows[1:] ** 2).sum(axis=0)

@@ -129,14 +129,21 @@ def linearised(
 ) -> tuple[Array, Array]:
     """Matrices and weights of the used pieces, as in `PieceFit`."""
     origins = sorted({p.origin for p in pieces if WEIGHTS[p.kind] > 0.0})
-    slow = slow_rows(pieces, origins, model.displacement_scale)
+    slow = slow_rows(pieces, model.displacement_scale)
     found = grams(model, [p.record for p in pieces], names, None, slow)
     counted = [i for i, p in enumerate(pieces) if WEIGHTS[p.kind] > 0.0]
     weights = np.array([WEIGHTS[pieces[i].kind] for i in counted])
     for origin in origins:
         mine = np.array([pieces[i].origin == origin for i in counted])
         weights[mine] /= weights[mine].sum()
-    matrices = np.array([found[i].matrix / (found[i].size * floors[pieces[i].origin] ** 2) for i in counted])
+    own, zeros = len(names), len(names) + len(origins)
+    size = zeros + WAVES * len(origins) + 1
+    matrices = np.zeros((len(counted), size, size))
+    for matrix, i in zip(matrices, counted, strict=True):
+        record = origins.index(pieces[i].origin)
+        waves = zeros + WAVES * record
+        rows = [*range(own), own + record, *range(waves, waves + WAVES), size - 1]
+        matrix[np.ix_(rows, rows)] = found[i].matrix / (found[i].size * floors[pieces[i].origin] ** 2)
     return matrices, weights / weights.sum()
 
 

@@ -55,8 +55,8 @@ INDEPENDENT = 16
 """Number of independent parts of the misfit of all records, so that long records do not outweigh the prior."""
 
 
-def slow_rows(pieces: Sequence[RecordPiece], origins: Sequence[int], scale: float) -> list[Array]:
-    """Zero and wander of every record in `origins`, for every piece: (r·(1 + `WAVES`), n), zeros first [m].
+def slow_rows(pieces: Sequence[RecordPiece], scale: float) -> list[Array]:
+    """Zero and wander of the record of every piece: (1 + `WAVES`, n), the zero first [m].
 
     Coefficients of the wander have unit variance.
 
@@ -64,8 +64,6 @@ def slow_rows(pieces: Sequence[RecordPiece], origins: Sequence[int], scale: floa
     ----------
     pieces : sequence of RecordPiece
         Pieces in order.
-    origins : sequence of int
-        Indices of the used records.
     scale : float
         Displacement scale of the model [m].
     """
@@ -81,9 +79,7 @@ def slow_rows(pieces: Sequence[RecordPiece], origins: Sequence[int], scale: floa
         time = piece.record.start_time - begin[piece.origin] + piece.record.sample_period * np.arange(piece.record.size)
         size = WANDER * scale * np.sqrt(2.0 * whole / WANDER_TIME) / frequency
         waves = size[:, None] * np.sin(frequency[:, None] * time / whole)
-        mine = np.array([float(piece.origin == origin) for origin in origins])
-        zeros = mine[:, None] * np.ones(time.size)
-        found.append(np.vstack((zeros, np.kron(mine[:, None], waves))))
+        found.append(np.vstack((np.ones(time.size), waves)))
     return found
 
 
