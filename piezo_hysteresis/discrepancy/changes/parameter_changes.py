@@ -33,7 +33,7 @@ from ...record import Record
 from ..search.cross_validation import ADEQUATE
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .change_search import Account, ChangeSearch
-from .signatures import SECOND_ORDER, SHAPES, shaped_model
+from .signatures import AVERAGE, SECOND_ORDER, SHAPES, shaped_model
 
 Array = NDArray[np.float64]
 
@@ -162,7 +162,7 @@ def _simulated(
 
 
 def _spread_of_forms(found: Sequence[_Explanation]) -> float:
-    """RMS difference to the lags of other forms, in the unit of the first explanation.
+    """Largest difference to the lag of another form, in the unit of the first explanation.
 
     Samples hardly show which form a lag of about a sample has.
     """
@@ -170,9 +170,11 @@ def _spread_of_forms(found: Sequence[_Explanation]) -> float:
     if not unit:
         return 0.0
     most = FORMS * max(1.0, best.account.cost)
-    forms = [e for e in found[1:] if e.account.key in SHAPES and e.account.cost < most]
-    lags = np.array([e.size * KINDS[e.account.key].lag / unit - best.size for e in forms])
-    return float(np.sqrt(np.mean(lags**2))) if lags.size else 0.0
+    forms = [(e.account.cost, e.size * KINDS[e.account.key].lag) for e in found[1:] if e.account.key in SHAPES]
+    if best.account.key in SECOND_ORDER:
+        mean = best.search.shaped(AVERAGE, near=unit * best.size)
+        forms.append((mean.cost, mean.size))
+    return max((abs(lag / unit - best.size) for cost, lag in forms if cost < most), default=0.0)
 
 
 def _moved_resonance(

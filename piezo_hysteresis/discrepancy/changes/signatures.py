@@ -41,10 +41,12 @@ from ...effects import (
 from ...model.model import Model
 from ...record import Record
 from .change_kinds import KINDS
-from .filtered_signal import derivatives, filtered
+from .filtered_signal import averaged, derivatives, filtered
 
 Array = NDArray[np.float64]
 
+AVERAGE = "moving_average"
+"""A mean of the last samples; not a change that is named, because it resembles a Bessel filter of the same delay."""
 DRIFT_TIME = 3.0
 """Time constant of a drift over the length of the longest record: the drift within a record is almost linear."""
 
@@ -174,6 +176,12 @@ def filtered_by(
     return filtered(prediction.between(signal, before), before, prediction.record.sample_period, tau, zeta)
 
 
+def averaged_by(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
+    """The mean of a signal of the record over twice `tau` [s], by which it is later."""
+    samples = 2.0 * tau / prediction.record.sample_period
+    return averaged(prediction.between(signal, before), before, samples) if samples > 0.0 else signal
+
+
 Shaped = Callable[[ChangeablePrediction, Array, float, float], Array]
 """(prediction, signal, value before, size) → the changed signal."""
 
@@ -184,6 +192,7 @@ SHAPES: dict[str, Shaped] = {
     "delay": delayed,
     "low_pass": filtered_by,
     **{key: partial(filtered_by, zeta=zeta) for key, zeta in SECOND_ORDER.items()},
+    AVERAGE: averaged_by,
 }
 """Changes that act on the whole prediction, by name."""
 
