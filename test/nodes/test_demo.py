@@ -93,5 +93,5 @@ def test_a_node_that_dies_ends_the_demo_with_one_line(demo):
     nodes = nodes_of(process, text)
     os.kill(nodes[1], signal.SIGKILL)
     assert process.wait(90.0) != 0
-    assert re.search(r"demo: model_node ended with code -9; its last words are in \S+model_node.log", text())
+    assert re.search(r"demo: model_node ended with code -9; the end of its log is in \S+model_node.log", text())
     assert not any(is_running(pid) for pid in nodes)
