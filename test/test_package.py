@@ -29,6 +29,7 @@ import yaml
 import piezo_hysteresis
 from piezo_hysteresis import recording
 from piezo_hysteresis.record import Experiment, Record
+from scripts.ros_changelog import in_rst
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
@@ -62,6 +63,25 @@ def test_versions_agree():
     assert version == piezo_hysteresis.__version__
     assert "version=VERSION" in (ROOT / "setup.py").read_text()
     assert f"## {version}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_the_package_of_actions_has_the_same_version_and_maintainer():
+    actions = ElementTree.parse(ROOT / "interfaces" / "package.xml").getroot()
+    for tag in ("version", "maintainer", "license"):
+        assert actions.findtext(tag) == PACKAGE.findtext(tag)
+    assert actions.find("maintainer").get("email") == PACKAGE.find("maintainer").get("email")
+
+
+@pytest.mark.filterwarnings("ignore:nodes.Node.traverse:DeprecationWarning")  # catkin_pkg calls it
+def test_release_tools_of_ros_read_every_change():
+    changelog = pytest.importorskip("catkin_pkg.changelog")
+    pytest.importorskip("docutils")
+    markdown = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert "Forthcoming\n-----------" in in_rst("## 0.1.0 (unreleased)")
+    released = changelog.Changelog("piezo_hysteresis")
+    changelog.populate_changelog_from_rst(released, in_rst(markdown.replace("unreleased", "2026-12-01")))
+    changes = [len(re.findall(r"^[*] ", part, re.MULTILINE)) for part in markdown.split("\n## ")[1:]]
+    assert [len(content[0].bullets) for _, _, content in released.foreach_version()] == changes
 
 
 def test_every_import_is_a_dependency():
