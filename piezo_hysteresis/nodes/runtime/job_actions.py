@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from importlib import import_module
@@ -43,6 +44,9 @@ SUCCEEDED = ("done", "planned")
 
 SUFFIX = "_actions"
 """Suffix that makes the name of the action node from the name of the node."""
+
+_EARLY = 0.01
+"""Time between two looks whether the main node spins [s]."""
 
 
 class JobActions:
@@ -162,7 +166,12 @@ class JobActions:
         return CancelResponse.ACCEPT
 
     def _in_main(self, action: Callable[[], object]) -> None:
-        self._main.executor.create_task(self._main.guarded(action))
+        """Call `action` in the thread of the main node, which may not spin yet where a goal arrives early."""
+        while (executor := self._main.executor) is None:
+            if not self._main.context.ok():
+                return
+            time.sleep(_EARLY)
+        executor.create_task(self._main.guarded(action))
 
 
 def by_service(
