@@ -53,9 +53,15 @@ def gcs2(plant):
     """Upload, arm, start, wait, read: block by block as long as the recorder, over TCP."""
     simulated = SimulatedStage(plant, seed=SEED, sample_period=PERIOD)
     with Gcs2Server(Controller(simulated, speed=math.inf, recorder_points=8 * 3000)) as server:
-        stage = Gcs2Stage(
-            Gcs2Setup(server.host, server.port, amplifier_gain=GAIN, points_per_command=500, max_slew_rate=1e6)
+        setup = Gcs2Setup(
+            server.host,
+            server.port,
+            amplifier_gain=GAIN,
+            points_per_command=500,
+            max_slew_rate=1e6,
+            timeout=60.0,  # a busy machine, and not the network, decides
         )
+        stage = Gcs2Stage(setup)
         longest = stage.description.longest_block
 
         def block(drive):
