@@ -134,12 +134,15 @@ class DriverNode(GuardedNode, LifecycleNode):
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Ramp to the safe voltage, then stop the samples."""
-        self._make_safe()
+        is_safe = self._make_safe()
         done = super().on_deactivate(state)
         if self._failure is not None:
             return TransitionCallbackReturn.ERROR
-        self.get_logger().info("not active any more: the stage is at its safe voltage")
-        self._diagnostics.state(DiagnosticStatus.OK, "configured, not active")
+        if is_safe:
+            is_replay = self._session is not None and self._session.limits.ignores_drive
+            where = "" if is_replay else ": the stage is at its safe voltage"
+            self.get_logger().info(f"not active any more{where}")
+            self._diagnostics.state(DiagnosticStatus.OK, "configured, not active")
         return done
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -163,13 +166,16 @@ class DriverNode(GuardedNode, LifecycleNode):
         super().on_error(state)
         return TransitionCallbackReturn.SUCCESS
 
-    def _make_safe(self) -> None:
+    def _make_safe(self) -> bool:
+        """Ramp to the safe voltage; False, with the reason reported, if the stage was not seen there."""
         self._diagnostics.watch(None)
         if self._session is not None:
             try:
                 self._session.make_safe()
             except Exception as error:
                 self._report_failure(error)
+                return False
+        return True
 
     def _release(self) -> None:
         self._commands.detach()

@@ -26,6 +26,8 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
 
+from piezo_hysteresis.acquisition.session import DriverSession
+from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import write
@@ -186,6 +188,22 @@ def test_a_failing_stage_is_made_safe_reported_and_can_be_tried_again(lab, monke
     assert stages[1].made_safe == 0
 
 
+def test_a_stage_that_was_not_seen_at_its_safe_voltage_is_not_reported_there(lab, monkeypatch):
+    def fail(session):
+        raise StageError("not at the safe voltage within 2 s")
+
+    node = lab.add(DriverNode, **IDEAL)
+    node.begin()
+    lab.streaming()
+    reported = lab.diagnostics()
+    with monkeypatch.context() as patched:
+        patched.setattr(DriverSession, "make_safe", fail)
+        assert lab.transition("deactivate")
+    reported.clear()
+    lab.wait(lambda: any("not at the safe voltage" in s.message for a in reported for s in a.status), "the reason")
+    assert not any("not active" in s.message for a in reported for s in a.status)
+
+
 def test_two_axes_do_not_meet(lab):
     for axis in ("/stage_x", "/stage_y"):
         lab.driver(namespace=axis, **IDEAL)
@@ -203,7 +221,7 @@ def test_a_recording_is_replayed_sample_by_sample(lab, tmp_path):
     ]
     write(Experiment(tuple(records)), tmp_path / "experiment")
     samples, phases = lab.samples(), lab.phases()
-    lab.driver(stage="replay", replay__experiment=str(tmp_path / "experiment"), replay__subscribers=1)
+    driver = lab.driver(stage="replay", replay__experiment=str(tmp_path / "experiment"), replay__subscribers=1)
     lab.wait(lambda: samples.blocks and samples.newest.phase[-1] == 3, "the end of the recording")
     assert samples.index[0] == 0
     assert samples.lost == 0
@@ -212,6 +230,9 @@ def test_a_recording_is_replayed_sample_by_sample(lab, tmp_path):
         assert np.array_equal(samples.voltage[inside], record.voltage)
         assert np.array_equal(samples.displacement[inside], record.displacement)
     assert [p.data for p in phases][-3:] == ["1 rest", "2 triangle", "3 hold"]
+    assert lab.transition("deactivate")
+    lab.wait(lambda: "not active any more" in driver.output, "the line of the end")
+    assert "safe voltage" not in driver.output
 
 
 def test_a_stage_with_memory_plays_blocks_and_gives_the_dead_time(lab):
