@@ -116,7 +116,7 @@ def slowed(record: Record) -> Record:
 
 
 def _averaged(record: Record, factor: int) -> Record:
-    is_described = factor > 1 and excitation_content(record).is_slow and not _differs(record, factor)
+    is_described = factor > 1 and not _differs(record, factor) and excitation_content(record).is_slow
     return record.decimate(factor) if is_described else record
 
 
