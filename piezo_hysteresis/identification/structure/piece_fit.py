@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A joint fit to pieces of records, with one sensor zero, which wanders, for all pieces of a record."""
+"""A joint fit to pieces of records, with one sensor zero, which wanders, for all records that continue one another."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class PieceFit:
         Free numbers.
     matrices : (p, q + s + 1, q + s + 1) ndarray
         Inner products of every piece, divided by its number of samples and its squared noise floor: sensitivities of
-        the q parameters, the s zeros and waves of the records, and the residual.
+        the q parameters, the s zeros and waves of the runs, and the residual.
     weights : (p,) ndarray
         Weights of the pieces; their sum is 1.
     cost : float
@@ -90,20 +90,20 @@ class PieceFit:
 
     @property
     def slow(self) -> Array:
-        """Fitted zeros of the records [m], then the amplitudes of the waves of their wander, shape (s,)."""
+        """Fitted zeros of the runs [m], then the amplitudes of the waves of their wander, shape (s,)."""
         total, numbers = self.total, len(self.names)
         matrix, cross = total[numbers:-1, numbers:-1], total[numbers:-1, -1]
         return np.asarray(np.linalg.lstsq(matrix, cross, rcond=None)[0])
 
     @property
-    def records(self) -> int:
-        """Number of the used records."""
+    def runs(self) -> int:
+        """Number of the runs of records that continue one another."""
         return (self.matrices.shape[1] - 1 - len(self.names)) // (1 + WAVES)
 
     @property
     def zeros(self) -> Array:
-        """Fitted zeros of the records [m], shape (r,)."""
-        return self.slow[: self.records]
+        """Fitted zeros of the runs [m], shape (r,)."""
+        return self.slow[: self.runs]
 
     @property
     def squares(self) -> Array:
@@ -128,21 +128,21 @@ def linearised(
     model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float], names: Sequence[str]
 ) -> tuple[Array, Array]:
     """Matrices and weights of the used pieces, as in `PieceFit`."""
-    origins = sorted({p.origin for p in pieces if WEIGHTS[p.kind] > 0.0})
     slow = slow_rows(pieces, model.displacement_scale)
     found = grams(model, [p.record for p in pieces], names, None, slow)
     counted = [i for i, p in enumerate(pieces) if WEIGHTS[p.kind] > 0.0]
     weights = np.array([WEIGHTS[pieces[i].kind] for i in counted])
-    for origin in origins:
+    for origin in {pieces[i].origin for i in counted}:
         mine = np.array([pieces[i].origin == origin for i in counted])
         weights[mine] /= weights[mine].sum()
-    own, zeros = len(names), len(names) + len(origins)
-    size = zeros + WAVES * len(origins) + 1
+    runs = sorted({pieces[i].run for i in counted})
+    own, zeros = len(names), len(names) + len(runs)
+    size = zeros + WAVES * len(runs) + 1
     matrices = np.zeros((len(counted), size, size))
     for matrix, i in zip(matrices, counted, strict=True):
-        record = origins.index(pieces[i].origin)
-        waves = zeros + WAVES * record
-        rows = [*range(own), own + record, *range(waves, waves + WAVES), size - 1]
+        run = runs.index(pieces[i].run)
+        waves = zeros + WAVES * run
+        rows = [*range(own), own + run, *range(waves, waves + WAVES), size - 1]
         matrix[np.ix_(rows, rows)] = found[i].matrix / (found[i].size * floors[pieces[i].origin] ** 2)
     return matrices, weights / weights.sum()
 

@@ -75,6 +75,8 @@ class RecordPiece:
         Class of the rate, for loops.
     amplitude : int
         Class of the amplitude, for loops.
+    run : int
+        Number of the run of records that continue one another; they share a sensor zero.
     """
 
     record: Record
@@ -82,6 +84,7 @@ class RecordPiece:
     kind: Kind
     rate: int = 0
     amplitude: int = 0
+    run: int = 0
 
 
 def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[RecordPiece]:
@@ -96,15 +99,17 @@ def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[Record
     """
     largest = max(float(np.ptp(np.append(records[i].voltage, records[i].settled_voltage))) for i in fitted)
     found: list[RecordPiece] = []
+    run = -1
     for index, record in enumerate(records):
+        run += index == 0 or not record.continues
         if index in fitted:
-            found += _cut(record, index, largest)
+            found += _cut(record, index, run, largest)
         else:
-            found.append(RecordPiece(record, index, Kind.CONDITIONING))
+            found.append(RecordPiece(record, index, Kind.CONDITIONING, run=run))
     return found
 
 
-def _cut(record: Record, index: int, largest: float) -> list[RecordPiece]:
+def _cut(record: Record, index: int, run: int, largest: float) -> list[RecordPiece]:
     u = record.voltage
     stop, opening = 0, []
     if not record.continues and abs(u[0] - record.settled_voltage) > JUMP * largest:
@@ -121,7 +126,8 @@ def _cut(record: Record, index: int, largest: float) -> list[RecordPiece]:
     parts = record.split(*(end for end, *_ in edges[:-1]))
     parts = (parts[0], *(replace(part, initial_voltage=None) for part in parts[1:]))
     return [
-        RecordPiece(part, index, kind, rate, size) for part, (_, kind, rate, size) in zip(parts, edges, strict=True)
+        RecordPiece(part, index, kind, rate, size, run)
+        for part, (_, kind, rate, size) in zip(parts, edges, strict=True)
     ]
 
 

@@ -37,7 +37,7 @@ WANDER = 0.003
 WANDER_TIME = 10.0
 """Time of that wander [s]; its variance grows with the time."""
 WAVES = 6
-"""Number of waves for the wander of a record (Karhunen-Loève expansion of a random walk)."""
+"""Number of waves for the wander of a run of records (Karhunen-Loève expansion of a random walk)."""
 ONE_RATE = 0.005
 """Standard deviation of the difference between fast and slow creep [1/decade]."""
 SMOOTH = 0.1
@@ -56,7 +56,7 @@ INDEPENDENT = 16
 
 
 def slow_rows(pieces: Sequence[RecordPiece], scale: float) -> list[Array]:
-    """Zero and wander of the record of every piece: (1 + `WAVES`, n), the zero first [m].
+    """Zero and wander of the run of every piece: (1 + `WAVES`, n), the zero first [m].
 
     Coefficients of the wander have unit variance.
 
@@ -70,13 +70,13 @@ def slow_rows(pieces: Sequence[RecordPiece], scale: float) -> list[Array]:
     begin: dict[int, float] = {}
     end: dict[int, float] = {}
     for piece in pieces:
-        begin.setdefault(piece.origin, piece.record.start_time)
-        end[piece.origin] = piece.record.start_time + piece.record.duration
+        begin.setdefault(piece.run, piece.record.start_time)
+        end[piece.run] = piece.record.start_time + piece.record.duration
     frequency = (np.arange(WAVES) + 0.5) * np.pi
     found = []
     for piece in pieces:
-        whole = end[piece.origin] - begin[piece.origin]
-        time = piece.record.start_time - begin[piece.origin] + piece.record.sample_period * np.arange(piece.record.size)
+        whole = end[piece.run] - begin[piece.run]
+        time = piece.record.start_time - begin[piece.run] + piece.record.sample_period * np.arange(piece.record.size)
         size = WANDER * scale * np.sqrt(2.0 * whole / WANDER_TIME) / frequency
         waves = size[:, None] * np.sin(frequency[:, None] * time / whole)
         found.append(np.vstack((np.ones(time.size), waves)))
@@ -93,11 +93,11 @@ def prior_of(model: Model, names: Sequence[str], slow: int) -> Array:
     names : sequence of str
         Free parameters.
     slow : int
-        Number of zeros and waves of all records.
+        Number of zeros and waves of all runs.
     """
-    numbers, records = len(names), slow // (1 + WAVES)
-    waves = np.zeros((slow - records, numbers + slow + 1))
-    waves[:, numbers + records : -1] = np.eye(slow - records)
+    numbers, runs = len(names), slow // (1 + WAVES)
+    waves = np.zeros((slow - runs, numbers + slow + 1))
+    waves[:, numbers + runs : -1] = np.eye(slow - runs)
     rows = [waves]
     fast, late = (f"{CreepTwoRates.name}.{n}" for n in ("gamma_fast", "gamma_slow"))
     if fast in names and late in names:

@@ -199,9 +199,9 @@ def _solve(total: Array, free: Array, fixed: Array, low: Array, high: Array) -> 
 
 
 def _logs(full: PieceFit, step: Array, mask: Mask, zero_free: bool) -> float:
-    """Mean ln max(1, R²) of the pieces in `mask`; the zero of a record without fitted pieces is free."""
+    """Mean ln max(1, R²) of the pieces in `mask`; the zero of a run without fitted pieces is free."""
     numbers, logs = len(full.names), []
-    zeros = np.arange(numbers, numbers + full.records)
+    zeros = np.arange(numbers, numbers + full.runs)
     rest = full.matrices[~mask].sum(axis=0) if not mask.all() else np.zeros_like(full.matrices[0])
     step = step.copy()
     for z in zeros:

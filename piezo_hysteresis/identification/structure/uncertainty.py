@@ -80,6 +80,8 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
     known_to = max(1.0, found.cost) / INDEPENDENT  # independent parts of the misfit
     covariance = (inverse @ meat @ inverse + known_to * inverse)[:numbers, :numbers]
     origins = sorted({p.origin for p in counted})
+    runs = sorted({p.run for p in counted})
+    run_of = {p.origin: runs.index(p.run) for p in counted}
     rms = []
     for origin in origins:
         mine = [k for k, p in enumerate(counted) if p.origin == origin]
@@ -95,7 +97,7 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
         covariance=covariance + spread,
         cost=found.cost,
         rms=tuple(rms),
-        nuisances=tuple(np.array([z]) for z in found.zeros),
+        nuisances=tuple(found.zeros[[run_of[o]]] for o in origins),
         at_bounds=bounds,
         converged=found.converged,
         iterations=found.iterations,
