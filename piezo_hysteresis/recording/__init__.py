@@ -59,7 +59,7 @@ from .checks.record_starts import checked_starts
 from .columns import TableColumns, experiment_from, to_columns
 from .formats.csv import Csv
 from .formats.gcs_array import GcsArrayFormat
-from .formats.known_formats import FORMATS, Format, WritableFormat
+from .formats.known_formats import FORMATS, Format, TextFormat, WritableFormat
 from .formats.mat import Mat
 from .formats.npz import Npz
 from .rows_before import with_rows_before
@@ -125,7 +125,7 @@ def read(
     notices: list[Notice] = []
     for path in paths:
         place = Path(path).expanduser()
-        found = with_rows_before(partial(_one, place, _format(place, format)), options, rows_before)
+        found = with_rows_before(partial(_parts, place, _format(place, format)), options, rows_before)
         factors = load_decimation(place) if decimate is None else decimate
         by_record = [(r, factors.get(r.phase, factors.get(r.phase.split("_")[0]))) for r in found]
         records += [r if factor is None else r.decimate(factor) for r, factor in by_record]
@@ -176,9 +176,13 @@ def from_columns(
     return experiment.noting(*inspect(experiment))
 
 
-def _one(place: Path, chosen: Format, options: ReadOptions) -> Experiment:
-    """Read the experiment of one path."""
-    return checked_starts(chosen.read(place, options), options)
+def _parts(place: Path, chosen: Format, parts: Sequence[ReadOptions]) -> list[Experiment]:
+    """Read one experiment of a path for each of `parts`."""
+    if isinstance(chosen, TextFormat):
+        read = chosen.read_parts(place, parts)
+    else:
+        read = [chosen.read(place, options) for options in parts]
+    return [checked_starts(experiment, options) for experiment, options in zip(read, parts, strict=True)]
 
 
 def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str | None = None) -> None:

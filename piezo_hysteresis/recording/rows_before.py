@@ -14,13 +14,13 @@
 
 """Rows before the chosen ones: they bring the model into the state of the stage at the first chosen row.
 
-Both are read by themselves, because phases, times and channels are found in the chosen rows alone. No number is read
-twice; only the lines of a text file in front of them are passed over twice.
+Both become experiments by themselves, because phases, times and channels are found in the chosen rows alone. They are
+read together, so that the lines of a text file are passed once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,28 +32,31 @@ AT_REST = 0.02
 """Largest difference of a voltage from that of the settled stage, as a share of the drive range."""
 
 
-def with_rows_before(read: Callable[[ReadOptions], Experiment], options: ReadOptions, most: int) -> Experiment:
+def with_rows_before(
+    read: Callable[[Sequence[ReadOptions]], list[Experiment]], options: ReadOptions, most: int
+) -> Experiment:
     """The rows that `options` choose, behind a phase ``conditioning`` of the rows before them.
 
     Parameters
     ----------
     read : callable
-        Reads one recording as options say.
+        Reads parts of one recording, one experiment for each of the options.
     options : ReadOptions
         With its `rows`. Where they begin with the first one, or are counted from the end, nothing is read before them.
         An `initial_voltage` belongs to the first row of the file, unless the row before the chosen ones is at it.
     most : int
         Largest number of rows before.
     """
-    wanted = read(options)
     first, _ = options.from_the_beginning
     count = min(first, most)
     count -= count % (options.average or 1)
     settled = options.initial_voltage
-    if not (count and (settled is not None or wanted[0].truncated)):
-        return wanted
+    if not count:
+        return read([options])[0]
     of_lead = options if first == count else replace(options, initial_voltage=None)
-    lead = read(replace(of_lead, rows=(first - count, first), phases=CONDITIONING))
+    wanted, lead = read([options, replace(of_lead, rows=(first - count, first), phases=CONDITIONING)])
+    if settled is None and not wanted[0].truncated:
+        return wanted
     if settled is not None and abs(lead[-1].voltage[-1] - settled) <= AT_REST * _swing(*lead, *wanted):
         return wanted
     ahead = [replace(r, phase=CONDITIONING, truncated=r.truncated or first > count) for r in lead]

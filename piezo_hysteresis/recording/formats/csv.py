@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from csv import writer
 from pathlib import Path
 
@@ -27,8 +28,8 @@ from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
 from ..table.dialect import Dialect
 from ..table.read_options import LABELS, ReadOptions, is_channel
-from ..table.table import resolve, table_records
-from ..table.text_cells import read_cells
+from ..table.table import Places, resolve, table_records
+from ..table.text_cells import Cells, read_cells
 from ..table.time_column import TimeColumn
 
 _ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
@@ -56,24 +57,17 @@ class Csv:
 
     def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The table as phases: those of its labels, or phases proposed from the shape of the drive."""
+        return self.read_parts(path, [options])[0]
+
+    def read_parts(self, path: Path, parts: Sequence[ReadOptions]) -> list[Experiment]:
+        """Parts of the table, each as `read`."""
         with naming(path, "a text table"):
             dialect = Dialect.sniff(path)
-            found = resolve(dialect.header, dialect.width, options)
-            places = found.columns
-            numbers = {name: at for name, (at, _) in places.items() if is_channel(name)}
-            words = {name: at for name, (at, _) in places.items() if name in LABELS}
-            cells = read_cells(path, dialect, numbers, words, options)
-            channels = {name: options.in_si(name, values, places[name][1]) for name, values in cells.columns.items()}
-            if "time" in channels and abs(channels["time"][0]) > _EPOCH:
-                channels["time"] = channels["time"] - channels["time"][0]
-            rest = options.after_reading(cells.average)
-            records, notices = table_records(channels, cells.marks, rest, truncated=options.passes_over)
-            notices += found.notices
-            if options.average is None and cells.average > 1:
-                notices.append(averaged_notice(cells.average, records[0].sample_period))
-            if cells.bad:
-                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number"))
-            return Experiment(tuple(records), str(path), tuple(notices))
+            found = resolve(dialect.header, dialect.width, parts[0])
+            numbers = {name: at for name, (at, _) in found.columns.items() if is_channel(name)}
+            words = {name: at for name, (at, _) in found.columns.items() if name in LABELS}
+            read = read_cells(path, dialect, numbers, words, parts)
+            return [_experiment(path, cells, found, options) for cells, options in zip(read, parts, strict=True)]
 
     def write(self, experiment: Experiment, path: Path) -> None:
         """Write all records into one table.
@@ -95,6 +89,20 @@ class Csv:
                 file.write(",".join(["time_s", "voltage_V", "displacement_m", *titles]) + "\n")
                 for number, record in enumerate(experiment, 1):
                     _write_record(file, record, channels, _row_end(number, record, labels))
+
+
+def _experiment(path: Path, cells: Cells, found: Places, options: ReadOptions) -> Experiment:
+    channels = {name: options.in_si(name, values, found.columns[name][1]) for name, values in cells.columns.items()}
+    if "time" in channels and abs(channels["time"][0]) > _EPOCH:
+        channels["time"] = channels["time"] - channels["time"][0]
+    rest = options.after_reading(cells.average)
+    records, notices = table_records(channels, cells.marks, rest, truncated=options.passes_over)
+    notices += found.notices
+    if options.average is None and cells.average > 1:
+        notices.append(averaged_notice(cells.average, records[0].sample_period))
+    if cells.bad:
+        notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number"))
+    return Experiment(tuple(records), str(path), tuple(notices))
 
 
 def _is_table(path: Path) -> bool:

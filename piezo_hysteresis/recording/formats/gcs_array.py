@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from ...channel_mapping import quantity_of
@@ -27,7 +28,7 @@ from ..segmentation.decimating_buffer import averaged_notice
 from ..table.dialect import Dialect, decoded
 from ..table.read_options import ReadOptions, is_channel
 from ..table.table import resolve, table_records
-from ..table.text_cells import BLOCK_BYTES, read_cells
+from ..table.text_cells import BLOCK_BYTES, Cells, read_cells
 
 _END = "# END_HEADER"
 """Last line of the header."""
@@ -49,6 +50,10 @@ class GcsArrayFormat:
 
     def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The array as phases, which are named by the shape of the drive unless `ReadOptions.phases` names them."""
+        return self.read_parts(path, [options])[0]
+
+    def read_parts(self, path: Path, parts: Sequence[ReadOptions]) -> list[Experiment]:
+        """Parts of the array, each as `read`."""
         with naming(path, "a GCS array"):
             header, skipped = _header(path)
             width = int(header.get("DIM", "0"))
@@ -56,34 +61,34 @@ class GcsArrayFormat:
             if width < 2 or width > 1000:
                 raise RecordingError(f"got DIM = {width}, expected two to 1000 columns")
             inferred = {"voltage": _first(titles, "volt"), "displacement": _first(titles, "position|displacement")}
-            columns = {c: at for c, at in inferred.items() if at} | dict(options.columns)
+            columns = {c: at for c, at in inferred.items() if at} | dict(parts[0].columns)
             places = resolve(titles, width, ReadOptions(columns=columns, sample_period=1.0)).columns
             separator = int(header.get("SEPARATOR", "32"))
             dialect = Dialect(None if separator in (9, 32) else chr(separator), False, skipped, (), width)
             numbers = {name: at for name, (at, _) in places.items() if is_channel(name)}
-            cells = read_cells(path, dialect, numbers, {}, options)
-            channels = {
-                name: options.in_si(name, column, "um" if quantity_of(name) == "displacement" else None)
-                for name, column in cells.columns.items()
-            }
-            period = options.sample_period or float(header.get("SAMPLE_TIME", "nan"))
-            rest = options.with_period(period if period > 0 else None).after_reading(cells.average)
-            records, notices = table_records(channels, [], rest, truncated=options.passes_over)
             said = ", ".join(f"{name} = '{titles[at]}'" for name, at in numbers.items())
-            notices.append(Notice("columns", f"columns used: {said}; positions without a unit are taken in µm"))
-            declared = int(header.get("NDATA", "-1"))
-            if declared >= 0 and options.rows is None and cells.average == 1 and channels["voltage"].size != declared:
-                notices.append(
-                    Notice(
-                        "cut",
-                        f"the file has {channels['voltage'].size} of the {declared} rows that its header declares",
-                    )
-                )
-            if options.average is None and cells.average > 1:
-                notices.append(averaged_notice(cells.average, records[0].sample_period))
-            if cells.bad:
-                notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number"))
-            return Experiment(tuple(records), str(path), tuple(notices))
+            used = Notice("columns", f"columns used: {said}; positions without a unit are taken in µm")
+            read = read_cells(path, dialect, numbers, {}, parts)
+            return [_experiment(path, c, header, used, options) for c, options in zip(read, parts, strict=True)]
+
+
+def _experiment(path: Path, cells: Cells, header: dict[str, str], used: Notice, options: ReadOptions) -> Experiment:
+    channels = {
+        name: options.in_si(name, column, "um" if quantity_of(name) == "displacement" else None)
+        for name, column in cells.columns.items()
+    }
+    period = options.sample_period or float(header.get("SAMPLE_TIME", "nan"))
+    rest = options.with_period(period if period > 0 else None).after_reading(cells.average)
+    records, notices = table_records(channels, [], rest, truncated=options.passes_over)
+    notices.append(used)
+    declared, size = int(header.get("NDATA", "-1")), channels["voltage"].size
+    if declared >= 0 and options.rows is None and cells.average == 1 and size != declared:
+        notices.append(Notice("cut", f"the file has {size} of the {declared} rows that its header declares"))
+    if options.average is None and cells.average > 1:
+        notices.append(averaged_notice(cells.average, records[0].sample_period))
+    if cells.bad:
+        notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number"))
+    return Experiment(tuple(records), str(path), tuple(notices))
 
 
 def _header(path: Path) -> tuple[dict[str, str], int]:

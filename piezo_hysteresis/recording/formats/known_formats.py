@@ -19,7 +19,7 @@ A further format is a file in this folder and one line of `FORMATS`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -52,6 +52,14 @@ class WritableFormat(Format, Protocol):
 
     def write(self, experiment: Experiment, path: Path) -> None:
         """Write the experiment to `path`."""
+
+
+@runtime_checkable
+class TextFormat(Format, Protocol):
+    """A format whose lines have to be passed one by one, so that several parts are read in one pass."""
+
+    def read_parts(self, path: Path, parts: Sequence[ReadOptions]) -> list[Experiment]:
+        """One experiment for each of `parts`, which differ in `rows`, `phases` and `initial_voltage` only."""
 
 
 FORMATS: Mapping[str, Format] = {

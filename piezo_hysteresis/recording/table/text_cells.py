@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,10 +51,35 @@ class Cells:
     """Rows that were averaged into one."""
 
 
+class _Part:
+    """A part of a text file while it is read: the options choose its rows."""
+
+    def __init__(self, width: int, options: ReadOptions) -> None:
+        self.buffer = DecimatingBuffer.of(width, options)
+        self.marks: list[tuple[int, dict[str, str]]] = []
+        self.bad = 0
+
+    def overlaps(self, rows: int) -> bool:
+        """Whether the part holds some of the next rows."""
+        return not self.buffer.is_full and self.buffer.rows + rows > self.buffer.start
+
+    def mark(self, labelled: Iterable[tuple[int, dict[str, str]]]) -> None:
+        """Note where the words change within the next rows."""
+        for row, labels in labelled:
+            if not self.marks or self.marks[-1][1] != labels:
+                self.marks.append((self.buffer.rows + row, labels))
+
+    def cells(self, names: Iterable[str]) -> Cells:
+        """What was read."""
+        buffer = self.buffer
+        columns = {name: buffer.column(at) for at, name in enumerate(names)}
+        return Cells(columns, [(buffer.kept_row(row), labels) for row, labels in self.marks], self.bad, buffer.factor)
+
+
 def read_cells(
-    path: Path, dialect: Dialect, numbers: Mapping[str, int], words: Mapping[str, int], options: ReadOptions
-) -> Cells:
-    """Read columns of a text file.
+    path: Path, dialect: Dialect, numbers: Mapping[str, int], words: Mapping[str, int], parts: Sequence[ReadOptions]
+) -> list[Cells]:
+    """Read columns of one or more parts of a text file, all in one pass.
 
     Parameters
     ----------
@@ -64,36 +89,33 @@ def read_cells(
         Its notation.
     numbers, words : mapping of str to int
         Name of every column to read to its position, counted from 0.
-    options : ReadOptions
-        Its `rows`, where they count from the beginning, and its `average` apply before anything is kept.
+    parts : sequence of ReadOptions
+        One for every part: its `rows`, where they count from the beginning, and its `average` apply before anything is
+        kept.
 
     Raises
     ------
     RecordingError
         On a line that is longer than a block, or more samples than can be kept.
     """
-    buffer = DecimatingBuffer.of(len(numbers), options)
-    marks: list[tuple[int, dict[str, str]]] = []
-    bad = 0
+    read = [_Part(len(numbers), options) for options in parts]
     for lines in _line_blocks(path, dialect.skipped):
-        first, behind = buffer.rows, buffer.rows + len(lines)
-        if behind > buffer.start:
+        holders = [part for part in read if part.overlaps(len(lines))]
+        values, wrong = np.empty((len(lines), len(numbers))), 0  # of skipped rows, if no part holds them
+        if holders:
             values, wrong = _parsed(lines, dialect, list(numbers.values()))
-            bad += wrong
-        else:
-            values = np.empty((len(lines), len(numbers)))  # skipped
-        buffer.add(values)
-        if words and behind > buffer.start:
+        if holders and words:
             cells = _labels(lines, dialect, list(words.values()))
             changes = np.flatnonzero((cells[1:] != cells[:-1]).any(axis=1)) + 1
-            for row in (0, *changes.tolist()):
-                labels = dict(zip(words, map(str, cells[row]), strict=True))
-                if not marks or marks[-1][1] != labels:
-                    marks.append((first + row, labels))
-        if buffer.is_full:
+            labelled = [(row, dict(zip(words, map(str, cells[row]), strict=True))) for row in (0, *changes.tolist())]
+            for part in holders:
+                part.mark(labelled)
+        for part in read:
+            part.bad += wrong if part in holders else 0
+            part.buffer.add(values)
+        if all(part.buffer.is_full for part in read):
             break
-    columns = {name: buffer.column(at) for at, name in enumerate(numbers)}
-    return Cells(columns, [(buffer.kept_row(row), labels) for row, labels in marks], bad, buffer.factor)
+    return [part.cells(numbers) for part in read]
 
 
 def _line_blocks(path: Path, skipped: int) -> Iterator[list[str]]:

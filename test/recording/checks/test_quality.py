@@ -26,6 +26,7 @@ from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import inspect, read, write
 from piezo_hysteresis.recording.checks.initial_condition_check import departures, is_within_its_loop
 from piezo_hysteresis.recording.checks.lag import lag_of
+from piezo_hysteresis.recording.table import text_cells
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
 PERIOD = 1e-4
@@ -381,6 +382,22 @@ def test_rows_before_the_selected_ones_determine_the_state(tmp_path):
         before = float(drive[2999])
         settled = read(file, rows=(3000, 5000), rows_before=1 << 20, initial_voltage=before, sample_period=period)
         assert len(settled) == 1 and settled[0].settled_voltage == pytest.approx(before)
+
+
+@pytest.mark.parametrize("format", ["csv", "gcs_array"])
+def test_rows_before_are_read_in_the_same_pass(tmp_path, monkeypatch, format):
+    drive, y = ringing()
+    head = "# DIM = 2\n# SAMPLE_TIME = 1e-4\n# NAME0 = Volt\n# NAME1 = Position\n# END_HEADER\n"
+    head = head if format == "gcs_array" else "voltage_V displacement_um\n"
+    np.savetxt(tmp_path / "lab.txt", np.c_[drive, 1e6 * y], header=head[:-1], comments="")
+    passes = []
+    monkeypatch.setattr(text_cells, "BLOCK_BYTES", 1 << 12)  # several blocks, some of them in both parts
+    lines = text_cells._line_blocks
+    monkeypatch.setattr(text_cells, "_line_blocks", lambda *given: passes.append(given) or lines(*given))
+    lead, wanted = read(tmp_path / "lab.txt", format=format, rows=(3000, 5000), rows_before=100, sample_period=1e-4)
+    assert len(passes) == 1
+    np.testing.assert_allclose(lead.voltage, drive[2900:3000])
+    np.testing.assert_allclose(wanted.voltage, drive[3000:5000])
 
 
 def test_an_initial_voltage_belongs_to_the_first_row_of_the_file(tmp_path):
