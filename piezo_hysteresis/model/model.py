@@ -17,23 +17,21 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..effects import Discretisation, Effect, HysteresisOperator
+from ..effects import Discretisation
 from ..errors import ModelError
 from ..html_table import html_table
-from ..parameter import Parameter
 from ..picture import Picture, picture_of
 from ..record import Experiment, Record
 from .chain import Chain, ChainState, Channels
-from .chain_order import in_chain_order
+from .composition import Composition
 from .free_run import free_run, linearised_run, simulated, standard_errors
-from .named_numbers import numbers_of, with_numbers
 from .parameter_covariance import ParameterCovariance
 from .sample_periods import require_not_shorter, stated_period
 from .samples import row
@@ -42,7 +40,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class Model(Composition):
     """Effects in the order of the physics. A model is frozen; ``with_…`` returns a new one.
 
     Parameters
@@ -75,7 +73,6 @@ class Model:
     >>> y2, state = model.run([2.0], state)
     """
 
-    effects: tuple[Effect, ...]
     sample_period: float
     voltage_scale: float = 10.0
     displacement_scale: float = 1.0
@@ -83,14 +80,14 @@ class Model:
     covariance: ParameterCovariance | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "effects", in_chain_order(self.effects))
+        super().__post_init__()
         for name in ("sample_period", "voltage_scale", "displacement_scale"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise ModelError(f"{name}: got {value!r}, expected a positive number")
 
     def __repr__(self) -> str:
-        return f"Model({' → '.join(e.name for e in self.effects)}, {self.sample_period:g} s)"
+        return f"Model({super().__repr__()}, {self.sample_period:g} s)"
 
     def _repr_html_(self) -> str:
         rows = ((name, f"{value:.6g}", self.row(name).unit) for name, value in self.values().items())
@@ -99,60 +96,6 @@ class Model:
     def plot(self, experiment: Experiment) -> Picture:
         """The free run against the measurement, phase by phase, with the residual and the 95 % band."""
         return picture_of(self, experiment)
-
-    def __getitem__(self, name: str) -> Effect:
-        for effect in self.effects:
-            if effect.name == name:
-                return effect
-        raise ModelError(f"no effect '{name}' in the chain {', '.join(e.name for e in self.effects)}")
-
-    def __contains__(self, name: object) -> bool:
-        return any(e.name == name for e in self.effects)
-
-    @property
-    def has_hysteresis(self) -> bool:
-        """Whether an effect of the chain plays the role of the hysteresis."""
-        return any(isinstance(e, HysteresisOperator) for e in self.effects)
-
-    @property
-    def hysteresis(self) -> HysteresisOperator:
-        """The effect that plays the role of the hysteresis, whichever operator it is.
-
-        Raises
-        ------
-        ModelError
-            If the chain has none.
-        """
-        for effect in self.effects:
-            if isinstance(effect, HysteresisOperator):
-                return effect
-        raise ModelError(f"got no hysteresis in {self!r}, expected one, e.g. BoucWen()")
-
-    def with_hysteresis(self, operator: HysteresisOperator) -> Model:
-        """With `operator` in the role of the hysteresis, instead of the one that has it."""
-        kept = tuple(e for e in self.effects if not isinstance(e, HysteresisOperator))
-        return replace(self, effects=(*kept, operator))
-
-    def with_effect(self, effect: Effect) -> Model:
-        """With `effect` in its place in the chain, instead of one of the same name."""
-        return replace(self, effects=(*(e for e in self.effects if e.name != effect.name), effect))
-
-    def without(self, name: str) -> Model:
-        """Without the effect `name`."""
-        return replace(self, effects=tuple(e for e in self.effects if e.name != name))
-
-    def with_values(self, values: Mapping[str, float]) -> Model:
-        """With other numbers, named ``"creep.gamma"`` or ``"arx.a[0]"``."""
-        return replace(self, effects=with_numbers(self.effects, values))
-
-    def values(self) -> dict[str, float]:
-        """All numbers by name, ``"bouc_wen.A"``, ``"arx.a[0]"``."""
-        return numbers_of(self.effects)
-
-    def row(self, name: str) -> Parameter:
-        """The table row of a number."""
-        owner, _, rest = name.partition(".")
-        return next(p for p in self[owner].parameters if p.name == rest.partition("[")[0])
 
     def at(self, sample_period: float) -> Chain:
         """The chain at another sample period [s]; kept for the next time.

@@ -21,6 +21,12 @@ from .sensor_offset import SensorOffset
 from .voltage_history import VoltageHistory
 from .warmup import Warmup
 
+PIECE = 50_000
+"""Fewest samples of the history that a new model processes per block of the stream; it takes a few milliseconds."""
+
+PACE = 8
+"""Fewest samples of the history that a new model processes per sample of the stream, so that it overtakes it."""
+
 
 class ModelSwap:
     """One model that is being run over the history, and the newest of the models that arrived meanwhile."""
@@ -45,13 +51,13 @@ class ModelSwap:
         """Use a model, with its offset [m] if known, after the one that is running; it replaces one that waits."""
         self._waiting = model, offset
 
-    def advance(self, values: int, history: VoltageHistory, zero: SensorOffset) -> Warmup | None:
+    def advance(self, received: int, history: VoltageHistory, zero: SensorOffset) -> Warmup | None:
         """Run over the next piece of the history. Returns the run that has reached the end, if any.
 
         Parameters
         ----------
-        values : int
-            Voltages to run over.
+        received : int
+            Samples of the stream that came with the newest block.
         history : VoltageHistory
             Of the stream.
         zero : SensorOffset
@@ -68,7 +74,7 @@ class ModelSwap:
             (model, offset), self._waiting = self._waiting, None
             self._running = Warmup(model, history, zero, offset)
         warmup, self._running = self._running, None
-        if warmup is None or warmup.advance(values):
+        if warmup is None or warmup.advance(max(PIECE, PACE * received)):
             return warmup
         self._running = warmup
         return None

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -26,24 +28,12 @@ from ..model.samples import samples
 from .model_swap import ModelSwap
 from .prediction import Prediction
 from .running_rms import RunningRms
-from .sensor_offset import SensorOffset
+from .sensor_offset import SensorOffset, samples_to_average
 from .sequence_check import LONGEST_SILENCE, SequenceCheck
 from .voltage_history import FULL_SAMPLES, DriveHistory, VoltageHistory, is_held
 from .warmup import chain_at
 
 Array = NDArray[np.float64]
-
-ZERO_TIME = 0.1
-"""Time over which the offset between sensor and model is averaged [s]; a moving stage is averaged over a loop."""
-
-ZERO_SAMPLES = 20
-"""Fewest samples over which the offset is averaged."""
-
-PIECE = 50_000
-"""Samples of the history that a new model processes per block of the stream; this takes a few milliseconds."""
-
-SHORTEST_PERIOD, LONGEST_PERIOD = 1e-7, 1e3
-"""Limits of the sample period of a stream [s]; the memory needed is inversely proportional to it."""
 
 FORGETTING = 2.0
 """Travel of the drive, in voltage scales, after which the initial state of a loop has decayed."""
@@ -93,22 +83,14 @@ class Predictor:
     """
 
     def __init__(self, sample_period: float, model: Model | None = None, rms_time: float = 1.0) -> None:
-        if not SHORTEST_PERIOD <= sample_period <= LONGEST_PERIOD:
-            raise RecordError(
-                f"sample period: got {sample_period:g} s, expected {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
-            )
-        self.sample_period = sample_period
         self.sequence = SequenceCheck(sample_period)
-        self.model: Model | None = None
+        self.sample_period = sample_period
+        self.model = model
         self.chain: Chain | None = None
         self._swap = ModelSwap()
-        self._unseen: float | None = None  # travel [V] at which the drive was last unknown
-        self._joined_unseen = False
-        self._window = max(ZERO_SAMPLES, round(ZERO_TIME / sample_period))
+        self._joined_moving = False
         self._rms = RunningRms(max(1, round(rms_time / sample_period)))
         self._begin()
-        if model is not None:
-            self.swap(model)
 
     @property
     def offset(self) -> float:
@@ -123,10 +105,8 @@ class Predictor:
     @property
     def warming_up(self) -> bool:
         """True while voltages that were not received (before the first block, in a gap) influence the prediction."""
-        if self._unseen is None:
-            return False
-        travelled = self._history.travel - self._unseen
-        return self.model is None or travelled < FORGETTING * self.model.voltage_scale
+        forgotten = math.inf if self.model is None else FORGETTING * self.model.voltage_scale
+        return self._history.known_travel < forgotten
 
     @property
     def residual_rms(self) -> float | None:
@@ -141,8 +121,7 @@ class Predictor:
     def swap(self, model: Model, offset: float | None = None) -> None:
         """Change to another model after it has been run over the history; `offset` [m] is its sensor offset, if known.
 
-        While one model is being run over the history, the newest of the later models waits. Models may therefore arrive
-        faster than they can be run over the history.
+        Models may arrive faster than they can be run over the history: only the newest of them waits.
 
         Raises
         ------
@@ -157,7 +136,7 @@ class Predictor:
             return
         self._swap.request(model, offset)
         if not self._swap.is_running:
-            self._advance_swap(PIECE)
+            self._advance_swap(0)
 
     def zero(self) -> None:
         """Measure the offset again, over the next 0.1 s."""
@@ -210,8 +189,9 @@ class Predictor:
             if arrival.restarted:
                 if self._history.count:
                     self._begin()
-                self._joined_unseen = not (settled and is_held(drive))
-                self._unseen = 0.0 if self._joined_unseen else None
+                self._joined_moving = not (settled and is_held(drive))
+                if self._joined_moving:
+                    self._history.mark_unknown()
             if arrival.missing:
                 self._bridge(arrival.missing, follows_gap)
             modelled = self._run_and_zero(drive, measured)
@@ -219,7 +199,7 @@ class Predictor:
         residual = measured[: prediction.size] - prediction
         self._rms.add(residual)
         answer = Prediction(arrival.repeated, prediction, residual, self.model, self.warming_up)
-        self._advance_swap(max(PIECE, 8 * drive.size))
+        self._advance_swap(drive.size)
         return answer
 
     def _begin(self) -> None:
@@ -232,13 +212,13 @@ class Predictor:
             self.swap(newest)
 
     def _zero_from(self, start: int, at_rest: bool = False) -> None:
-        self._zero = SensorOffset(start, self._window, at_rest)
+        self._zero = SensorOffset(start, samples_to_average(self.sample_period), at_rest)
         self._rms.clear()
 
     def _bridge(self, missing: int, never_measured: bool) -> None:
         """Bridge missing samples with the last voltage. The true voltage is unknown where messages were lost."""
         if not never_measured:
-            self._unseen = self._history.travel
+            self._history.mark_unknown()
         gap = min(missing, round(LONGEST_SILENCE / self.sample_period), FULL_SAMPLES)
         self._run(np.full(gap, self._history.last))
 
@@ -260,8 +240,8 @@ class Predictor:
         modelled = self._run(drive)
         if self._history.has_rested and not had_rested:
             self._zero_from(start, at_rest=True)
-        elif self._joined_unseen and not self.warming_up:
-            self._joined_unseen = False
+        elif self._joined_moving and not self.warming_up:
+            self._joined_moving = False
             self._zero_from(start)
             self._zero.until = 2.0 * self._history.travel  # as long again as the part that was forgotten
         elif self._zero.at_rest and not is_held(drive):
@@ -269,16 +249,15 @@ class Predictor:
         self._zero.add(measured, modelled, self._history.travel)
         return modelled
 
-    def _advance_swap(self, values: int) -> None:
-        warmup = self._swap.advance(values, self._history, self._zero)
+    def _advance_swap(self, received: int) -> None:
+        warmup = self._swap.advance(received, self._history, self._zero)
         if warmup is None:
             return
         self.model, self.chain, self.state = warmup.model, warmup.chain, warmup.state
         if warmup.offset is not None:
             self._zero = SensorOffset.known(self._history.count, warmup.offset)
-            self._rms.clear()
         elif warmup.zero is self._zero and warmup.mean is not None:
             self._zero.remodel(warmup.mean)
-            self._rms.clear()
         else:
             self._zero_from(self._history.count)
+        self._rms.clear()

@@ -21,6 +21,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+TIME = 0.1
+"""Time over which the offset is averaged [s]; a moving stage is averaged over a loop."""
+
+FEWEST = 20
+"""Fewest samples over which the offset is averaged."""
+
 
 class SensorOffset:
     """Mean of measured minus modelled displacement over a window of the stream.
@@ -85,3 +91,8 @@ class SensorOffset:
     def remodel(self, mean: float) -> None:
         """Change to another model, whose mean displacement over the window is `mean` [m]."""
         self._modelled = mean * (self.stop - self.start)
+
+
+def samples_to_average(sample_period: float) -> int:
+    """Number of samples over which the offset is averaged, for samples of a period [s]."""
+    return max(FEWEST, round(TIME / sample_period))

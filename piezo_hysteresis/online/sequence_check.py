@@ -18,9 +18,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..errors import RecordError
+
 LONGEST_SILENCE = 60.0
 """Longest time [s] that a jump of the index may stand for if it counts as lost samples; a longer one counts as a
 restart."""
+
+SHORTEST_PERIOD, LONGEST_PERIOD = 1e-7, 1e3
+"""Limits of the sample period of a stream [s]; the memory needed is inversely proportional to it."""
 
 LONGEST_DELAY = 1.0
 """A block that repeats samples older than this [s] counts as a restart, not as a late message."""
@@ -57,9 +62,18 @@ class SequenceCheck:
     ----------
     received, lost, repeated, restarts : int
         Numbers of accepted samples, of lost samples, of samples that came twice or too late, and of restarts.
+
+    Raises
+    ------
+    RecordError
+        If the sample period is outside the limits.
     """
 
     def __init__(self, sample_period: float) -> None:
+        if not SHORTEST_PERIOD <= sample_period <= LONGEST_PERIOD:
+            raise RecordError(
+                f"sample period: got {sample_period:g} s, expected {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
+            )
         self.sample_period = sample_period
         self.received = self.lost = self.repeated = self.restarts = 0
         self._expected: int | None = None

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,6 +92,7 @@ class VoltageHistory:
         self.travel = 0.0
         """Lower bound of the travel of the drive since the beginning of the stream [V]. It adds the distances between
         the ends of all blocks that are not held, so that the noise of a measured drive does not count."""
+        self._unknown_at: float | None = None
         self._counted = 0.0
         self.has_rested = False
         """True once a block of the drive stood still."""
@@ -106,6 +108,15 @@ class VoltageHistory:
     def start(self) -> int:
         """Number of the first sample that is kept, averaged or in full."""
         return self._full_start - self.factor * self._slow.size
+
+    @property
+    def known_travel(self) -> float:
+        """Travel since the drive was last unknown [V]; infinite where it was always known."""
+        return math.inf if self._unknown_at is None else self.travel - self._unknown_at
+
+    def mark_unknown(self) -> None:
+        """State that the drive was unknown until now: the voltages of lost samples, or of the time before the first."""
+        self._unknown_at = self.travel
 
     @property
     def last(self) -> float:
