@@ -26,12 +26,12 @@ from .fork_server import ForkServer
 SECONDS = 120
 """Processor time after which a call is ended [s]; none of them needs a tenth of it."""
 INTERVAL = 0.01
-"""Time between two looks at a call that runs [s]."""
+"""Time between two checks of a call that runs [s]."""
 
 
 @cache
 def _server() -> ForkServer:
-    commands = ("main", "diagnose", "identify", "import_", "simulate", "validate")
+    commands = ("main", "model.diagnose", "model.identify", "model.validate", "recording.import_", "stage.simulate")
     return ForkServer(*(f"cli.{name}" for name in commands), "stage.simulated")
 
 

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The `piezo` command. Every subcommand has a file with `add_parser(subparsers)` and `run(args) -> int`."""
+"""The `piezo` command. A subcommand is a file with `add_parser(subparsers)` and `run(args) -> int`."""

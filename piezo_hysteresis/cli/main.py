@@ -29,25 +29,31 @@ from .. import __version__
 from ..errors import IdentificationError, PiezoError, printable
 
 COMMANDS = {
-    "simulate": "play a protocol to a simulated stage and record it",
-    "record": "play a protocol to a stage and record it, without ROS",
-    "emulate": "emulate a controller behind a TCP port",
-    "calibrate": "measure the delay of a card without a stage",
-    "identify": "identify a model from an experiment",
-    "recalibrate": "fit gain, offset, loop height and lag of an existing model to new records",
-    "history": "show the recalibrations of a stage over time",
-    "validate": "compare a model with an experiment in free-run simulation",
-    "diagnose": "find where a model is wrong and which effect is missing",
-    "compensate": "compute the drive voltage for a wanted displacement",
-    "export": "write a model as C code or co-simulation unit (FMU)",
-    "view": "show an experiment in the browser, with zoom",
-    "report": "write one page about an experiment and its models",
-    "import": "convert a recording of other software into an experiment",
-    "fleet": "identify, validate or diagnose many recordings, one row of a table for each",
-    "follow": "show the progress of the identification node in one line; needs ROS 2",
-    "effects": "list the catalogue of physical effects",
+    "stage": {
+        "simulate": "play a protocol to a simulated stage and record it",
+        "record": "play a protocol to a stage and record it, without ROS",
+        "emulate": "emulate a controller behind a TCP port",
+        "calibrate": "measure the delay of a card without a stage",
+        "follow": "show the progress of the identification node in one line; needs ROS 2",
+    },
+    "model": {
+        "identify": "identify a model from an experiment",
+        "recalibrate": "fit gain, offset, loop height and lag of an existing model to new records",
+        "history": "show the recalibrations of a stage over time",
+        "validate": "compare a model with an experiment in free-run simulation",
+        "diagnose": "find where a model is wrong and which effect is missing",
+        "compensate": "compute the drive voltage for a wanted displacement",
+        "export": "write a model as C code or co-simulation unit (FMU)",
+        "effects": "list the catalogue of physical effects",
+    },
+    "recording": {
+        "import": "convert a recording of other software into an experiment",
+        "view": "show an experiment in the browser, with zoom",
+        "report": "write one page about an experiment and its models",
+        "fleet": "identify, validate or diagnose many recordings, one row of a table for each",
+    },
 }
-"""Subcommands with a short description; the file of a subcommand is loaded only when it is called."""
+"""Subcommands with a short description, by folder; the file of a subcommand is loaded only when it is called."""
 
 DONE, NOT_IDENTIFIABLE, BAD_INPUT, INTERRUPTED, BROKEN_PIPE = 0, 1, 2, 130, 141
 """Exit codes of `piezo`."""
@@ -90,11 +96,13 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"piezo_hysteresis {__version__}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
-    for name, summary in COMMANDS.items():
-        if name == chosen:
-            import_module(f".{'import_' if name == 'import' else name}", __package__).add_parser(subparsers)
-        else:
-            subparsers.add_parser(name, help=summary)
+    for folder, commands in COMMANDS.items():
+        for name, summary in commands.items():
+            if name == chosen:
+                file = "import_" if name == "import" else name
+                import_module(f".{folder}.{file}", __package__).add_parser(subparsers)
+            else:
+                subparsers.add_parser(name, help=summary)
     return parser
 
 

@@ -215,7 +215,7 @@ def test_the_verdict_is_the_last_line_and_force_replaces(tmp_path, plain):
 def test_an_undetermined_fit_is_reported_with_status_1(tmp_path):
     from types import SimpleNamespace
 
-    from piezo_hysteresis.cli.identify import verdict_line
+    from piezo_hysteresis.cli.model.identify import verdict_line
 
     fit = SimpleNamespace(converged=False, iterations=40, at_bounds=())
     said = verdict_line(SimpleNamespace(fit=fit, free_run_percent=5.0, notices=()))

@@ -30,6 +30,8 @@ from piezo_hysteresis.model import model_file
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
+NAMES = [name for commands in COMMANDS.values() for name in commands]
+
 
 def test_help_names_every_command_and_loads_nothing_heavy():
     code = (
@@ -41,10 +43,10 @@ def test_help_names_every_command_and_loads_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert all(command in done.stdout for command in COMMANDS)
+    assert all(name in done.stdout for name in NAMES)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", NAMES)
 def test_every_command_explains_itself(piezo, command):
     done = piezo(command, "--help")
     assert done.status == 0

@@ -52,7 +52,7 @@ ROOMS = ("cli", "compensation", "discrepancy", "identification", "model", "nodes
 ORDINARY = {"offset"}
 OTHER_MEANINGS = {("report/figures/creep.py", "creep")}  # the name of the figure
 ABOUT_ONE_OPERATOR = {
-    "cli/identify.py",  # its option --published means the published operator
+    "cli/model/identify.py",  # its option --published means the published operator
     "discrepancy/residual/explicit_step.py",  # recognises the step of Eq. (7)
 }
 LIMITS = DriveLimits(sample_period=2e-4)

@@ -33,7 +33,7 @@ from ...record import Experiment, Record
 from ...report.tables.probability_table import probability_table
 from ...stage.back_ends import BACK_ENDS
 from ...yaml_file import read_yaml
-from ..record import checked_settings, drive_limits, read_stage
+from ..stage.record import checked_settings, drive_limits, read_stage
 from ..terminal import console, progress, show
 from .destination import require_new_experiment
 

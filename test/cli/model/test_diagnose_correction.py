@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`piezo diagnose --correction`: a correction without a name is written only where it was accepted, and is told."""
+"""`piezo diagnose --correction`: a correction without a name is written only if accepted, and is in the answer."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from piezo_hysteresis.cli import diagnose as command
+from piezo_hysteresis.cli.model import diagnose as command
 from piezo_hysteresis.discrepancy import Conclusion, Diagnosis, Gap
 from piezo_hysteresis.discrepancy.unnamed.correction import Correction
 from piezo_hysteresis.effects import Arx, BoucWen, UnnamedPositionMap
@@ -60,14 +60,14 @@ def test_an_accepted_correction_is_written_and_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code, path = answered(ACCEPTED, tmp_path, monkeypatch)
-    out, told = capsys.readouterr().out, json.loads((tmp_path / "answer.json").read_text())
+    out, answer = capsys.readouterr().out, json.loads((tmp_path / "answer.json").read_text())
     assert code == 0
     assert model_file.load(path)[HUMP.name] == HUMP
     assert HUMP.name not in model_file.load(tmp_path / "better.yaml"), "the model of the answer stays without it"
     assert "removes 85 % of the gap" in out and "from 0 to 8 V" in out and str(path) in out
-    assert told["verdict"] == "unknown" and told["effects"] == []
-    assert told["unnamed_correction"]["form"] == "unnamed_position_map"
-    assert told["unnamed_correction"]["shape"]["y"]["values"] == pytest.approx([0.0, 1e-8, 3e-8, 1e-8, 0.0])
+    assert answer["verdict"] == "unknown" and answer["effects"] == []
+    assert answer["unnamed_correction"]["form"] == "unnamed_position_map"
+    assert answer["unnamed_correction"]["shape"]["y"]["values"] == pytest.approx([0.0, 1e-8, 3e-8, 1e-8, 0.0])
 
 
 def test_a_refused_correction_is_reported_and_not_written(

@@ -24,12 +24,12 @@ import argparse
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ..errors import RecordingError
-from ..model.parameter_file import number
-from ..stage.daqmx.loop_back import loop_back_delay
-from ..stage.daqmx.setup import DaqmxSetup
-from ..stage.daqmx.stage import DaqmxStage
-from .terminal import console
+from ...errors import RecordingError
+from ...model.parameter_file import number
+from ...stage.daqmx.loop_back import loop_back_delay
+from ...stage.daqmx.setup import DaqmxSetup
+from ...stage.daqmx.stage import DaqmxStage
+from ..terminal import console
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

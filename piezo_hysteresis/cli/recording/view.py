@@ -24,10 +24,10 @@ import webbrowser
 from contextlib import suppress
 from pathlib import Path
 
-from ..model import model_file
-from ..report.figures.comparison import ModelComparison, compare
-from .options import destination, reading_options
-from .terminal import console, show_notices
+from ...model import model_file
+from ...report.figures.comparison import ModelComparison, compare
+from ..options import destination, reading_options
+from ..terminal import console, show_notices
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     comparison = compare(experiment, models)
     title = f"Recording {', '.join(Path(path).name for path in args.experiment)}"
     if args.rerun is not None:
-        from ..report.rerun_file import write_rerun
+        from ...report.rerun_file import write_rerun
 
         write_rerun(comparison, args.rerun, title)
         show_notices(experiment.notices)
@@ -66,8 +66,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _serve(args: argparse.Namespace, comparison: ModelComparison, title: str) -> int:
-    from ..report.live.recording_page import RecordingPage
-    from ..report.live.server import PageServer
+    from ...report.live.recording_page import RecordingPage
+    from ...report.live.server import PageServer
 
     server = PageServer(lambda document: RecordingPage(document, comparison, title), port=args.port)
     show_notices(comparison.experiment.notices)

@@ -20,15 +20,15 @@ import argparse
 import signal
 import threading
 
-from ..emulators.daqmx.card import Card
-from ..emulators.daqmx.faults import FAULTS as NI_FAULTS
-from ..emulators.daqmx.server import DaqmxServer
-from ..emulators.gcs2.controller import Controller
-from ..emulators.gcs2.faults import FAULTS as GCS2_FAULTS
-from ..emulators.gcs2.server import Gcs2Server
-from ..stage.simulated import SimulatedStage
-from .options.plant_option import add_plant_arguments, plant
-from .terminal import console
+from ...emulators.daqmx.card import Card
+from ...emulators.daqmx.faults import FAULTS as NI_FAULTS
+from ...emulators.daqmx.server import DaqmxServer
+from ...emulators.gcs2.controller import Controller
+from ...emulators.gcs2.faults import FAULTS as GCS2_FAULTS
+from ...emulators.gcs2.server import Gcs2Server
+from ...stage.simulated import SimulatedStage
+from ..options.plant_option import add_plant_arguments, plant
+from ..terminal import console
 
 _PORT = {"gcs2": 50000, "nidaqmx": 31763}
 """Default TCP port of every emulated device."""

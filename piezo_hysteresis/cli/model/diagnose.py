@@ -19,19 +19,19 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..discrepancy import Diagnosis, diagnose
-from ..discrepancy.choice.live_diagnosis import LiveDiagnosis
-from ..errors import IdentificationError, ParameterError
-from ..model import model_file
-from ..report.figures.comparison import compare_diagnosis
-from ..report.json_file import write_json
-from ..report.page import page
-from ..report.tables.answer_tables import correction_table, effect_table, gap_table, rejection_table, where_table
-from ..report.verdict import answer_verdict
-from .options import reading_options
-from .options.destination import add_results, require_new_file, require_new_results
-from .options.stage_option import add_stage_arguments, diagnose_stage
-from .terminal import console, progress, show, show_notices
+from ...discrepancy import Diagnosis, diagnose
+from ...discrepancy.choice.live_diagnosis import LiveDiagnosis
+from ...errors import IdentificationError, ParameterError
+from ...model import model_file
+from ...report.figures.comparison import compare_diagnosis
+from ...report.json_file import write_json
+from ...report.page import page
+from ...report.tables.answer_tables import correction_table, effect_table, gap_table, rejection_table, where_table
+from ...report.verdict import answer_verdict
+from ..options import reading_options
+from ..options.destination import add_results, require_new_file, require_new_results
+from ..options.stage_option import add_stage_arguments, diagnose_stage
+from ..terminal import console, progress, show, show_notices
 
 USUAL_TIME = "5 s to 2 min"
 """Usual duration, also on a busy computer; `docs/performance.md` measures it."""

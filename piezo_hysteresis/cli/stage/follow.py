@@ -21,7 +21,7 @@ import subprocess
 import sys
 from importlib.util import find_spec
 
-from ..errors import PiezoError
+from ...errors import PiezoError
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -27,14 +27,14 @@ from typing import Any
 
 import numpy as np
 
-from ..compensation import Limits, Plan, plan
-from ..errors import ModelError, RecordingError
-from ..model import model_file
-from ..recording.formats.wanted_path import read_path
-from ..report.json_file import write_json
-from ..report.tables.plan_table import answer, notes, plan_table
-from .options.destination import add_results, require_new_results
-from .terminal import console, show
+from ...compensation import Limits, Plan, plan
+from ...errors import ModelError, RecordingError
+from ...model import model_file
+from ...recording.formats.wanted_path import read_path
+from ...report.json_file import write_json
+from ...report.tables.plan_table import answer, notes, plan_table
+from ..options.destination import add_results, require_new_results
+from ..terminal import console, show
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     if args.figures is not None:
         _draw(found, Path(args.figures).expanduser())
     if args.report is not None:
-        from ..report.plan_page import plan_page
+        from ...report.plan_page import plan_page
 
         plan_page(found, model, args.path).save(Path(args.report).expanduser())
     show(plan_table(found))
@@ -147,7 +147,7 @@ def _save(found: Plan, place: Path) -> None:
 
 
 def _draw(found: Plan, folder: Path) -> None:
-    from ..report.figures.tracking import tracking
+    from ...report.figures.tracking import tracking
 
     folder.mkdir(parents=True, exist_ok=True)
     tracking(found).save(folder)

@@ -20,22 +20,22 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..discrepancy.residual.correlation import CAPTION, correlate
-from ..discrepancy.residual.residual import zero_per_phase
-from ..errors import RecordError
-from ..identification.identified_range import outside
-from ..identification.records.conditioning_split import known_from_within
-from ..model import model_file
-from ..record import CONDITIONING, Experiment
-from ..report.figures.comparison import ModelComparison, compare
-from ..report.json_file import write_json
-from ..report.tables.error_table import error_table, frequency_table
-from ..report.tables.table import Table
-from ..report.words import describes, error_sentence
+from ...discrepancy.residual.correlation import CAPTION, correlate
+from ...discrepancy.residual.residual import zero_per_phase
+from ...errors import RecordError
+from ...identification.identified_range import outside
+from ...identification.records.conditioning_split import known_from_within
+from ...model import model_file
+from ...record import CONDITIONING, Experiment
+from ...report.figures.comparison import ModelComparison, compare
+from ...report.json_file import write_json
+from ...report.tables.error_table import error_table, frequency_table
+from ...report.tables.table import Table
+from ...report.words import describes, error_sentence
+from ..options import reading_options
+from ..options.destination import add_results, require_new_results
+from ..terminal import console, show, show_notices
 from . import several_axes
-from .options import reading_options
-from .options.destination import add_results, require_new_results
-from .terminal import console, show, show_notices
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
     assert comparison.now is not None
-    verdict = f"{error_sentence(comparison.now.percent)}{_left(tests)}{_doubts(experiment)}"
+    verdict = f"{error_sentence(comparison.now.percent)}{_left(tests)}{_caveats(experiment)}"
     console().print(f"Verdict: {verdict}", style="bold")
     severe = any(notice.severe for notice in experiment.notices)
     return 0 if describes(comparison.now.percent) and not severe else 1
@@ -93,7 +93,7 @@ def _left(tests: list[dict[str, Any]]) -> str:
     )
 
 
-def _doubts(experiment: Experiment) -> str:
+def _caveats(experiment: Experiment) -> str:
     severe = list(dict.fromkeys(n.phase or "all" for n in experiment.notices if n.severe))
     unknown = [r.phase for r in experiment if r.truncated and r.phase != CONDITIONING]
     message = f" Severe findings in the data make this doubtful: {', '.join(severe)}." if severe else ""
@@ -169,9 +169,9 @@ def _test_table(tests: list[dict[str, Any]]) -> Table:
 
 
 def _draw(comparison: ModelComparison, folder: Path) -> None:
-    from ..report.figures.diagnosis.gap import gap
-    from ..report.figures.time_series import time_series
-    from ..report.figures.whiteness import whiteness
+    from ...report.figures.diagnosis.gap import gap
+    from ...report.figures.time_series import time_series
+    from ...report.figures.whiteness import whiteness
 
     folder.mkdir(parents=True, exist_ok=True)
     for figure in (gap, time_series, whiteness):

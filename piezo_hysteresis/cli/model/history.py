@@ -21,10 +21,10 @@ from pathlib import Path
 
 from rich.table import Table
 
-from ..discrepancy.changes.recalibration_history import FILE, read_numbers
-from ..errors import RecordingError
-from .options.destination import add_force, require_new_results
-from .terminal import console
+from ...discrepancy.changes.recalibration_history import FILE, read_numbers
+from ...errors import RecordingError
+from ..options.destination import add_force, require_new_results
+from ..terminal import console
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     out = console()
     out.print(table)
     if args.output is not None:
-        from ..report.recalibrations import recalibrations
+        from ...report.recalibrations import recalibrations
 
         picture = Path(args.output).expanduser()
         recalibrations(numbers).save_picture(picture)

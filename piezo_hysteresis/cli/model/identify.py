@@ -19,20 +19,20 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..effects import HYSTERESIS, MEMORY, OPERATORS, PublishedBoucWen
-from ..identification.identification import Identification, undetermined
-from ..identification.identify import identify
-from ..identification.records.roles import HELD_OUT
-from ..model import model_file
-from ..model.axes_samples import has_several_drives
-from ..report.json_file import write_json
-from ..report.tables.parameter_table import correlation_table, parameter_table
-from ..report.tables.table import Table
-from ..report.words import describes, error_sentence
+from ...effects import HYSTERESIS, MEMORY, OPERATORS, PublishedBoucWen
+from ...identification.identification import Identification, undetermined
+from ...identification.identify import identify
+from ...identification.records.roles import HELD_OUT
+from ...model import model_file
+from ...model.axes_samples import has_several_drives
+from ...report.json_file import write_json
+from ...report.tables.parameter_table import correlation_table, parameter_table
+from ...report.tables.table import Table
+from ...report.words import describes, error_sentence
+from ..options import reading_options
+from ..options.destination import add_results, require_new_results
+from ..terminal import console, progress, show, show_notices
 from . import several_axes
-from .options import reading_options
-from .options.destination import add_results, require_new_results
-from .terminal import console, progress, show, show_notices
 
 USUAL_TIME = "2 s to 1 min"
 """Usual duration, also on a busy computer; `docs/performance.md` measures it."""
@@ -127,12 +127,12 @@ def verdict_line(found: Identification) -> str:
             "above are not estimates; give phases that move the stage over its range at several rates."
         )
     severe = sum(n.severe for n in found.notices)
-    doubt = (
+    caveat = (
         f" {severe} severe finding{'s' * (severe > 1)} above make{'s' * (severe == 1)} it doubtful." if severe else ""
     )
     names = ", ".join(undetermined(fit))
     at_bounds = f" At a bound, so undetermined: {names}." if names else ""
-    return f"Verdict: {error_sentence(percent)}{doubt}{at_bounds}"
+    return f"Verdict: {error_sentence(percent)}{caveat}{at_bounds}"
 
 
 def answer(found: Identification, path: str) -> dict[str, Any]:

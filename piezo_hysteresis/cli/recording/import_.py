@@ -19,15 +19,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .. import recording
-from ..discrepancy.residual.noise_floor import noise_floors
-from ..errors import RecordingError
-from ..record import Experiment
-from ..report.json_file import write_json
-from ..report.tables.quality_table import notice_table, record_table, understood_table
-from .options import reading_options
-from .options.destination import require_new_experiment, require_new_file
-from .terminal import console, show
+from ... import recording
+from ...discrepancy.residual.noise_floor import noise_floors
+from ...errors import RecordingError
+from ...record import Experiment
+from ...report.json_file import write_json
+from ...report.tables.quality_table import notice_table, record_table, understood_table
+from ..options import reading_options
+from ..options.destination import require_new_experiment, require_new_file
+from ..terminal import console, show
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _show_preview(experiment: Experiment, picture: Path) -> None:
-    from ..report.figures.preview import preview  # matplotlib is slow to import
+    from ...report.figures.preview import preview  # matplotlib is slow to import
 
     show(understood_table(experiment))
     preview(experiment).save_picture(picture)

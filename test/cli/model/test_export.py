@@ -27,7 +27,7 @@ from piezo_hysteresis.model import axes_file, model_file
 from piezo_hysteresis.model.axes_model import AxesModel
 from piezo_hysteresis.model.model import Model
 
-from ..contract.compiled import needs_compiler
+from ...contract.compiled import needs_compiler
 
 MODEL = Model((BoucWen(), Arx(a=[-1.2, 0.6], b=[0.3, 0.1], delay=2)), 2e-5, 10.0, 1e-5)
 

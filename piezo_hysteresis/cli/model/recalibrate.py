@@ -18,12 +18,12 @@ from __future__ import annotations
 
 import argparse
 
-from ..discrepancy.changes.recalibration import recalibrate
-from ..model import model_file
-from ..report.json_file import write_json
-from .options import reading_options
-from .options.destination import add_results, require_new_results
-from .terminal import console, show_notices
+from ...discrepancy.changes.recalibration import recalibrate
+from ...model import model_file
+from ...report.json_file import write_json
+from ..options import reading_options
+from ..options.destination import add_results, require_new_results
+from ..terminal import console, show_notices
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

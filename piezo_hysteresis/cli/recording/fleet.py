@@ -23,20 +23,20 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..effects import HYSTERESIS, OPERATORS
-from ..errors import ParameterError
-from ..fleet.attempt import RowStatus
-from ..fleet.cluster import cluster
-from ..fleet.finding import find_recordings
-from ..fleet.fleet import open_orders, run_fleet
-from ..fleet.source import NamePattern
-from ..fleet.storage import Storage
-from ..fleet.table.results import Results
-from ..fleet.work import TASKS, work_for
-from ..model import model_file
-from .options import reading_options
-from .options.destination import add_force, require_new_file
-from .terminal import console, progress
+from ...effects import HYSTERESIS, OPERATORS
+from ...errors import ParameterError
+from ...fleet.attempt import RowStatus
+from ...fleet.cluster import cluster
+from ...fleet.finding import find_recordings
+from ...fleet.fleet import open_orders, run_fleet
+from ...fleet.source import NamePattern
+from ...fleet.storage import Storage
+from ...fleet.table.results import Results
+from ...fleet.work import TASKS, work_for
+from ...model import model_file
+from ..options import reading_options
+from ..options.destination import add_force, require_new_file
+from ..terminal import console, progress
 
 TIME_LIMIT = 600.0
 """Time limit per recording if none is given [s]."""
@@ -105,8 +105,8 @@ def run(args: argparse.Namespace) -> int:
     folder = Path(args.output).expanduser()
     without = _worked(args, folder) if args.urls else 0
     if args.report is not None:
-        from ..fleet.table.results_history import results_history
-        from ..report.fleet.fleet_page import fleet_page
+        from ...fleet.table.results_history import results_history
+        from ...report.fleet.fleet_page import fleet_page
 
         fleet_page(results_history(folder, args.task)).save(Path(args.report).expanduser())
         console().print(f"wrote {args.report}")

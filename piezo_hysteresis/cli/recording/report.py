@@ -19,14 +19,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..discrepancy.residual.residual import zero_per_phase
-from ..model import model_file
-from ..report.figures.comparison import compare
-from ..report.json_file import read_json
-from ..report.page import page
-from .options import reading_options
-from .options.destination import add_force, require_new_results
-from .terminal import console, progress
+from ...discrepancy.residual.residual import zero_per_phase
+from ...model import model_file
+from ...report.figures.comparison import compare
+from ...report.json_file import read_json
+from ...report.page import page
+from ..options import reading_options
+from ..options.destination import add_force, require_new_results
+from ..terminal import console, progress
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

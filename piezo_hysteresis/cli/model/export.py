@@ -29,15 +29,15 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..compensation import Band, Inverse, Limits
-from ..errors import ModelError
-from ..export import c_program, fmus
-from ..export.fmu import compiler
-from ..export.inversion import inversion
-from ..model import model_file
-from ..model.model import Model
-from .options.destination import add_force, require_new_folder
-from .terminal import console
+from ...compensation import Band, Inverse, Limits
+from ...errors import ModelError
+from ...export import c_program, fmus
+from ...export.fmu import compiler
+from ...export.inversion import inversion
+from ...model import model_file
+from ...model.model import Model
+from ..options.destination import add_force, require_new_folder
+from ..terminal import console
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

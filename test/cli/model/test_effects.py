@@ -18,7 +18,7 @@ import argparse
 
 import pytest
 
-from piezo_hysteresis.cli import effects
+from piezo_hysteresis.cli.model import effects
 from piezo_hysteresis.effects import CHAIN, UNNAMED
 from piezo_hysteresis.errors import ModelError
 

@@ -21,7 +21,7 @@ import pytest
 
 from piezo_hysteresis import recording
 from piezo_hysteresis.acquisition.phase_recorder import record_phases
-from piezo_hysteresis.cli import record
+from piezo_hysteresis.cli.stage import record
 
 pytestmark = pytest.mark.device
 

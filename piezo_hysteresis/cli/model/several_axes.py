@@ -20,14 +20,14 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..errors import IdentificationError, ModelError
-from ..identification.identify_axes import LENGTH, AxisError, axes_errors, identify_axes
-from ..identification.records.roles import HELD_OUT
-from ..model import axes_file
-from ..record import Experiment, Record
-from ..report.json_file import write_json
-from ..report.tables.table import Table
-from .terminal import console, show, show_notices
+from ...errors import IdentificationError, ModelError
+from ...identification.identify_axes import LENGTH, AxisError, axes_errors, identify_axes
+from ...identification.records.roles import HELD_OUT
+from ...model import axes_file
+from ...record import Experiment, Record
+from ...report.json_file import write_json
+from ...report.tables.table import Table
+from ..terminal import console, show, show_notices
 
 
 def identify(experiment: Experiment, args: argparse.Namespace) -> int:

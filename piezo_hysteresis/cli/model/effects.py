@@ -22,8 +22,8 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from ..effects import BASELINE, CHAIN, UNNAMED, Effect, effect_named
-from ..parameter import Parameter
+from ...effects import BASELINE, CHAIN, UNNAMED, Effect, effect_named
+from ...parameter import Parameter
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

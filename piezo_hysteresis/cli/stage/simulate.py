@@ -18,15 +18,15 @@ from __future__ import annotations
 
 import argparse
 
-from .. import recording
-from ..identification.protocol import protocol
-from ..identification.protocol.drive_limits import DriveLimits
-from ..record import Experiment, Record
-from ..report.json_file import write_json
-from ..stage.simulated import SimulatedStage
-from .options.destination import require_new_experiment, require_new_file
-from .options.plant_option import add_plant_arguments, plant
-from .terminal import console, progress
+from ... import recording
+from ...identification.protocol import protocol
+from ...identification.protocol.drive_limits import DriveLimits
+from ...record import Experiment, Record
+from ...report.json_file import write_json
+from ...stage.simulated import SimulatedStage
+from ..options.destination import require_new_experiment, require_new_file
+from ..options.plant_option import add_plant_arguments, plant
+from ..terminal import console, progress
 
 PROTOCOLS = {"paper": protocol.paper, "short": protocol.short, "rich": protocol.rich}
 """Identification protocols that can be simulated."""

@@ -26,17 +26,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import recording
-from ..acquisition.phase_recorder import record_phases
-from ..acquisition.session import DriverSession
-from ..acquisition.settings import DRIVER, DriverSettings
-from ..errors import ParameterError
-from ..identification.protocol.drive_limits import DriveLimits
-from ..record import Experiment
-from ..stage.back_ends import BACK_ENDS
-from ..yaml_file import read_yaml
+from ... import recording
+from ...acquisition.phase_recorder import record_phases
+from ...acquisition.session import DriverSession
+from ...acquisition.settings import DRIVER, DriverSettings
+from ...errors import ParameterError
+from ...identification.protocol.drive_limits import DriveLimits
+from ...record import Experiment
+from ...stage.back_ends import BACK_ENDS
+from ...yaml_file import read_yaml
+from ..terminal import console, progress
 from .simulate import PROTOCOLS
-from .terminal import console, progress
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
