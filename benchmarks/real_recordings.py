@@ -73,8 +73,8 @@ def percent(record: Record, prediction: Prediction) -> tuple[float, float]:
     """Error over the whole record and behind row `SETTLED`, one constant for the record."""
     left = record.displacement - prediction(record)
     left -= left.mean()
-    reach = np.ptp(record.displacement)
-    return tuple(float(100.0 * np.sqrt(np.mean(part**2)) / reach) for part in (left, left[SETTLED:]))
+    span = np.ptp(record.displacement)
+    return tuple(float(100.0 * np.sqrt(np.mean(part**2)) / span) for part in (left, left[SETTLED:]))
 
 
 def free_run(model: Model) -> Prediction:
@@ -115,10 +115,10 @@ def sysidentpy(record: Record) -> Prediction | None:
         from sysidentpy.parameter_estimation import LeastSquares
     except ImportError:
         return None
-    low, reach = record.displacement.min(), np.ptp(record.displacement)
+    low, span = record.displacement.min(), np.ptp(record.displacement)
 
     def columns(other: Record) -> tuple[np.ndarray, np.ndarray]:
-        return other.voltage[:, None] / 3.6, ((other.displacement - low) / reach)[:, None]
+        return other.voltage[:, None] / 3.6, ((other.displacement - low) / span)[:, None]
 
     def train(part: Record, degree: int, lags: int) -> Prediction:
         network = FROLS(
@@ -138,7 +138,7 @@ def sysidentpy(record: Record) -> Prediction | None:
             # the recording begins with 0 V: its settled samples are the initial condition
             rest = np.full((lags, 1), start[0, 0])
             y = network.predict(X=np.vstack((np.full((lags, 1), other.settled_voltage), drive)), y=rest)
-            return low + reach * y[lags:, 0]
+            return low + span * y[lags:, 0]
 
         return predict
 

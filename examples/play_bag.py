@@ -33,8 +33,10 @@ from rosgraph_msgs.msg import Clock
 
 from piezo_hysteresis.recording import Bag
 
-LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # serves late joiners and all others
-DISCOVERY = 3.0  # s, after which topics that nobody listens to are played to nobody
+LATCHED = QoSProfile(
+    depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)  # nodes that subscribe later receive it, too
+DISCOVERY = 3.0  # s; then the bag is played even if some topics have no subscriber
 CLOCK_STEP = 0.001  # s between two messages of /clock
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

@@ -27,7 +27,7 @@ from piezo_hysteresis.nodes.runtime.launch_values import SWITCH, number, paramet
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
 
 SIGTERM_TIMEOUT = "30"
-"""A driver ramps to its safe voltage before it ends; launch shall not kill it meanwhile [s]."""
+"""A driver ramps to its safe voltage before it ends; launch must not kill it before that [s]."""
 
 ARGUMENTS = (
     ("namespace", "", "namespace of the axis, e.g. stage_x", None),
@@ -92,5 +92,5 @@ def nodes(context: LaunchContext) -> list[Node]:
 
 
 def page_node(file: Path) -> Node:
-    """The page is one for all axes, and belongs to none."""
+    """One page shows all axes, so it has no namespace."""
     return Node(package="piezo_hysteresis", executable="page_node", parameters=[str(file)], output="screen")

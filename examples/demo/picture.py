@@ -56,16 +56,16 @@ def save(path: Path, parts: Mapping[str, NDArray], sample_period: float, traces:
         drive.plot(sample_period * np.arange(voltage.size)[every], voltage[every], color=BLACK, linewidth=0.8)
         drive.set(ylabel="u [V]", ylim=(-0.5, 1.45 * voltage.max()), title="drive, the same for every model")
         _segments(axes[:, 0], parts, sample_period, 1.25 * float(voltage.max()))
-        reach = 1.05e9 * max(float(np.abs(trace.residual).max()) for trace in traces.values())
+        span = 1.05e9 * max(float(np.abs(trace.residual).max()) for trace in traces.values())
         for ax, (label, trace) in zip(residuals, traces.items(), strict=True):
             ax.plot(trace.time[every], trace.residual[every] * 1e9, color=BLACK, linewidth=0.5)
-            ax.set(ylabel="residual [nm]", ylim=(-reach, reach), title=f"{label}: {trace.rms * 1e9:.0f} nm rms")
+            ax.set(ylabel="residual [nm]", ylim=(-span, span), title=f"{label}: {trace.rms * 1e9:.0f} nm rms")
         zoom.plot(last.time[every], last.residual[every] * 1e9, color=BLACK, linewidth=0.5)
         for sign in (-2e9, 2e9):
             zoom.axhline(sign * floor, **FLOOR)
         limit = 1.05e9 * float(np.abs(last.residual).max())
         title = (
-            f"{name}, enlarged {reach / limit:.0f} times; lines: ± 2 × noise of the sensor ({1e9 * floor:.0f} nm rms)"
+            f"{name}, enlarged {span / limit:.0f} times; lines: ± 2 × noise of the sensor ({1e9 * floor:.0f} nm rms)"
         )
         zoom.set(ylabel="residual [nm]", ylim=(-limit, limit), title=title)
         zoom.set_xlabel("time [s]; residual = measured − predicted: positive where the stage is further than predicted")

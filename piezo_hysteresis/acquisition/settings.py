@@ -166,5 +166,5 @@ class DriverSettings:
 
     def longest_ramp(self, limits: Description) -> float:
         """Duration of the longest ramp to the safe voltage [s]."""
-        reach = max(limits.voltage_max - limits.safe_voltage, limits.safe_voltage - limits.voltage_min)
-        return math.ceil(reach / self.ramp_rate / self.real_time_factor)
+        longest_way = max(limits.voltage_max - limits.safe_voltage, limits.safe_voltage - limits.voltage_min)
+        return math.ceil(longest_way / self.ramp_rate / self.real_time_factor)

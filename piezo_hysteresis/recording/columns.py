@@ -101,7 +101,7 @@ def experiment_from(columns: TableColumns, options: ReadOptions) -> Experiment:
 
 
 def _marks(words: dict[str, NDArray[Any]]) -> list[tuple[int, dict[str, str]]]:
-    """First row and labels of every stretch of rows with the same labels."""
+    """First row and labels of every run of rows with the same labels."""
     if not words:
         return []
     size = next(iter(words.values())).size

@@ -45,10 +45,10 @@ def recalibrations(numbers: Sequence[RecalibratedNumber]) -> Drawing:
         at = [k for k, n in enumerate(numbers) if n.parameter == name]
         rows = [numbers[k] for k in at]
         new = np.array([n.new for n in rows])
-        reach = np.abs(np.array([[n.new - n.low, n.high - n.new] for n in rows]).T)
+        interval = np.abs(np.array([[n.new - n.low, n.high - n.new] for n in rows]).T)
         steps = np.array([rows[0].old, *new])
         axis.step(times[[at[0], *at]], steps, where="post", **RESIDUAL)
-        axis.errorbar(times[at], new, reach, fmt="o", markersize=3, capsize=2, color=str(MEASURED["color"]))
+        axis.errorbar(times[at], new, interval, fmt="o", markersize=3, capsize=2, color=str(MEASURED["color"]))
         axis.set_ylabel(name if rows[0].unit in ("", "1") else f"{name} [{rows[0].unit}]")
     for label, marker in (("before", "s"), ("after", "o"), ("baseline", "_")):
         values = [1e9 * getattr(n, f"residual_{label}") for n in numbers]

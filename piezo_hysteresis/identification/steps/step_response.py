@@ -167,7 +167,7 @@ def _averaged(
         line, uncertain = base.at(ahead.astype(np.float64))
         weighted += edge.height * (record.displacement[edge.start + every * ahead] - line)
         weight += edge.height**2
-        off, spread = _foretold(base.samples)
+        off, spread = _extrapolation_error(base.samples)
         missed, expected = missed + edge.height * off, expected + edge.height**2 * spread
         variance += edge.height**2 * (1.0 + uncertain)
     noise = max(squares / freedom, resolution**2 / 12.0)
@@ -178,7 +178,7 @@ def _averaged(
     return StepResponse(period, weighted / weight, deviation, len(edges), freedom), ringing
 
 
-def _foretold(base: Samples) -> tuple[float, float]:
+def _extrapolation_error(base: Samples) -> tuple[float, float]:
     """Difference between the mean of the last quarter of a base line and a line through the first three quarters.
 
     Returns

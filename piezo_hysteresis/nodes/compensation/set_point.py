@@ -39,7 +39,7 @@ def volts_per_metre(model: Model, limits: Limits) -> float:
 class SetPoint:
     """Voltage for a displacement that is held.
 
-    The integral is slow, because a fast feedback loop belongs into the controller of the stage. It stops where the
+    The integral is slow, because a fast feedback loop belongs in the controller of the stage. It stops where the
     voltage is at a limit.
 
     Parameters

@@ -55,7 +55,7 @@ class DriverCommands:
         Counts the refusals.
     latch : StopLatch
         Latch of the driver.
-    tell_latch : callable
+    publish_latch : callable
         Called in the thread of the stop when the driver is stopped or released.
     """
 

@@ -36,7 +36,7 @@ from ..runtime.job_process import Exchange, JobProcess, Report
 PATIENCE = 20.0
 """Longest wait until the recorded samples are in the file [s]."""
 _INTERVAL = 0.3
-"""Time between two looks at the file [s]."""
+"""Time between two checks of the file [s]."""
 
 
 @dataclass(frozen=True, slots=True)

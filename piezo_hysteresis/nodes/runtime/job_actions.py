@@ -46,7 +46,7 @@ SUFFIX = "_actions"
 """Suffix that makes the name of the action node from the name of the node."""
 
 _EARLY = 0.01
-"""Time between two looks whether the main node spins [s]."""
+"""Time between two checks whether the main node spins [s]."""
 
 
 class JobActions:

@@ -127,14 +127,14 @@ def lag_notices(records: Sequence[Record]) -> list[Notice]:
         if lag is None:
             continue
         samples = f"{abs(lag.time):.3g} s ({abs(lag.time) / record.sample_period:.2g} samples)"
-        doubt = _SURE * lag.error
-        least = max(doubt, 2.0 * _BENT * lag.swing)
+        uncertainty = _SURE * lag.error
+        least = max(uncertainty, 2.0 * _BENT * lag.swing)
         peers = [o for o in lags if o is not None and _SLOWER * lag.time < o.swing <= _ALIKE * lag.swing]
         shared = min((max(o.time, 0.0) + _SURE * o.error for o in peers), default=lag.time)
         if lag.time < -max(least, 0.5 * record.sample_period) and lag.swing > _SLOW:
             text = f"the displacement leads the voltage by {samples}; one channel is shifted, or both are swapped"
             notices.append(Notice("leads", text, record.phase, severe=True))
-        elif lag.time > max(LATE, least) and lag.time - doubt < _SHARED * shared:
+        elif lag.time > max(LATE, least) and lag.time - uncertainty < _SHARED * shared:
             cause = "check for a slow sensor filter, a delayed channel or a wrong time base"
             text = f"the displacement lags the voltage by {samples}; {cause}"
             notices.append(Notice("late", text, record.phase))

@@ -66,8 +66,8 @@ def whiteness(comparison: ModelComparison) -> Drawing | None:
         axis.legend(loc="upper right")
     if not found.decides:
         axes[1].set_title(f"{title}, {record.phase}: undecided")
-    reach = 1.1 * float(np.max(np.abs(found.cross), initial=found.cross_bound))
-    axes[1].set_ylim(-reach, reach)
+    limit = 1.1 * float(np.max(np.abs(found.cross), initial=found.cross_bound))
+    axes[1].set_ylim(-limit, limit)
     axes[0].set_ylabel("correlation")
     white = "white" if found.is_white else "not white"
     free = "depends on the drive" if not found.is_independent else "does not depend on the drive"
