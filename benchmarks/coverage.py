@@ -60,7 +60,8 @@ def truth_of(plant: Plant, model: Model) -> dict[str, float]:
         Gives the scales of voltage and displacement.
     """
     shrink = plant.volt / model.voltage_scale
-    unit = plant.stroke / ((plant.p1 + plant.p2) * model.displacement_scale * model["arx"].dc_gain)  # type: ignore[attr-defined]
+    gain = model["arx"].dc_gain  # type: ignore[attr-defined]
+    unit = plant.stroke / ((plant.p1 + plant.p2) * model.displacement_scale * gain)
     found: dict[str, float] = {}
     for name, value in plant.hidden.items():
         match name, value:

@@ -112,7 +112,8 @@ class Parameter:
         name = prefix + self.name
         if self.is_array:
             try:
-                return tuple(self._scalar(v, f"{name}[{i}]") for i, v in enumerate(value))  # type: ignore[arg-type, var-annotated]
+                numbers: enumerate[object] = enumerate(value)  # type: ignore[arg-type]
+                return tuple(self._scalar(v, f"{name}[{i}]") for i, v in numbers)
             except TypeError:
                 raise ParameterError(f"{name}: got {value!r}, expected a sequence of numbers [{self.unit}]") from None
         return self._scalar(value, name)

@@ -154,7 +154,8 @@ def _nearest(
         rise = 0.5 - 0.5 * np.cos(np.pi * np.arange(lead) / lead)
         return np.concatenate((at_start + (path[0] - at_start) * rise, path))
 
-    shifts = [_smallest(lambda c, s=s: is_whole(led(y + s * c)), span or model.displacement_scale) for s in (1, -1)]  # type: ignore[misc]
+    most = span or model.displacement_scale
+    shifts = [_smallest(lambda c, s=s: is_whole(led(y + s * c)), most) for s in (1, -1)]  # type: ignore[misc]
     offsets = [s * c for s, c in zip((1.0, -1.0), shifts, strict=True) if c is not None]
     shrink = _smallest(lambda c: is_whole(led(middle + (1.0 - c) * (y - middle))), 1.0)
     usual = Band.of(model.sample_period)

@@ -176,6 +176,8 @@ def test_its_block_defines_its_inverse():
 
 def test_an_operator_without_inverse_is_refused_by_name():
     class Silent(OwnPlays):
+        """Names no form of its inverse."""
+
         def block(self, setting, terms=()):
             block = super().block(setting, terms)
             block.inverse_terms = lambda: None

@@ -36,6 +36,8 @@ class Frame:
     """What the columns of a DataFrame and of a Dataset have in common: names, and columns that become arrays."""
 
     class Series:
+        """One column."""
+
         def __init__(self, values: np.ndarray) -> None:
             self.values = values
 

@@ -48,7 +48,8 @@ def drive_class(score: ChangeScore) -> DriveClass:
     """Class of the drive of a block: its span and its speed, in powers of `CLASS_RATIO`; (0, 0) for a held voltage."""
     if score.span == 0.0 or score.speed == 0.0:
         return 0, 0
-    return tuple(1000 + round(math.log(x, CLASS_RATIO)) for x in (score.span, score.speed))  # type: ignore[return-value]
+    span, speed = (1000 + round(math.log(x, CLASS_RATIO)) for x in (score.span, score.speed))
+    return span, speed
 
 
 @dataclass(frozen=True, eq=False, slots=True)

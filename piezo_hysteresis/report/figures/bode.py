@@ -179,6 +179,7 @@ def _linear_part(model: Model | None, gain_axis: object, phase_axis: object, dat
     value = slope * g.response(f, model.sample_period)
     angle = np.degrees(np.unwrap(np.angle(value)))
     style = {"color": GREEN, "linestyle": (0, (1, 1.4)), "linewidth": 1.6}
-    gain_axis.plot(f, 1e6 * np.abs(value), label="G alone × slope of the loop at a turning point", **style)  # type: ignore[attr-defined]
+    label = "G alone × slope of the loop at a turning point"
+    gain_axis.plot(f, 1e6 * np.abs(value), label=label, **style)  # type: ignore[attr-defined]
     phase_axis.plot(f, angle, **style)  # type: ignore[attr-defined]
     data |= {"G_frequency_Hz": f, "G_gain_m_per_V": np.abs(value), "G_phase_deg": angle}

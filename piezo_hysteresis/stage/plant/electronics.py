@@ -33,8 +33,8 @@ Samples = NDArray[np.float64]
 class Electronics(Group):
     """Digital-to-analogue converter with hold, dead time, and the high-voltage amplifier.
 
-    The amplifier is a first-order lag whose slope is limited: τ v̇ = clip(u − v, ±S τ), then saturates. Both have closed
-    solutions while the converter holds.
+    The amplifier is a first-order lag whose slope is limited: τ v̇ = clip(u − v, ±S τ), then saturates. Both have
+    closed solutions while the converter holds.
     """
 
     dac_range: float = quantity(10.0, "V", 1e-3, 1e3, "the converter spans ± this drive voltage")
