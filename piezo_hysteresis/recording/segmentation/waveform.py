@@ -40,6 +40,8 @@ _PERIODIC = 0.9
 """Autocorrelation from which a drive repeats itself."""
 _STILL = 0.01
 """Largest median step of a drive that consists of levels, as a share of its range."""
+_UNCERTAIN = 0.05
+"""Uncertainty of the frequency of a sine, in cycles over its whole duration; in 95 % of the cases it is smaller."""
 
 
 def phase_name(voltage: Samples, sample_period: float) -> str:
@@ -97,17 +99,20 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     body = voltage[turns[0] if turns.size <= 3 else turns[1] :]
     cosines = np.count_nonzero(shapes == COSINE) >= max(_FEWEST, _MAJORITY * shapes.size)
     if regular and (cosines or _is_sine(body, period)):
-        return sine_name(_frequency(body, 1 / period) / sample_period)
+        duration = body.size * sample_period
+        return sine_name(_frequency(body, 1 / period) / sample_period, _UNCERTAIN / duration)
     return "multisine" if _repeats(wave) else "noise"
 
 
-def sine_name(frequency: float) -> str:
-    """Phase name of a sine, its frequency [Hz] to three digits.
+def sine_name(frequency: float, uncertainty: float) -> str:
+    """Phase name of a sine: its frequency [Hz] with the fewest digits within the uncertainty [Hz], at most three.
 
-    >>> sine_name(0.99996), sine_name(12345.0)
-    ('sine_1hz', 'sine_12300hz')
+    >>> sine_name(9.99, 0.02), sine_name(9.99, 0.002), sine_name(12345.0, 1.0)
+    ('sine_10hz', 'sine_9.99hz', 'sine_12300hz')
     """
-    return f"sine_{np.format_float_positional(float(f'{frequency:.3g}'), trim='-')}hz"
+    rounded = [float(f"{frequency:.{digits}g}") for digits in (1, 2, 3)]
+    named = next((f for f in rounded if abs(f - frequency) <= uncertainty), rounded[-1])
+    return f"sine_{np.format_float_positional(named, trim='-')}hz"
 
 
 def _transition(voltage: Samples) -> str:

@@ -165,5 +165,22 @@ def test_a_sine_of_few_samples_per_period_has_no_levels(samples, faded):
     assert float(name.removeprefix("sine_").removesuffix("hz")) == pytest.approx(1 / samples / PERIOD, rel=0.005)
 
 
+@pytest.mark.parametrize("cycles", [2.5, 3, 5, 10.3])
+@pytest.mark.parametrize(("grows", "noise"), [(False, 0.0), (True, 0.0), (False, 0.005)])
+def test_a_sine_is_named_with_the_digits_that_its_duration_shows(cycles, grows, noise):
+    """10 Hz was named 9.99, 10.1 or 9.92 Hz for a tenth of these drives."""
+    for frequency in (1.0, 10.0, 50.0):
+        t = PERIOD / 10 * np.arange(int(10 * cycles / frequency / PERIOD))
+        size = np.linspace(0.2, 1.0, t.size) if grows else 1.0
+        drive = 5.0 + size * np.sin(2.0 * np.pi * frequency * t + 0.5)
+        drive += noise * np.random.default_rng(0).normal(size=t.size)
+        assert phase_name(drive, PERIOD / 10) == f"sine_{frequency:g}hz"
+
+
+def test_a_long_sine_keeps_three_digits():
+    t = PERIOD * np.arange(round(20.0 / PERIOD))
+    assert phase_name(np.sin(2.0 * np.pi * 9.93 * t), PERIOD) == "sine_9.93hz"
+
+
 def test_the_name_of_a_fast_sine_is_a_plain_number():
     assert phase_name(np.sin(2 * np.pi * 1.25e4 * np.arange(4000) * 2e-6), 2e-6) == "sine_12500hz"
