@@ -202,3 +202,21 @@ def test_an_unknown_file_ending_is_refused(tmp_path):
     assert done.returncode == 2
     assert "got a file ending '.xlsx'" in done.stderr
     assert "choose one by --format, or export the data as text" in done.stderr
+
+
+@pytest.mark.parametrize("key", ["units", "Unit"])
+@pytest.mark.parametrize("form", [str, np.bytes_, lambda text: np.array([text], dtype=object)])
+def test_the_unit_beside_an_hdf5_array_counts_as_that_in_a_title(tmp_path, key, form):
+    time = 1e-3 * np.arange(2000)
+    drive = 5.0 + np.sin(2.0 * np.pi * 5.0 * time)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        group = file.create_group("run")
+        group["note"] = "a text that is not a signal"
+        group["time"] = time
+        for name, values, unit in (("drive", drive, "V"), ("stage", 3.0 * drive, "um")):
+            group[name] = values
+            group[name].attrs[key] = form(unit)
+    (record,) = read(tmp_path / "a.h5")
+    np.testing.assert_allclose(record.displacement, 3e-6 * drive)
+    (named,) = read(tmp_path / "a.h5", columns={"voltage": "run.drive", "displacement": "run.stage"})
+    np.testing.assert_array_equal(named.displacement, record.displacement)

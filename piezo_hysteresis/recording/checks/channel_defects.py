@@ -43,6 +43,8 @@ _SEVERE_SHARE = 0.05
 """Share of samples from which a defect spoils a phase."""
 _ALONE = 0.5
 """Largest movement of the displacement just before and after a drop-out, as a share of its jump."""
+_BESIDE = 3
+"""Number of samples before and after a drop-out in which the displacement moves little."""
 _ROUGH_SHARE, _FEW = 0.001, 3
 """Share and number of samples up to which drop-outs do not spoil a phase."""
 
@@ -144,8 +146,8 @@ def _dropouts(record: Record) -> list[Notice]:
         back = abs(y[b + 1] - y[a]) < 0.25 * abs(steps[a])
         around = u[max(0, a - 20) : b + 20]
         # a stage that rings after a step moves as fast before and after
-        beside = max(abs(steps[max(a - 1, 0)]) if a else 0.0, abs(steps[b + 1]) if b + 1 < steps.size else 0.0)
-        alone = beside < _ALONE * abs(steps[a])
+        beside = np.concatenate((steps[max(0, a - _BESIDE) : a], steps[b + 1 : b + 1 + _BESIDE]))
+        alone = float(np.abs(beside).max(initial=0.0)) < _ALONE * abs(steps[a])
         if back and alone and steps[a] * steps[b] < 0 and b - a <= longest and np.ptp(around) < 0.25 * np.ptp(u):
             count, samples, k = count + 1, samples + b - a, k + 2
         else:

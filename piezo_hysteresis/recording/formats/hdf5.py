@@ -33,6 +33,9 @@ from .named_arrays import NamedArrays
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of a file."""
 
+_UNITS = ("units", "Units", "unit", "Unit")
+"""Attributes of an array that may state its unit."""
+
 _LARGEST_EXPANSION = 1100
 """Largest number of bytes that one compressed byte can contain."""
 
@@ -84,6 +87,21 @@ class Hdf5Arrays(NamedArrays):
 
     def __iter__(self) -> Iterator[str]:
         return (name.replace("/", ".") for name in self._names if not name.startswith("#"))
+
+    def title(self, name: str) -> str:
+        """Name of an array, with its unit in parentheses where an attribute states one."""
+        attributes = self._file[name.replace(".", "/")].attrs
+        for key in _UNITS:
+            if key not in attributes:
+                continue
+            try:
+                unit = np.ravel(attributes[key])[:1]
+            except (OSError, TypeError, ValueError):
+                continue  # of a type that h5py cannot read
+            text = "".join(u.decode("utf-8", "replace") if isinstance(u, bytes) else str(u) for u in unit.tolist())
+            if text.strip("[]() "):
+                return f"{name} ({text.strip('[]() ')})"
+        return name
 
     def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         dataset = self._numbers(name)

@@ -47,6 +47,10 @@ class NamedArrays(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
+    def title(self, name: str) -> str:
+        """Name of an array, with its unit in parentheses where the file states one beside the name."""
+        return name
+
     @abstractmethod
     def close(self) -> None:
         """Close the file, and release what was read from it."""

@@ -66,12 +66,13 @@ def records_from_arrays(
     timed = options.sample_period is not None or "sample_period" in labels
     names = [name for name in arrays if name not in places.values()]
     wanted = [c for c in ("time", "voltage", "displacement") if c not in places and not (c == "time" and timed)]
-    inferred = {c: names[at] for c, at in inferred_columns([n.rpartition(".")[2] for n in names], (), wanted).items()}
-    places |= inferred
+    titles = [arrays.title(name) for name in names]
+    found_at = inferred_columns([title.rpartition(".")[2] for title in titles], (), wanted)
+    places |= {c: names[at] for c, at in found_at.items()}
     for channel in ("voltage", "displacement"):
         if channel not in places:
             raise RecordingError(f"got {_listed(arrays)}, expected {given[channel]}; name it by `columns`")
-    units = {c: unit_in(place, c) for c, place in places.items() if is_channel(c)}
+    units = {c: unit_in(arrays.title(p) if p in arrays else p, c) for c, p in places.items() if is_channel(c)}
     buffers = {c: _channel(arrays, places[c], options) for c in units}
     columns = {c: options.in_si(c, buffer.column(0), units[c]) for c, buffer in buffers.items()}
     needed = {*CHANNELS, *options.columns}
@@ -84,7 +85,7 @@ def records_from_arrays(
     records, notices = table_records(columns, [(0, labels)], rest, before, truncated=options.passes_over)
     if options.average is None and average > 1:
         notices.append(averaged_notice(average, records[0].sample_period, labels.get("phase", "")))
-    return records, [*notices, *inference_notice(inferred, units)]
+    return records, [*notices, *inference_notice({c: titles[at] for c, at in found_at.items()}, units)]
 
 
 def _channel(arrays: NamedArrays, place: str, options: ReadOptions) -> DecimatingBuffer:

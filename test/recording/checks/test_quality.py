@@ -187,6 +187,10 @@ def test_a_ring_down_contains_no_drop_outs():
     time = 1e-4 * np.arange(4000)
     y = 1e-5 * (1.0 - np.exp(-100.0 * time) * np.cos(2.0 * np.pi * 1000.0 * time))
     assert "dropout" not in kinds(Record(5.0 + time, y, 1e-4, "x", initial_voltage=0.0))
+    time = 1e-4 * np.arange(20000)
+    for cycles in (0.3, 0.35, 0.4, 0.45):  # per sample: a step may be small between two large ones
+        y = 1e-5 * (1.0 - np.exp(-500.0 * time) * np.cos(2.0 * np.pi * cycles * np.arange(time.size)))
+        assert "dropout" not in kinds(Record(5.0 + time, y, 1e-4, "x", initial_voltage=0.0)), cycles
 
 
 @pytest.mark.parametrize("length", [1, 7, 40])
