@@ -27,6 +27,7 @@ from ...identification.range_watch import RangeWatch
 from ...model.model import Model
 from ...model.model_parameters import model_hash
 from ...online.predictor import Predictor
+from ...record import Notice
 from ..messages.conversions import diagnostic
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
@@ -64,6 +65,7 @@ class ModelDiagnostics:
         self._model: Model | None = None
         self._predictor: Predictor | None = None
         self._range: RangeWatch | None = None
+        self._outside: set[str] = set()
         self._free_run_error: float | None = None
         self._latency = 0.0
         self._seen = (time.monotonic(), 0, 0, 0)
@@ -171,7 +173,16 @@ class ModelDiagnostics:
                 DiagnosticStatus.WARN,
                 "the model is warming up, because the earlier drive voltage is unknown",
             )
-        for notice in self._range.findings() if self._range else ():
+        for notice in self._outside_range():
             yield DiagnosticStatus.WARN, notice.message
         if (finding := self._alarm.finding(predictor.residual_rms, self._free_run_error)) is not None:
             yield finding
+
+    def _outside_range(self) -> tuple[Notice, ...]:
+        """Notices about a drive outside the identified range; each kind is logged when it begins."""
+        found = self._range.findings() if self._range else ()
+        for notice in found:
+            if notice.kind not in self._outside:
+                self._node.get_logger().warning(notice.message)
+        self._outside = {notice.kind for notice in found}
+        return found

@@ -152,13 +152,17 @@ def test_a_drive_outside_the_identified_range_gives_a_warning(lab, tmp_path):
     seen = {"voltage_min": "0.0", "voltage_max": "4.0", "slew_rate_max": "1000.0"}
     known = replace(MODEL, provenance={**PROVENANCE, **seen, "frequency_min": "1.0", "frequency_max": "5.0"})
     bench = Bench(lab, model_file=str(save(known, tmp_path / "model.yaml")))
-    blocks = stream(330)
+    blocks = stream(340)
     bench.send(blocks[:5])
     bench.predicted(5)
     assert not bench._reported("the model was identified")
-    bench.send(blocks[5:])
+    bench.send(blocks[5:330])
     bench.report("the drive goes from 0 to 6 V, the model was identified from 0 to 4 V")
     bench.report("the drive reaches 20 Hz, the model was identified up to 5 Hz")
+    first = len(bench._reported("identified from 0 to 4 V"))
+    bench.send(blocks[330:])
+    lab.wait(lambda: len(bench._reported("identified from 0 to 4 V")) > first, "a second warning")
+    assert lab.processes[0].output.count("the model was identified from 0 to 4 V") == 1
 
 
 def test_a_model_on_the_topic_takes_over_between_two_blocks(lab, tmp_path):
