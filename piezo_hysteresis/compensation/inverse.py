@@ -108,20 +108,20 @@ class Inverse:
             )
         self.model, self.limits, self.left_out = model, limits or Limits(), tuple(impossible)
         self.sample_period = model.sample_period
+        self.chain: Chain = model.at(model.sample_period)
         kept = Model(
             tuple(e for e in model.effects if e.invertibility is not Invertibility.IMPOSSIBLE),
             model.sample_period,
             model.voltage_scale,
             model.displacement_scale,
-        )
-        self.chain: Chain = kept.at(model.sample_period)
+        ).at(model.sample_period)
         self.not_on_path = tuple(e.name for e in model.effects if e.invertibility is Invertibility.NOT_NEEDED)
-        blocks, labels = self.chain.blocks, self.chain.labels
-        terms = _terms_of_nonlinear_part(blocks, labels)
-        self._nonlinear_end = len(terms)
+        terms = _terms_of_nonlinear_part(kept.blocks, kept.labels)
         self._nonlinear = NonlinearPart(terms, self.limits, self.sample_period)
-        after = list(zip(labels, blocks, strict=True))[self._nonlinear_end :]
-        own = [(self._nonlinear_end + k, _inverted(b, label)) for k, (label, b) in enumerate(after)]
+        numbers = [self.chain.labels.index(label) for label in kept.labels]  # the states are those of the whole model
+        numbered = list(zip(numbers, kept.blocks, strict=True))
+        self._before, after = numbered[: len(terms)], numbered[len(terms) :]
+        own = [(k, _inverted(b, self.chain.labels[k])) for k, b in after]
         inverted: list[tuple[int | None, InvertedBlock]] = [(k, stage) for k, stage in own[::-1] if stage is not None]
         if band is not None:
             inverted.insert(0, (None, band.stage(self.sample_period)))
@@ -143,16 +143,15 @@ class Inverse:
 
     def resume(self, state: ChainState) -> InverseState:
         """State of the inverse for a stage whose model is in `state`, with settled dynamics."""
-        end = self._nonlinear_end
         started = tuple(
             stage.start(state.inputs[-1] if k is None else state.inputs[k], None if k is None else state.blocks[k])
             for k, stage in self._stages
         )
         if self._stages and self._stages[0][0] is None:
-            last = len(self.chain.blocks) - 1
-            reading = self.chain.blocks[last].static(state.inputs[last])
+            reading = self.chain.blocks[-1].static(state.inputs[-1])
             started = (self._stages[0][1].start(reading, None), *started[1:])
-        nonlinear = self._nonlinear.start(self.chain.blocks[:end], state.inputs[:end], state.blocks[:end])
+        before = [(block, state.inputs[k], state.blocks[k]) for k, block in self._before]
+        nonlinear = self._nonlinear.start(*zip(*before, strict=True))
         return InverseState(started, nonlinear, state.time, 0)
 
     def run(self, wanted: ArrayLike, state: InverseState) -> tuple[Array, InverseState]:

@@ -38,6 +38,7 @@ from piezo_hysteresis.effects import (
     Offset,
     PublishedBoucWen,
     RateDependentHysteresis,
+    SensorBandwidth,
 )
 from piezo_hysteresis.errors import DivergenceError, ModelError, ParameterError
 from piezo_hysteresis.model.model import Model
@@ -180,6 +181,20 @@ def test_impossible_is_refused_by_name_or_left_out(kind: type[Effect]) -> None:
     inverse = Inverse(model, approximate=True)
     assert inverse.left_out == (kind.name,) and not inverse.is_exact
     assert Inverse(model_with(typical(kind).off())).left_out == (), "off, it is not missed"
+
+
+@pytest.mark.parametrize("kind", kinds(Invertibility.IMPOSSIBLE), ids=lambda kind: kind.name)
+def test_the_effects_after_one_that_is_left_out_start_from_their_own_states(kind: type[Effect]) -> None:
+    drives = []
+    for after in ((), (Offset(y0=1e-7, settling=0.1), SensorBandwidth(tau=1e-4))):
+        model = model_with(typical(kind), *after)
+        if not after:
+            model = model.without(Offset.name)
+        inverse, start = Inverse(model, approximate=True), model.rest(3.0)
+        reading = np.full(100, model.run([3.0], start)[0][0])
+        drives.append(inverse.run(reading, inverse.resume(start))[0])
+        np.testing.assert_array_equal(inverse.run(reading, inverse.rest(3.0))[0], drives[-1])
+    np.testing.assert_allclose(drives[1], drives[0], rtol=1e-9)
 
 
 @every_effect
