@@ -175,23 +175,11 @@ def _effects(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
                 yield Case("effects", (name,), seed, noise, plant)
 
 
-PAIRS = (
-    ("creep", "thermal_drift"),
-    ("creep", "amplifier_slew_limit"),
-    ("creep", "hysteresis_exponent"),
-    ("creep", "mains_hum"),
-    ("asymmetric_hysteresis", "extra_resonance"),
-    ("backlash", "gain_drift"),
-    ("rate_dependent_hysteresis", "creep"),
-    ("softening", "axis_coupling"),
-    ("initial_state", "thermal_drift"),
-    ("extra_resonance", "mains_hum"),
-)
-
-
 def _pairs(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
+    """Pairs of a random order of the catalogue: every effect occurs once per seed."""
     for seed in range(seeds):
-        for k, pair in enumerate(PAIRS):
+        order = np.random.default_rng(seed).permutation(EFFECTS).tolist()
+        for k, pair in enumerate(zip(order[::2], order[1::2], strict=False)):
             yield Case("pairs", pair, seed, noises[(k + seed) % len(noises)])
 
 

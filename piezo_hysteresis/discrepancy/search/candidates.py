@@ -126,10 +126,10 @@ def _products(model: Model, training_data: TrainingData) -> tuple[list[Gram], Ar
     names = free_numbers(model, training_data)
     products = grams(model, training_data.records, names, training_data.nuisance)
     columns = directions(model, names)
-    return products, training_data.floors, columns, _room(model, names, columns)
+    return products, training_data.floors, columns, room_of(model, names, columns)
 
 
-def _room(model: Model, names: Sequence[str], columns: Array) -> tuple[Array, Array]:
+def room_of(model: Model, names: Sequence[str], columns: Array) -> tuple[Array, Array]:
     """Smallest and largest step along every column before a parameter leaves its bounds."""
     values = model.values()
     theta = np.array([values[n] for n in names])
@@ -190,7 +190,7 @@ def _screen_off(model: Model, training_data: TrainingData, base: list[str], memb
     for effect in members:
         wanted = [kept + names.index(n) - len(base) for n in own[effect.name]]
         part = columns[:, [*range(kept), *wanted]]
-        limits = _room(extended, names, part)
+        limits = room_of(extended, names, part)
         score = cross_validate(products, training_data.floors, part, training_data.alone, limits)
         found.append(Candidate(effect, training_data, score))
     return found
@@ -215,7 +215,7 @@ def _screen_moves(model: Model, training_data: TrainingData, base: list[str], mo
     found = []
     for k, effect in enumerate(usable):
         part = columns[:, [*range(kept), kept + k]]
-        score = cross_validate(products, training_data.floors, part, training_data.alone, _room(model, base, part))
+        score = cross_validate(products, training_data.floors, part, training_data.alone, room_of(model, base, part))
         if score.step[-1] > 0.0:  # otherwise the effect with opposite sign would improve the prediction
             found.append(Candidate(effect, training_data, score))
     return found

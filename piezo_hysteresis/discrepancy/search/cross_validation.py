@@ -102,23 +102,25 @@ def cross_validate(
         pull it outwards: an amplifier does not lead, even where a negative time constant would improve the prediction.
     """
     counted, products = _counted(grams, floors)
-    if room is not None:
-        columns, held = columns.copy(), True
-        while held:
-            step = _step(products, columns)
-            outwards = ((step < 0.0) & (room[0] >= 0.0)) | ((step > 0.0) & (room[1] <= 0.0))
-            columns[:, outwards] = 0.0
-            held = bool(outwards.any())
     hessians = np.array([columns.T @ p @ columns for p in products])
     slopes = np.array([columns.T @ p[:, -1] for p in products])
     power = np.array([p[-1, -1] for p in products])
     hessian, slope = hessians.sum(axis=0), slopes.sum(axis=0)
+    step = _solve(hessian[None], slope[None], _scale(hessian))[0]
+    while room is not None:
+        outwards = ((step < 0.0) & (room[0] >= 0.0)) | ((step > 0.0) & (room[1] <= 0.0))
+        if not outwards.any():
+            break
+        for sums in (hessians, hessian, slopes, slope):
+            sums[..., outwards] = 0.0
+        hessians[:, outwards], hessian[outwards] = 0.0, 0.0
+        step = _solve(hessian[None], slope[None], _scale(hessian))[0]
     scale = _scale(hessian)
     left = np.array([i not in alone for i in counted], dtype=float) * (len(counted) > 1)
     steps = _solve(hessian - left[:, None, None] * hessians, slope - left[:, None] * slopes, scale)
     changes = np.einsum("rj,rjk,rk->r", steps, hessians, steps) - 2.0 * np.sum(steps * slopes, axis=1)
-    squares = np.clip(np.array(power) + changes, 0.0, FARTHEST * np.maximum(1.0, power))
-    return Score(np.sqrt(squares), _solve(hessian[None], slope[None], scale)[0])
+    squares = np.clip(power + changes, 0.0, FARTHEST * np.maximum(1.0, power))
+    return Score(np.sqrt(squares), step)
 
 
 def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, columns: Array) -> tuple[int, ...]:
@@ -144,13 +146,6 @@ def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, column
     whitened = vectors[:, known] / np.sqrt(values[known]) * scale[:, None]
     shares = [float(np.linalg.eigvalsh(whitened.T @ h @ whitened)[-1]) for h in hessians]
     return tuple(i for i, share in zip(counted, shares, strict=True) if share > SPOILT * grams[i].size * (1.0 - share))
-
-
-def _step(products: Sequence[Array], columns: Array) -> Array:
-    """Linearised change of the parameters from all records."""
-    total = np.sum(products, axis=0)
-    hessian, slope = columns.T @ total @ columns, columns.T @ total[:, -1]
-    return np.asarray(_solve(hessian[None], slope[None], _scale(hessian))[0])
 
 
 def _counted(grams: Sequence[Gram], floors: Sequence[float] | Array) -> tuple[list[int], list[Array]]:

@@ -27,11 +27,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...identification.fit.bounded_step import bounded_step, room
+from ...identification.fit.bounded_step import bounded_step
 from ...identification.fit.normal_equations import grams
 from ...identification.records.excitation_content import excitation_content
 from ...model.model import Model
-from ..search.candidates import directions, free_numbers
+from ..search.candidates import directions, free_numbers, room_of
 from ..search.training_data import TrainingData
 
 Array = NDArray[np.float64]
@@ -111,9 +111,7 @@ def held_out(model: Model, training_data: TrainingData, correction: str = "") ->
     slopes = np.array([columns.T @ p[:-1, -1] for p in scaled])
     power = np.array([p[-1, -1] for p in scaled])
     theta = np.array([model.values()[n] for n in names])
-    ends = [np.array([getattr(model.row(n), end) for n in names]) for end in ("lower", "upper")]
-    low = room(ends[0], theta, columns, -np.inf)
-    high = room(ends[1], theta, columns, np.inf)
+    low, high = room_of(model, names, columns)
     own = np.array([n.startswith(f"{correction}.") for n in names], dtype=bool)
     home = columns.T @ np.where(own, -theta, 0.0)  # the step that removes the correction
     diagonal = np.diag(hessians.sum(axis=0))
