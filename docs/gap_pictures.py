@@ -31,7 +31,8 @@ from matplotlib.figure import Figure
 
 from piezo_hysteresis.discrepancy import Diagnosis, diagnose
 from piezo_hysteresis.discrepancy.next_experiment import separations
-from piezo_hysteresis.discrepancy.residual.noise_floor import ADEQUACY, noise_floors, stroke
+from piezo_hysteresis.discrepancy.residual.noise_floor import noise_floors, stroke
+from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.discrepancy.search.acceptance_tests import share_left
 from piezo_hysteresis.discrepancy.search.candidate_refits import LATER, LEAST_GAIN, refit_candidates
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen

@@ -20,11 +20,11 @@ from dataclasses import replace
 
 from ..errors import DivergenceError
 from ..identification.fit.fit import Fit, Progress
+from ..identification.fit.form_uncertainty import with_form_uncertainty
 from ..identification.fit.normal_equations import Nuisance
 from ..record import Experiment
 from .diagnosis import Diagnosis, Verdict
 from .excitation_check import missing_excitation
-from .form_uncertainty import with_form_uncertainty
 from .gap import Gap, measure_gap, stating
 from .next_experiment import decide
 from .residual.localise import ResidualShare
@@ -87,8 +87,9 @@ def concluded(
     if not named or not falls:
         named, final, final_training_data = False, first, training_data
         gap = gap_of(first, training_data.nuisance)
-    fitted = replace(final_training_data, records=whole)
-    final = with_form_uncertainty(final, fitted, setup.whole_noise, setup.span)
+    final = with_form_uncertainty(
+        final, whole, final_training_data.nuisance, final_training_data.floors, setup.whole_noise, setup.span
+    )
     progress("next experiment", 0.95)
     conclusion, reason = conclusion_of(selection, named, falls, gap)
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time

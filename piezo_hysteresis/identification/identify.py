@@ -32,14 +32,16 @@ from ..model.provenance import provenance
 from ..model.sample_periods import identified_periods
 from ..record import Experiment, Notice
 from .fit.fit import Fit, Progress
+from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
 from .fit.joint import fit_dynamics, fit_lag
-from .fit.normal_equations import residuals
+from .fit.normal_equations import Nuisance, residuals
 from .identification import Identification, phase_errors, undetermined
 from .identified_range import identified_range
 from .one_core import on_one_core
+from .records.conditioning import select
 from .records.conditioning_split import known_from_within
 from .records.excitation_content import sensor_noise
-from .records.leading_step import begins_with_a_jump, steps_apart
+from .records.leading_step import Blocks, begins_with_a_jump, steps_apart
 from .records.roles import HELD_OUT, Roles, roles_of
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.delay import Delay, identify_delay
@@ -51,8 +53,6 @@ from .steps.remaining_lag import lag_notices
 from .steps.three_steps import ThreeSteps, behind_the_gauge, three_steps
 from .structure.structure_choice import StructureChoice, choose_structure
 
-ADEQUATE = 3e-4
-"""Smallest noise floor that is used, as a share of the range."""
 AT_THE_FLOOR = 1.5
 """Mean square of residual over floor below which a fit counts as converged, independent of its last step."""
 FEWEST_SAMPLES = 32
@@ -118,7 +118,8 @@ def identify(
     Notes
     -----
     Every record has the same weight in the joint fit. Its residual is divided by its noise floor: the sensor noise, but
-    at least 0.03 % of the range.
+    at least 0.03 % of the range. The intervals contain the uncertainty of the model's form
+    (`with_form_uncertainty`).
     """
     report = progress or (lambda word, fraction: None)
     experiment, conditioning_notices = known_from_within(experiment)
@@ -136,7 +137,7 @@ def identify(
         raise IdentificationError("identify: the displacement never changes; expected that of a stage that is driven")
     scale_v = voltage_scale or max(float(np.max(np.abs(r.voltage))) for r in records)
     scale_y = displacement_scale or reach
-    floors = [max(c.noise, ADEQUATE * reach) for c in roles.contents]
+    floors = [max(c.noise, ADEQUACY * reach) for c in roles.contents]
     period = experiment.fastest_period
     notices: list[Notice] = [*experiment.notices, *conditioning_notices]
 
@@ -152,6 +153,7 @@ def identify(
     table: tuple[OrderError, ...] = ()
     comparisons: tuple[InputComparison, ...] = ()
     structure: StructureChoice | None = None
+    used: Blocks = records, floors, roles.fitted
     if roles.broadband:
         report("step 2: dynamics", 0.2)
         signals = hysteresis_signals(start, records, roles.broadband)
@@ -183,7 +185,7 @@ def identify(
         comparisons, more_notices = compare_inputs(joint.model, records, noise, samples, chosen)
         notices += more_notices
     elif memory and start.hysteresis.memoryless() is not None:
-        quiet = [max(noise, ADEQUATE * reach) for noise in sensor_noise(records)]
+        quiet = [max(noise, ADEQUACY * reach) for noise in sensor_noise(records)]
         choice = choose_structure(
             start, records, quiet, roles.fitted, lambda word, part: report(word, 0.2 + 0.7 * part)
         )
@@ -191,11 +193,15 @@ def identify(
         notices += choice.notices
     else:
         report("joint fit", 0.3)
-        joint = fit_lag(start, *steps_apart(records, floors, roles.fitted))
+        used = steps_apart(records, floors, roles.fitted)
+        joint = fit_lag(start, *used)
     if memory and roles.broadband:
         report("memory of the hysteresis", 0.9)
         joint, more_notices = choose_memory(joint, records, floors, roles.fitted, roles.loops)
         notices += more_notices
+    if structure is None:
+        kept, sizes = select(*used)
+        joint = with_form_uncertainty(joint, kept, Nuisance(offset=True), sizes, sizes, reach)
     if not roles.broadband:
         notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted], rivals_counted=structure is not None)
     report("free run", 0.95)

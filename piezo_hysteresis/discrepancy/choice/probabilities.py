@@ -27,7 +27,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..diagnosis import Diagnosis, Verdict
-from ..form_uncertainty import PIECES
+from ...identification.fit.form_uncertainty import PIECES
 from ..search.cross_validation import ADEQUATE, Score
 from ..search.selection_result import Step
 from ..verdict import FAR, NAMED, NAMED_FAR

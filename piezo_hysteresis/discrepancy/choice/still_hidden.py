@@ -32,7 +32,7 @@ from ...identification.fit.normal_equations import grams
 from ...identification.protocol.protocol import ProtocolPhase
 from ...model.model import Model
 from ...record import Record
-from ..form_uncertainty import PIECES
+from ...identification.fit.form_uncertainty import PIECES
 from ..search.candidates import directions, free_numbers
 from ..search.cross_validation import ADEQUATE
 from ..search.refit import FAILURES

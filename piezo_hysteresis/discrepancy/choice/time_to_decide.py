@@ -24,7 +24,7 @@ import numpy as np
 
 from ...identification.protocol.protocol import ProtocolPhase
 from ...record import Record
-from ..form_uncertainty import PIECES
+from ...identification.fit.form_uncertainty import PIECES
 from ..next_experiment import distances
 from ..search.candidates import FittedCandidate
 from .probabilities import ONE_RECORD

@@ -28,13 +28,12 @@ import scipy
 from numpy.typing import NDArray
 
 from ...channel_mapping import quantity_of
+from ...identification.fit.form_uncertainty import ADEQUACY
 from ...identification.records.excitation_content import noise_on_motion
 from ...record import Record
 
 Array = NDArray[np.float64]
 
-ADEQUACY = 3e-4
-"""Adequacy floor: error that counts as perfect, as a share of the range of the experiment."""
 MAINS = (50.0, 60.0)
 """Mains frequencies [Hz]."""
 ALIKE, UNLIKE = 1e-6, 0.1

@@ -28,7 +28,7 @@ from .normal_equations import Gram, Nuisance, residuals
 Array = NDArray[np.float64]
 
 UNKNOWN = 1e-10
-"""Relative size below which a direction of the parameters counts as undetermined and adds no variance."""
+"""Relative curvature below which a direction of the parameters is undetermined; it has the variance of this curvature."""
 
 
 def covariance(
@@ -88,11 +88,15 @@ def sandwich(bread: Array, meat: Array, directions: Array) -> Array:
         1.0, np.sqrt(np.abs(diagonal)), out=np.zeros(diagonal.size), where=diagonal > np.finfo(float).tiny
     )
     values, vectors = np.linalg.eigh(bread * np.outer(scale, scale))
-    known = values > UNKNOWN * values[-1]
-    vectors = scale[:, None] * vectors[:, known]
-    spread, axes = np.linalg.eigh(vectors.T @ meat @ vectors)
-    half = directions @ (vectors / values[known]) @ (axes * np.sqrt(np.clip(spread, 0.0, None)))
-    return np.asarray(half @ half.T)
+    least = UNKNOWN * values[-1]
+    known = values > least
+    vectors = scale[:, None] * vectors
+    determined, free = vectors[:, known], directions @ vectors[:, ~known]
+    spread, axes = np.linalg.eigh(determined.T @ meat @ determined)
+    half = directions @ (determined / values[known]) @ (axes * np.sqrt(np.clip(spread, 0.0, None)))
+    power = float(np.mean(scale**2 * np.diag(meat)))  # of the right-hand side, per curvature
+    free *= np.sqrt(power / least) if least > 0.0 else 0.0
+    return np.asarray(half @ half.T + free @ free.T)
 
 
 def colour(residual: Array, blocks: int = 64) -> float:

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.residual.noise_floor import (
-    ADEQUACY,
     drive_period,
     floors,
     noise_floors,
@@ -27,6 +26,7 @@ from piezo_hysteresis.discrepancy.residual.noise_floor import (
     stroke,
     white_noise,
 )
+from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.record import Record
 
 RANDOM = np.random.default_rng(3)

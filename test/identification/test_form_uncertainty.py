@@ -12,20 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Intervals that do not shrink with the length of a record: closed form for one gain."""
+"""Intervals that do not shrink with the length of a record: closed form for one gain, and a stage of other form."""
 
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.form_uncertainty import PIECES, with_form_uncertainty
-from piezo_hysteresis.discrepancy.residual.noise_floor import ADEQUACY
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import AmplifierBandwidth, Arx, BoucWen, Offset
-from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import fit
+from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY, PIECES, with_form_uncertainty
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.model.model import Model
-from piezo_hysteresis.record import Record
+from piezo_hysteresis.record import Experiment, Record
+from piezo_hysteresis.stage.plant import Plant, PlantParameters
 
 MODEL = Model((BoucWen(A=0.0, p1=0.0, p2=1.0), Arx(a=(), b=(1.0,), delay=1), Offset()), 1e-3, 1.0, 1e-5)
 SPAN = 2e-5
@@ -39,11 +38,8 @@ def errors_of(size, misfit=0.0):
     noise = 1e-9
     slow = misfit * np.sqrt(2.0) * np.cos(2 * np.pi * 3 * np.arange(size) / size)
     record = Record(u, y + noise * rng.normal(size=size) + slow, 1e-3)
-    training_data = TrainingData(
-        (record,), np.array([noise]), Nuisance(), Extent.of([record], MODEL.voltage_scale, MODEL.displacement_scale)
-    )
     found = fit(MODEL, (record,), ["bouc_wen.p2"], floors=[noise])
-    wider = with_form_uncertainty(found, training_data, np.array([noise]), SPAN)
+    wider = with_form_uncertainty(found, (record,), Nuisance(), [noise], [noise], SPAN)
     return found.standard_errors["bouc_wen.p2"], wider.standard_errors["bouc_wen.p2"]
 
 
@@ -66,8 +62,24 @@ def test_a_lag_is_known_to_one_sample_at_best():
     model = MODEL.with_effect(AmplifierBandwidth(tau=0.5 * period))
     u = np.sin(2 * np.pi * 20 * np.arange(20_000) / 20_000)
     record = Record(u, model.simulate(Record(u, np.zeros(u.size), period))[0], period)
-    training_data = TrainingData(
-        (record,), np.array([noise]), Nuisance(), Extent.of([record], model.voltage_scale, model.displacement_scale)
-    )
-    found = with_form_uncertainty(fit(model, (record,), [name], floors=[noise]), training_data, np.array([noise]), SPAN)
+    found = fit(model, (record,), [name], floors=[noise])
+    found = with_form_uncertainty(found, (record,), Nuisance(), [noise], [noise], SPAN)
     assert found.standard_errors[name] > period / np.sqrt(12.0)
+
+
+@pytest.mark.parametrize("averaged", [5, 50])
+def test_the_interval_of_the_loop_contains_the_truth_for_triangles_stored_as_averages(averaged):
+    """Averages of 1 ms have lost the corners of the drive."""
+    period, truth = 2e-5, PlantParameters()
+    plant = Plant(truth, period, seed=3)
+    records = []
+    for frequency, height in ((1.0, 10.0), (1.0, 7.0), (1.0, 4.0), (2.0, 10.0)):
+        turns = frequency * period * np.arange(round(3.0 / frequency / period))
+        played = plant.run(height * (1.0 - np.abs(1.0 - 2.0 * (turns % 1.0))))
+        record = Record(played.voltage, played.displacement, period, phase="triangle", initial_voltage=0.0)
+        records.append(record.decimate(averaged))
+        plant.settle(0.0)
+    found = identify(Experiment(tuple(records)))
+    for name in ("beta", "gamma"):
+        low, high = found.fit.interval(f"bouc_wen.{name}")
+        assert low < getattr(truth.hysteresis, name) < high

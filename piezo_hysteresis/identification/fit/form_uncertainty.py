@@ -22,19 +22,21 @@ it. An interval that ignores it excludes the true value (Brynjarsdóttir and O'H
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification.fit.covariance import sandwich
-from ..identification.fit.fit import Fit, gauge
-from ..identification.fit.normal_equations import grams
-from .residual.noise_floor import ADEQUACY
-from .search.training_data import TrainingData
+from ...record import Record
+from .covariance import sandwich
+from .fit import Fit, gauge
+from .normal_equations import Nuisance, grams
 
 Array = NDArray[np.float64]
 
+ADEQUACY = 3e-4
+"""Adequacy floor: error that counts as perfect, as a share of the range of the experiment."""
 LAG = "lag"
 """Family of the effects that delay."""
 PIECES = 16.0
@@ -43,17 +45,26 @@ PIECES = 16.0
 Chosen by the coverage of intervals on stages of other form (`python -m benchmarks.coverage`)."""
 
 
-def with_form_uncertainty(fit: Fit, training_data: TrainingData, noise: Array, span: float) -> Fit:
+def with_form_uncertainty(
+    fit: Fit,
+    records: Sequence[Record],
+    nuisance: Nuisance,
+    floors: Sequence[float] | Array,
+    noise: Sequence[float] | Array,
+    span: float,
+) -> Fit:
     """The fit with a covariance that includes the uncertainty of the model's form.
 
     Parameters
     ----------
     fit : Fit
-        Fit to the training data.
-    training_data : TrainingData
-        Records that were fitted, and their floors.
-    noise : (r,) ndarray
-        Noise of every record [m].
+        Fit to the records.
+    records : sequence of Record
+        Records that were fitted, in order.
+    nuisance : Nuisance
+        Disturbances that are free in every record.
+    floors, noise : (r,) array_like
+        Floor and noise of every record [m]; the floor is infinite for a record that only determines the state.
     span : float
         Range of the displacement over the experiment [m].
 
@@ -69,8 +80,8 @@ def with_form_uncertainty(fit: Fit, training_data: TrainingData, noise: Array, s
     directions = gauge(fit.model, fit.names)
     bread = np.zeros((directions.shape[1],) * 2)
     meat = np.zeros_like(bread)
-    products = grams(fit.model, training_data.records, fit.names, training_data.nuisance)
-    for gram, floor, quiet in zip(products, training_data.floors, noise, strict=True):
+    products = grams(fit.model, records, fit.names, nuisance)
+    for gram, floor, quiet in zip(products, floors, noise, strict=True):
         if np.isfinite(floor):
             weight = 1.0 / (gram.size * floor**2)
             misfit = max((ADEQUACY * span) ** 2, gram.rms**2 - quiet**2)
