@@ -191,7 +191,7 @@ class Diagnosis(Pictured):
             "after": None if gap is None else gap.after,
             "live": None if gap is None else gap.live,
             "floor": None if gap is None else gap.floor,
-            "after_interval_95": None if gap is None else list(gap.interval_95),
+            "after_interval_95": None if gap is None or gap.interval_95 is None else list(gap.interval_95),
             "unseen": False if gap is None else gap.unseen,
             "per_phase": {
                 f"{p.index:02d}_{p.phase}": {"before": p.before, "after": p.after, "floor": p.floor}

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..identification.fit.normal_equations import Nuisance, residuals
@@ -53,8 +54,8 @@ class Gap:
     ----------
     before, after, floor : float
         Error of the baseline, error of the extended model, and noise floor [% of range].
-    interval_95 : (float, float)
-        95 % interval of `after`, with records as independent units [% of range].
+    interval_95 : (float, float) or None
+        95 % interval of `after` (Student's t), with records as independent units [% of range]; None for one record.
     per_phase : tuple of PhaseGap
         Gap of every record.
     unseen : bool
@@ -67,7 +68,7 @@ class Gap:
     before: float
     after: float
     floor: float
-    interval_95: tuple[float, float]
+    interval_95: tuple[float, float] | None
     per_phase: tuple[PhaseGap, ...]
     unseen: bool
     live: float
@@ -128,13 +129,15 @@ def measure_gap(
     live = [100.0 * float(np.sqrt(np.mean(predicted[i] ** 2))) / stroke for i in chosen]
     least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
     squares = after**2
-    spread = 1.96 * float(squares.std(ddof=1)) / np.sqrt(squares.size) if squares.size > 1 else float(squares[0])
-    mean = float(squares.mean())
+    mean, interval = float(squares.mean()), None
+    if squares.size > 1:
+        spread = float(scipy.stats.t.ppf(0.975, squares.size - 1) * scipy.stats.sem(squares))
+        interval = float(np.sqrt(max(0.0, mean - spread))), float(np.sqrt(mean + spread))
     return Gap(
         before=float(np.sqrt(np.mean(before**2))),
         after=float(np.sqrt(mean)),
         floor=float(np.sqrt(np.mean(least**2))),
-        interval_95=(float(np.sqrt(max(0.0, mean - spread))), float(np.sqrt(mean + spread))),
+        interval_95=interval,
         per_phase=tuple(
             PhaseGap(records[i].phase, i, float(b), float(a), float(f))
             for i, b, a, f in zip(chosen, before, after, least, strict=True)

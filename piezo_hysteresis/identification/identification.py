@@ -38,11 +38,20 @@ from .structure.structure_choice import StructureChoice
 
 CORRELATED = 0.95
 """Correlation from which two parameters are reported as hard to separate."""
+INSEPARABLE = 1.0 - 1e-4
+"""Correlation from which only a combination of two parameters is determined."""
 
 
 def undetermined(fit: Fit) -> tuple[str, ...]:
     """Parameters at a bound after a fit, except those that are off there, such as a play without weight."""
     return tuple(n for n in fit.at_bounds if fit.model.row(n).off != fit.values[n])
+
+
+def correlated_pairs(fit: Fit, least: float) -> tuple[tuple[str, str, float], ...]:
+    """Pairs of parameters, those of G aside, whose correlation is at least `least`: names and correlation."""
+    names = [n for n in fit.names if not n.startswith(f"{Arx.name}.")]
+    pairs = [(a, b, fit.correlation(a, b)) for i, a in enumerate(names) for b in names[:i]]
+    return tuple(pair for pair in pairs if abs(pair[2]) > least)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,9 +155,7 @@ class Identification:
     @property
     def correlated(self) -> tuple[tuple[str, str, float], ...]:
         """Pairs of hysteresis parameters with strongly correlated estimates: names and correlation."""
-        names = [n for n in self.fit.names if not n.startswith(f"{Arx.name}.")]
-        pairs = [(a, b, self.fit.correlation(a, b)) for i, a in enumerate(names) for b in names[:i]]
-        return tuple(pair for pair in pairs if abs(pair[2]) > CORRELATED)
+        return correlated_pairs(self.fit, CORRELATED)
 
     def response(self, frequency: Samples) -> tuple[np.ndarray, Samples]:
         """G at `frequency` [Hz] and its relative standard error (`response_error`), both of shape (k,)."""

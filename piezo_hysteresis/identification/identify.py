@@ -35,7 +35,7 @@ from .fit.fit import Fit, Progress
 from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
 from .fit.joint import fit_dynamics, fit_lag
 from .fit.normal_equations import Nuisance, residuals
-from .identification import Identification, phase_errors, undetermined
+from .identification import INSEPARABLE, Identification, correlated_pairs, phase_errors, undetermined
 from .identified_range import identified_range
 from .one_core import on_one_core
 from .records.conditioning import select
@@ -212,6 +212,11 @@ def identify(
     if not joint.converged:
         notices.append(Notice("not_converged", f"the joint fit did not converge in {joint.iterations} linearisations"))
     notices += [Notice("at_bound", f"{name} reached a bound of its range") for name in undetermined(joint)]
+    if structure is None:
+        notices += [
+            Notice("not_identifiable", f"{a} and {b} are not determined separately; record whole loops", severe=True)
+            for a, b, _ in correlated_pairs(joint, INSEPARABLE)
+        ]
     if not any(not p.is_fitted for p in phases):
         notices.append(
             Notice(

@@ -67,6 +67,9 @@ def test_free_disturbances_are_not_part_of_the_gap(records):
     assert gap.before == pytest.approx(gap.after)
 
 
-def test_one_record_still_has_an_interval(records):
-    gap = measure(records, (MODEL, MODEL), (1,))
-    assert np.isfinite(gap.interval_95).all()
+def test_the_interval_of_few_records_is_that_of_student(records):
+    """Two records: 12.7 standard errors, where many records would have 1.96."""
+    gap = measure(records, (MODEL, MODEL), (0, 2))
+    error = (0.5**2 - 0.1**2) / 2
+    assert gap.interval_95[1] ** 2 == pytest.approx(gap.after**2 + 12.706 * error, rel=1e-3)
+    assert measure(records, (MODEL, MODEL), (1,)).interval_95 is None

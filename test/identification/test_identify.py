@@ -223,3 +223,15 @@ def test_phases_that_are_held_out_must_exist():
         identify(experiment, held_out=("sine",))
     with pytest.raises(RecordError, match="every phase"):
         identify(experiment, held_out=("triangle",))
+
+
+def test_parameters_that_the_drive_does_not_separate_are_not_stated_as_known():
+    """A drive that only rises shows β + γ, and neither of them."""
+    u = np.linspace(0.0, 10.0, 3000)
+    (y,) = TRUTH.simulate(Record(u, np.zeros(u.size), TRUTH.sample_period, initial_voltage=0.0))
+    noisy = y + NOISE * np.random.default_rng(1).normal(size=u.size)
+    found = identify(Experiment((Record(u, noisy, TRUTH.sample_period, phase="ramp", initial_voltage=0.0),)))
+    for name in ("bouc_wen.beta", "bouc_wen.gamma"):
+        low, high = found.fit.interval(name)
+        assert low < TRUTH.values()[name] < high
+    assert [n.severe for n in found.notices if n.kind == "not_identifiable"] == [True]

@@ -37,7 +37,7 @@ Progress = Callable[[str, float], None]
 TRUSTED = 1.0
 """Largest damping at which a small decrease of the cost means convergence."""
 MAX_DAMPING = 1e10
-"""Damping at which a fit ends without convergence."""
+"""Damping at which a fit ends: no step lowers the cost. It has converged, unless even the smallest step diverges."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +211,7 @@ def fit(
             if damping > MAX_DAMPING:
                 break
         if damping > MAX_DAMPING or better is None:
-            converged = True
+            converged = better is not None
             break
         decrease = 1.0 - cost / total[-1, -1]
         try:
