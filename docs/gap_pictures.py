@@ -32,7 +32,6 @@ from matplotlib.figure import Figure
 from piezo_hysteresis.discrepancy import Diagnosis, diagnose
 from piezo_hysteresis.discrepancy.next_experiment import separations
 from piezo_hysteresis.discrepancy.residual.noise_floor import noise_floors, stroke
-from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.discrepancy.search.acceptance_tests import share_left
 from piezo_hysteresis.discrepancy.search.candidate_refits import LATER, LEAST_GAIN, refit_candidates
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen
@@ -41,6 +40,7 @@ from piezo_hysteresis.discrepancy.search.refit import without
 from piezo_hysteresis.discrepancy.search.selection import KEEPS, REFITS
 from piezo_hysteresis.discrepancy.search.test_records import reporting
 from piezo_hysteresis.effects import CATALOGUE
+from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.identification.protocol import protocol
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.record import Experiment, Record

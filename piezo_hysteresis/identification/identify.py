@@ -38,19 +38,19 @@ from .fit.normal_equations import Nuisance, residuals
 from .identification import INSEPARABLE, Identification, correlated_pairs, phase_errors, undetermined
 from .identified_range import identified_range
 from .one_core import on_one_core
+from .published_steps import delay_of_steps, published_steps
 from .records.conditioning import select
 from .records.conditioning_split import known_from_within
 from .records.excitation_content import sensor_noise
-from .records.leading_step import Blocks, begins_with_a_jump, steps_apart
-from .records.roles import HELD_OUT, Roles, roles_of
+from .records.leading_step import Blocks, steps_apart
+from .records.roles import HELD_OUT, roles_of
 from .steps.comparison import InputComparison, compare_inputs
-from .steps.delay import Delay, identify_delay
 from .steps.dynamics import Dynamics, delay_of
 from .steps.hysteresis_choice import choose_memory
 from .steps.linear_start import hysteresis_signals
 from .steps.order_choice import OrderError, choose_order, compare_orders
 from .steps.remaining_lag import lag_notices
-from .steps.three_steps import ThreeSteps, behind_the_gauge, three_steps
+from .steps.three_steps import behind_the_gauge
 from .structure.structure_choice import StructureChoice, choose_structure
 
 AT_THE_FLOOR = 1.5
@@ -59,11 +59,6 @@ FEWEST_SAMPLES = 32
 """Number of samples of the shortest record that can show a loop."""
 HIGHEST_ORDER = 10
 """Highest model order of the comparison."""
-LEADING_STEP = (
-    "the step is at the first sample, so the delay cannot be read from its onset; the joint fit determines delay, "
-    "ringing and creep from it"
-)
-"""Message if the only step is at the beginning of a record."""
 
 
 @on_one_core
@@ -142,8 +137,8 @@ def identify(
     notices: list[Notice] = [*experiment.notices, *conditioning_notices]
 
     report("step 1: delay", 0.0)
-    delay = _delay(experiment, roles, notices)
-    published = _published(experiment, scale_v, scale_y, orders or (8, 8), hysteresis, delay, notices)
+    delay = delay_of_steps(experiment, roles, notices)
+    published = published_steps(experiment, scale_v, scale_y, orders or (8, 8), hysteresis, delay, notices)
 
     report("step 3: hysteresis", 0.1)
     dead = 1.0 if delay is None else max(1.0, delay.time / period)
@@ -232,42 +227,3 @@ def identify(
     if not roles.broadband:
         origin |= identified_periods(records[i].sample_period for i in roles.fitted)
     return replace(found, model=replace(joint.stated_model, provenance=origin))
-
-
-def _delay(experiment: Experiment, roles: Roles, notices: list[Notice]) -> Delay | None:
-    at_full_rate = [i for i in roles.fitted if experiment[i].sample_period < 1.001 * experiment.fastest_period]
-    fast = [experiment[i] for i in at_full_rate]
-    calm = [experiment[i] for i in at_full_rate if not roles.contents[i].is_broadband]
-    kinds = (("step",), ("steps", "staircase"))
-    named = ([r for r in fast if r.phase.split("_")[0] in kind] for kind in kinds)
-    try:
-        delay = identify_delay(next((records for records in named if records), calm or fast))
-    except IdentificationError as error:
-        jumps = any(not r.continues and begins_with_a_jump(r) for r in experiment)
-        notices.append(Notice("no_step", LEADING_STEP if jumps else str(error), "step"))
-        return None
-    notices += delay.notices
-    return delay
-
-
-def _published(
-    experiment: Experiment,
-    voltage_scale: float,
-    displacement_scale: float,
-    orders: tuple[int, int],
-    hysteresis: type[HysteresisOperator],
-    delay: Delay | None,
-    notices: list[Notice],
-) -> ThreeSteps | None:
-    try:
-        return three_steps(
-            experiment.records,
-            voltage_scale=voltage_scale,
-            displacement_scale=displacement_scale,
-            orders=orders,
-            hysteresis=hysteresis,
-            delay=delay,
-        )
-    except IdentificationError as error:
-        notices.append(Notice("no_three_steps", str(error)))
-        return None

@@ -26,8 +26,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..diagnosis import Diagnosis, Verdict
 from ...identification.fit.form_uncertainty import PIECES
+from ..diagnosis import Diagnosis, Verdict
 from ..search.cross_validation import ADEQUATE, Score
 from ..search.selection_result import Step
 from ..verdict import FAR, NAMED, NAMED_FAR

@@ -28,11 +28,11 @@ from numpy.typing import NDArray
 
 from ...effects import Effect
 from ...identification.fit.covariance import sandwich
+from ...identification.fit.form_uncertainty import PIECES
 from ...identification.fit.normal_equations import grams
 from ...identification.protocol.protocol import ProtocolPhase
 from ...model.model import Model
 from ...record import Record
-from ...identification.fit.form_uncertainty import PIECES
 from ..search.candidates import directions, free_numbers
 from ..search.cross_validation import ADEQUATE
 from ..search.refit import FAILURES

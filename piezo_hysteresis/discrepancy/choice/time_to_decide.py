@@ -22,9 +22,9 @@ from itertools import combinations
 
 import numpy as np
 
+from ...identification.fit.form_uncertainty import PIECES
 from ...identification.protocol.protocol import ProtocolPhase
 from ...record import Record
-from ...identification.fit.form_uncertainty import PIECES
 from ..next_experiment import distances
 from ..search.candidates import FittedCandidate
 from .probabilities import ONE_RECORD

@@ -28,7 +28,7 @@ from .normal_equations import Gram, Nuisance, residuals
 Array = NDArray[np.float64]
 
 UNKNOWN = 1e-10
-"""Relative curvature below which a direction of the parameters is undetermined; it has the variance of this curvature."""
+"""Relative curvature below which a direction of the parameters is undetermined; it gets the variance of this value."""
 
 
 def covariance(
