@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sends recordings to workers, a few at a time, and collects their rows; repeats a recording if its worker ended."""
+"""Sends recordings to workers, several at once, and collects their rows; repeats a recording if its worker ended."""
 
 from __future__ import annotations
 
@@ -31,8 +31,11 @@ AHEAD = 4
 """Number of submitted recordings per thread."""
 TOGETHER, ALONE = 2, 2
 """Numbers of lost workers after which a recording fails: while others run, which may be the cause, and alone."""
-WAIT, LOOK = 0.5, 5.0
-"""Longest wait for the next result, and time between two checks of the workers [s]."""
+WAIT, COLLECT, LOOK = 0.5, 2.0, 5.0
+"""Longest wait for the end of a recording, and times between two collections of rows and two checks of the workers [s].
+
+Every submission and every collection costs messages between three processes, however many recordings it is about.
+"""
 
 
 class Dispatch:
@@ -50,44 +53,59 @@ class Dispatch:
         self._waiting = deque(range(len(orders)))
         self._suspects: deque[int] = deque()
         self._deaths: Counter[int] = Counter()
-        self._under_way: dict[Any, int] = {}
+        self._running: dict[Any, int] = {}
+        self._over: dict[Any, int] = {}
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._collected = time.monotonic()
 
     @property
     def is_over(self) -> bool:
         """Whether every recording has its row."""
-        return not (self._waiting or self._suspects or self._under_way)
+        return not (self._waiting or self._suspects or self._running or self._over)
 
     def submit(self, room: int) -> None:
-        """Submit recordings until `room` of them are running; recordings that lost a worker run last, one by one."""
-        while self._waiting and len(self._under_way) < room:
-            self._submit(self._waiting.popleft())
-        if self._suspects and not self._under_way:
-            self._submit(self._suspects.popleft())
+        """Submit recordings until `room` of them are running, as soon as less than half of them are.
+
+        Recordings that lost a worker run last, one by one.
+        """
+        if self._waiting and 2 * len(self._running) <= room:
+            free = min(room - len(self._running), len(self._waiting))
+            self._submit([self._waiting.popleft() for _ in range(free)])
+        elif self._suspects and not (self._waiting or self._running or self._over):
+            self._submit([self._suspects.popleft()])
 
     def rows(self) -> list[Row]:
-        """Finished rows, after a short wait for the first."""
-        try:
-            futures = [self._ended.get(timeout=WAIT)]
-        except queue.Empty:
+        """The rows of recordings that have ended, from time to time; otherwise nothing, after a short wait."""
+        self._wait()
+        if not self._over or (self._running and time.monotonic() - self._collected < COLLECT):
             return []
-        while not self._ended.empty():
-            futures.append(self._ended.get())
+        self._collected = time.monotonic()
         # the results of a lost worker are computed again, which may fail; then there is no row
-        finished = {self._under_way[f]: f for f in futures if f.status == "finished"}
+        finished = {number: future for future, number in self._over.items() if future.status == "finished"}
         found: dict[int, Row | None] = self._client.gather(finished, errors="skip")
+        over, self._over = self._over, {}
         rows = []
-        for future in futures:
-            row = found.get(self._under_way[future])
+        for future, number in over.items():
+            row = found.get(number)
             if row is not None:
                 rows.append(row)
             elif future.status == "error":
-                rows += self._failed(future)
+                rows += self._failed(number, future.exception())
             else:
-                future.add_done_callback(self._ended.put)
-                continue
-            del self._under_way[future]
+                self._watch(future, number)
         return rows
+
+    def _wait(self) -> None:
+        """Wait until a running recording ends, and note which have ended."""
+        if not self._running:
+            return
+        try:
+            ended = [self._ended.get(timeout=WAIT)]
+        except queue.Empty:
+            return
+        while not self._ended.empty():
+            ended.append(self._ended.get())
+        self._over |= {future: self._running.pop(future) for future in ended}
 
     def check(self) -> None:
         """Check the connection to the scheduler.
@@ -97,21 +115,24 @@ class Dispatch:
         RecordingError
             If it was lost.
         """
-        for future, number in self._under_way.items():
-            if future.status in ("cancelled", "lost"):
+        for future, number in self._running.items():
+            if future.status == "cancelled":
                 raise RecordingError(
                     f"{self._orders[number].source.url}: the scheduler was lost; repeat the same command, it continues "
                     "from here"
                 )
 
-    def _submit(self, number: int) -> None:
-        key = (self._name, number, self._deaths[number])
-        future = self._client.submit(attempt, self._orders[number], key=key, pure=False)
-        self._under_way[future] = number
+    def _submit(self, numbers: Sequence[int]) -> None:
+        orders = [self._orders[number] for number in numbers]
+        keys = [(self._name, number, self._deaths[number]) for number in numbers]
+        for number, future in zip(numbers, self._client.map(attempt, orders, key=keys, pure=False), strict=True):
+            self._watch(future, number)
+
+    def _watch(self, future: Any, number: int) -> None:
+        self._running[future] = number
         future.add_done_callback(self._ended.put)
 
-    def _failed(self, future: Any) -> list[Row]:
-        number, error = self._under_way[future], future.exception()
+    def _failed(self, number: int, error: BaseException) -> list[Row]:
         if isinstance(error, PiezoError):
             raise error
         if type(error).__name__ != "KilledWorker":
