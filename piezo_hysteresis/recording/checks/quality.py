@@ -25,6 +25,7 @@ from ..segmentation.waveform import phase_name
 from .channel_defects import channel_defects
 from .initial_condition_check import not_at_rest, origins
 from .lag import lag_notices, lag_of
+from .swapped import swapped
 
 DISPLACEMENT_RANGE = (1e-9, 2e-3)
 """Range of displacement that a piezo stage can have [m]."""
@@ -68,6 +69,8 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
         notices += _named_frequency(record)
         notices += channel_defects(record)
     late = lag_notices(moving)
+    leading = {notice.phase for notice in late if notice.kind == "leads"}
+    late += [found for record in moving if record.phase not in leading and (found := swapped(record))]
     notices += late
     notices += [n for n in _polarity_and_lead(moving) if n.kind not in {notice.kind for notice in late}]
     for record in experiment:

@@ -50,7 +50,7 @@ def kinds(voltage, displacement, period=PERIOD, phase="triangle"):
 
 @pytest.mark.parametrize("amplitudes", [(0.9, 0.9), (0.25, 0.5, 0.7, 0.95), (0.9, 0.6, 0.3, 0.1)])
 @pytest.mark.parametrize(
-    "terms", [(-0.5, 3.0, 0.5, 0.0, 0.0), (0.35, 2.0, 0.3, 0.0, 0.0), (-0.6, 3.5, 1.0, -1.1, -0.8)]
+    "terms", [(-0.5, 3.0, 0.5, 0.0, 0.0), (-0.35, 2.0, 0.3, 0.0, 0.0), (-0.6, 3.5, 1.0, -1.1, -0.8)]
 )
 def test_curved_loops_are_not_a_shifted_channel(amplitudes, terms):
     voltage = triangle(amplitudes)
