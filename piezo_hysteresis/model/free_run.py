@@ -34,7 +34,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 HOLD_STEPS = 8
-"""Number of steps over the time between two records that continue."""
+"""Number of steps over a long time between two records that continue."""
+
+SHORT_GAP = 0.1
+"""Longest time between two records that continue [s] during which the dynamics still move: it is run sample by sample.
+"""
 
 
 def free_run(model: Model, records: Iterable[Record]) -> list[Array]:
@@ -42,8 +46,8 @@ def free_run(model: Model, records: Iterable[Record]) -> list[Array]:
     outputs: list[Array] = []
     state: ChainState | None = None
     chain: Chain | None = None
-    for index, record in _in_one_go(records, model.sample_period):
-        before, chain = chain, model.at(record.sample_period)
+    for index, record in _in_one_go(records):
+        before, chain = chain, model.at(record.sample_period, chain.setting.sample_period if chain else None)
         if state is None or not record.continues:
             state = chain.rest(record.settled_voltage, record.start_time)
         elif before is not chain:
@@ -91,8 +95,8 @@ def linearised_run(
     state: ChainState | None = None
     tangent: ChainTangent | None = None
     chain: Chain | None = None
-    for index, record in _in_one_go(records, model.sample_period):
-        before, chain = chain, model.at(record.sample_period)
+    for index, record in _in_one_go(records):
+        before, chain = chain, model.at(record.sample_period, chain.setting.sample_period if chain else None)
         if state is None or tangent is None or not record.continues:
             state = chain.rest(record.settled_voltage, record.start_time)
             tangent = chain.rest_tangent(record.settled_voltage, wanted)
@@ -125,16 +129,18 @@ def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
     return found
 
 
-def _in_one_go(records: Iterable[Record], sample_period: float) -> Iterator[tuple[int | None, Record]]:
-    """Records with their index, and without an index the holds between them, during which creep continues."""
+def _in_one_go(records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:
+    """Records with their index, and without an index the holds between them, during which the stage moves on."""
     before: Record | None = None
     for index, record in enumerate(records):
         if before is not None and record.continues:
-            end = before.start_time + before.duration
-            steps = min(HOLD_STEPS, int((record.start_time - end) / sample_period))
+            end, period = before.start_time + before.duration, before.sample_period
+            gap = record.start_time - end
+            steps = round(gap / period)
+            if steps > HOLD_STEPS and gap > SHORT_GAP:
+                steps, period = HOLD_STEPS, gap / HOLD_STEPS
             if steps > 0:
                 held = np.full(steps, before.voltage[-1])
-                period = (record.start_time - end) / steps
                 yield None, Record(held, held, period, "hold", start_time=end, continues=True)
         yield index, record
         before = record

@@ -24,7 +24,6 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..effects import Discretisation
 from ..errors import ModelError
 from ..html_table import html_table
 from ..picture import Picture, picture_of
@@ -33,7 +32,7 @@ from .chain import Chain, ChainState, Channels
 from .composition import Composition
 from .free_run import free_run, linearised_run, simulated, standard_errors
 from .parameter_covariance import ParameterCovariance
-from .sample_periods import require_not_shorter, stated_period
+from .sample_periods import ChainCache, chain_period, stated_period
 from .samples import row
 
 Array = NDArray[np.float64]
@@ -97,24 +96,26 @@ class Model(Composition):
         """The free run against the measurement, phase by phase, with the residual and the 95 % band."""
         return picture_of(self, experiment)
 
-    def at(self, sample_period: float) -> Chain:
-        """The chain at another sample period [s]; kept for the next time.
+    def at(self, sample_period: float, running: float | None = None) -> Chain:
+        """The chain for samples of another period [s].
+
+        Parameters
+        ----------
+        sample_period : float
+            Of the samples to come [s]; it counts as the model's if the two differ by less than a thousandth.
+        running : float, optional
+            Of the samples before them [s]; likewise.
 
         Raises
         ------
         ModelError
             If the period is shorter than the model's.
         """
-        require_not_shorter(self, sample_period)
-        kept = self._chains
-        if sample_period not in kept:
-            setting = Discretisation(sample_period, self.sample_period, self.voltage_scale, self.displacement_scale)
-            kept[sample_period] = Chain(self.effects, setting)
-        return kept[sample_period]
+        return self._chains.at(chain_period(self, sample_period, running))
 
     @cached_property
-    def _chains(self) -> dict[float, Chain]:
-        return {}
+    def _chains(self) -> ChainCache:
+        return ChainCache(self)
 
     def rest(self, voltage: float, time: float = 0.0, sample_period: float | None = None) -> ChainState:
         """State of a stage settled at `voltage` [V], for samples of the period given.
@@ -165,8 +166,9 @@ class Model(Composition):
         DivergenceError
             If the output diverges.
         """
-        chain = self.at(sample_period or state.sample_period)
-        if chain.setting.sample_period != state.sample_period:
+        before = state.sample_period
+        chain = self.at(before if sample_period is None else sample_period, before)
+        if chain.setting.sample_period != before:
             state = chain.resume(state)
         return chain.run(row(voltage, "voltage"), state, channels)
 

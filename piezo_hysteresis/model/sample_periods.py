@@ -23,10 +23,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..effects import Discretisation
 from ..errors import ModelError
+from .chain import Chain
 
 if TYPE_CHECKING:
     from .model import Model
+
+EQUAL_PERIODS = 1e-3
+"""Relative difference up to which two sample periods count as one."""
+
+KEPT_CHAINS = 32
+"""Number of sample periods whose chains a model keeps."""
 
 SAMPLE_PERIODS = "sample_periods"
 """Key of the provenance: the periods of the records of a model without dynamics of its own period [s]."""
@@ -60,10 +70,50 @@ def stated_period(model: Model, given: float | None) -> float:
     return model.sample_period
 
 
-def require_not_shorter(model: Model, sample_period: float) -> None:
-    """Raise `ModelError` where samples come faster than the model's period [s]."""
-    if sample_period < 0.999 * model.sample_period:
+def chain_period(model: Model, sample_period: float, running: float | None) -> float:
+    """The period [s] of the chain for samples of `sample_period`: that of the model, or `running`, if they are equal.
+
+    Clocks and files state one period with different last digits.
+
+    Raises
+    ------
+    ModelError
+        If the samples come faster than the model's.
+    """
+    for known in (model.sample_period, running):
+        if known is not None and abs(sample_period / known - 1.0) <= EQUAL_PERIODS:
+            return known
+    if not model.sample_period < sample_period < np.inf:
         raise ModelError(
             f"sample period: got {sample_period:g} s, expected {model.sample_period:g} s (the model's) or more; "
             "decimate the record or identify at its rate"
         )
+    return sample_period
+
+
+class ChainCache:
+    """Builds the chain of a model at a sample period, and keeps it for the next time.
+
+    Parameters
+    ----------
+    model : Model
+        Its effects and scales.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._kept: dict[float, Chain] = {}
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    def at(self, period: float) -> Chain:
+        """The chain at a sample period [s]."""
+        if period not in self._kept:
+            model = self._model
+            setting = Discretisation(period, model.sample_period, model.voltage_scale, model.displacement_scale)
+            chain = Chain(model.effects, setting)
+            if len(self._kept) == KEPT_CHAINS:
+                del self._kept[next(iter(self._kept))]
+            self._kept[period] = chain
+        return self._kept[period]

@@ -31,7 +31,6 @@ from .running_rms import RunningRms
 from .sensor_offset import SensorOffset, samples_to_average
 from .sequence_check import LONGEST_SILENCE, SequenceCheck
 from .voltage_history import FULL_SAMPLES, DriveHistory, VoltageHistory, is_held
-from .warmup import chain_at
 
 Array = NDArray[np.float64]
 
@@ -130,7 +129,7 @@ class Predictor:
         DivergenceError
             If the model diverges on the history; the present model stays.
         """
-        chain = chain_at(model, self.sample_period)
+        chain = model.at(self.sample_period)
         if self._history.count == 0:
             self.chain, self.model = chain, model
             return

@@ -23,24 +23,12 @@ from numpy.typing import NDArray
 
 from ..effects import BY_NAME, CHAIN
 from ..errors import PiezoError
-from ..model.chain import Chain, ChainState
+from ..model.chain import ChainState
 from ..model.model import Model
 from .sensor_offset import SensorOffset
 from .voltage_history import VoltageHistory
 
 Array = NDArray[np.float64]
-
-
-def chain_at(model: Model, sample_period: float) -> Chain:
-    """The chain of a model for a stream; its own period where the two agree to a thousandth.
-
-    Raises
-    ------
-    ModelError
-        If the stream is faster than the model.
-    """
-    same = abs(sample_period / model.sample_period - 1.0) < 1e-3
-    return model.at(model.sample_period if same else sample_period)
 
 
 class Warmup:
@@ -69,7 +57,7 @@ class Warmup:
     """
 
     def __init__(self, model: Model, history: VoltageHistory, zero: SensorOffset, offset: float | None = None) -> None:
-        self.model, self.chain = model, chain_at(model, history.sample_period)
+        self.model, self.chain = model, model.at(history.sample_period)
         self.zero, self.offset, self._history = zero, offset, history
         self._slow = model.at(history.factor * history.sample_period) if history.factor > 1 else self.chain
         self._position = history.start

@@ -26,14 +26,16 @@ from piezo_hysteresis.effects import (
     AsymmetricHysteresis,
     BoucWen,
     Creep,
+    ExtraResonance,
     Offset,
+    SensorBandwidth,
     SensorNonlinearity,
     ThermalDrift,
     effect_named,
 )
 from piezo_hysteresis.errors import ModelError, ParameterError, UnknownStateWarning
 from piezo_hysteresis.model.model import Model
-from piezo_hysteresis.model.sample_periods import identified_periods
+from piezo_hysteresis.model.sample_periods import KEPT_CHAINS, identified_periods
 from piezo_hysteresis.record import Record
 
 PERIOD = 1e-3
@@ -145,6 +147,38 @@ def test_creep_continues_between_continuing_records() -> None:
     (_, _, y, _, (slope,)), *_ = list(model.linearise(parts, ["creep.gamma"]))[1:]
     np.testing.assert_array_equal(y, behind)
     np.testing.assert_allclose(slope, model.sensitivities(whole, ["creep.gamma"])[1]["creep.gamma"][5000:], rtol=1e-3)
+
+
+RESONANT = Model((BoucWen(), ExtraResonance(r=0.2, f0=100.0, zeta=0.02)), PERIOD, displacement_scale=1e-5)
+
+
+@pytest.mark.parametrize("missing", [0, 1, 5, 40])
+@pytest.mark.parametrize("drift", [0.0, 1e-12, 1e-4])
+def test_a_short_gap_and_the_last_digits_of_a_period_leave_the_dynamics_as_they_are(missing: int, drift: float) -> None:
+    """The stage rings while the drive is held."""
+    drive = np.concatenate((np.zeros(50), np.full(250, 5.0)))
+    (expected,) = RESONANT.simulate(Record(drive, drive, PERIOD))
+    first = Record(drive[:60], drive[:60], PERIOD * (1.0 + drift), start_time=0.3)
+    behind = slice(60 + missing, None)
+    start = first.start_time + first.duration + missing * PERIOD
+    second = Record(drive[behind], drive[behind], PERIOD, start_time=start, continues=True)
+    np.testing.assert_array_equal(RESONANT.simulate([first, second])[1], expected[behind])
+    for index, _, y, _, _ in RESONANT.linearise([first, second], ["extra_resonance.r"]):
+        np.testing.assert_array_equal(y, (expected[:60], expected[behind])[index])
+
+
+def test_slow_records_whose_periods_differ_in_the_last_digits_continue() -> None:
+    slow = Record(np.cos(np.arange(90.0) / 9.0), np.zeros(90), 7e-3)
+    model = RESONANT.with_effect(SensorBandwidth(tau=2e-2))
+    second = replace(slow[50:], sample_period=7e-3 * (1.0 + 1e-12))
+    np.testing.assert_array_equal(model.simulate([slow[:50], second])[1], model.simulate(slow)[0][50:])
+
+
+def test_a_model_keeps_a_bounded_number_of_chains() -> None:
+    model = Model((Arx(),), PERIOD)
+    for period in np.linspace(2.0, 9.0, 100) * PERIOD:
+        model.at(period)
+    assert len(model._chains) == KEPT_CHAINS
 
 
 def test_a_part_of_an_experiment_keeps_the_state_or_warns():

@@ -25,7 +25,6 @@ from ...model.chain import Chain, ChainState, ChainTangent
 from ...model.model import Model
 from ...online.change.score import ChangeScore, Scores, loop_heights
 from ...online.voltage_history import DriveHistory
-from ...online.warmup import chain_at
 
 Array = NDArray[np.float64]
 
@@ -72,7 +71,7 @@ def _brought_up(
     model: Model, drive: DriveHistory, first: int, loop: dict[str, float]
 ) -> tuple[Chain, ChainState, ChainTangent]:
     """Chain, state and sensitivities of a model before sample `first` of the part of the drive stored in full."""
-    fast = chain_at(model, drive.sample_period)
+    fast = model.at(drive.sample_period)
     chain = model.at(drive.slow_period) if drive.slow.size else fast
     state = chain.rest(drive.rest_voltage, drive.start_time)
     tangent = chain.rest_tangent(drive.rest_voltage, loop)
