@@ -20,7 +20,7 @@ import argparse
 import sys
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from ...effects import BASELINE, CHAIN, UNNAMED, Effect, effect_named
 from ...parameter import Parameter
@@ -52,10 +52,12 @@ def run(args: argparse.Namespace) -> int:
 
 def listing() -> Table:
     """One line for every effect, in the order in which they act."""
+    listed = [effect for effect in CHAIN if effect not in UNNAMED]
+    names = Column("effect", min_width=max(len(effect.name) for effect in listed))  # one types them
     table = Table(
-        "effect", "family", "place", "how it shows in the residual", title="Catalogue of effects, in chain order"
+        names, "family", "place", "how it shows in the residual", title="Catalogue of effects, in chain order"
     )
-    for effect in (e for e in CHAIN if e not in UNNAMED):
+    for effect in listed:
         name = f"[dim]{effect.name}[/dim]" if effect in BASELINE else f"[bold]{effect.name}[/bold]"
         table.add_row(name, effect.family, effect.place.name.lower(), effect.signature)
     return table

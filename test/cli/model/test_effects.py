@@ -15,8 +15,11 @@
 """``piezo effects`` prints what the classes say."""
 
 import argparse
+import io
 
 import pytest
+from rich.cells import cell_len
+from rich.console import Console
 
 from piezo_hysteresis.cli.model import effects
 from piezo_hysteresis.effects import CHAIN, UNNAMED
@@ -53,3 +56,13 @@ def test_one_effect_gives_equation_source_and_parameters(
 def test_an_unknown_name_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(ModelError, match="unknown effect 'crep'"):
         printed(capsys, "crep")
+
+
+def test_the_catalogue_fits_a_narrow_terminal_and_names_stay_whole() -> None:
+    output = io.StringIO()
+    Console(file=output, width=80).print(effects.listing())
+    text = output.getvalue()
+    assert max(map(cell_len, text.splitlines())) <= 80
+    assert "…" not in text
+    for effect in CHAIN:
+        assert effect in UNNAMED or f" {effect.name} " in text
