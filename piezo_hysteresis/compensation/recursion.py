@@ -62,11 +62,13 @@ def ramp(excess, corner):
 @inlined
 def before_saturation(v, lower, upper, corner):
     """Inverse of `saturated`; if v is beyond the limit, the voltage at which the limit is reached."""
-    if v > upper - corner:
+    width, middle = upper - lower, 0.5 * (lower + upper)
+    bent = corner if width >= 2.0 * corner else 0.25 * width * width / corner  # output range of one bend alone
+    if v > upper - bent:
         return upper + corner - 2.0 * sqrt(corner * max(upper - v, 0.0))
-    if v < lower + corner:
+    if v < lower + bent:
         return lower - corner + 2.0 * sqrt(corner * max(v - lower, 0.0))
-    return v
+    return v if bent == corner else middle + (v - middle) * (2.0 * corner / width)  # a line where the bends overlap
 
 
 @inlined
@@ -163,13 +165,15 @@ static const double SAME = {SAME!r}, TOUCHING = {TOUCHING!r};
 /* The voltage that the saturation turns into v; where v is beyond the end, where the end is reached. */
 static double before_saturation(double v, double lower, double upper, double corner)
 {
-    if (v > upper - corner) {
+    const double width = upper - lower, middle = 0.5 * (lower + upper);
+    const double bent = width >= 2.0 * corner ? corner : 0.25 * width * width / corner;
+    if (v > upper - bent) {
         return upper + corner - 2.0 * sqrt(corner * larger(upper - v, 0.0));
     }
-    if (v < lower + corner) {
+    if (v < lower + bent) {
         return lower - corner + 2.0 * sqrt(corner * larger(v - lower, 0.0));
     }
-    return v;
+    return bent < corner ? middle + (v - middle) * (2.0 * corner / width) : v;
 }
 """
 )

@@ -25,6 +25,7 @@ import pytest
 from piezo_hysteresis.compensation import Band, Inverse, Limits
 from piezo_hysteresis.effects import (
     CHAIN,
+    AmplifierSaturation,
     Arx,
     BoucWen,
     Effect,
@@ -74,6 +75,18 @@ def test_all_effects_of_one_chain_agree_together(tmp_path) -> None:
     rows = [u, *(channels()[name] for name in sorted(channels()))]
     y, expected = run_c(files, tmp_path, u[0], rows), run(model, u)
     assert np.abs(y - expected).max() <= WORST * np.abs(expected).max()
+
+
+@needs_compiler
+@pytest.mark.parametrize(("lower", "upper", "corner"), [(-1.0, 1.0, 1.5), (0.0, 8.0, 4.5), (0.0, 5.0, 50.0)])
+def test_a_saturation_whose_bends_overlap_is_inverted(lower: float, upper: float, corner: float, tmp_path) -> None:
+    model = turned_model_with(AmplifierSaturation(lower=lower, upper=upper, corner=corner))
+    u = 0.5 * (lower + upper) + 0.8 * (0.5 * (upper - lower) + corner) * np.sin(np.arange(600) / 20.0)
+    path, inverse = model.run(u, model.rest(u[0]))[0], Inverse(model)
+    turned, _ = inverse.run(path, inverse.rest(u[0]))
+    np.testing.assert_allclose(turned[inverse.preview :], u[: -inverse.preview], rtol=0.0, atol=1e-6 * np.ptp(u))
+    in_c = run_c(c_program(model, inverse=inverse), tmp_path, u[0], [path], "inverse_")
+    np.testing.assert_allclose(in_c, turned, rtol=0.0, atol=1e-9 * np.ptp(u))
 
 
 @needs_compiler
