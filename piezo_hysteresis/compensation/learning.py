@@ -76,7 +76,7 @@ class IterativeLearning:
     model : Model
         Model of the stage.
     first : Plan
-        First plan of the path.
+        First plan of the path; its band is that of all rounds.
     limits : Limits
         Limits of the drive.
     filter : LearningFilter, optional
@@ -151,7 +151,7 @@ class IterativeLearning:
             return None
         self._reference = self._reference + correction
         following = plan(
-            self.model, self._reference, self.limits, start=start, approximate=self.approximate,
+            self.model, self._reference, self.limits, start=start, band=played.band, approximate=self.approximate,
             approach=(played.begin - played.preview) * played.sample_period,
             way_back=(played.voltage.size - played.begin - played.wanted.size) * played.sample_period,
         )  # fmt: skip

@@ -107,6 +107,7 @@ def _parts(
     ends = np.flatnonzero(np.diff(bad) > gap)
     begins = np.concatenate((bad[:1], bad[ends + 1]))
     stops = np.concatenate((bad[ends], bad[-1:]))
+    lowest, direction = _at_the_lowest_voltage(model, limits)
     found = []
     for a, b in zip(begins, stops, strict=True):
         here = needed[a : b + preview + 1]
@@ -119,8 +120,6 @@ def _parts(
         }
         limit = max(beyond, key=lambda name: beyond[name])
         worst = a + int(np.abs(off[a : b + 1]).argmax())
-        lowest = model.at(period).rest(limits.voltage_min) if np.isfinite(limits.voltage_min) else None
-        resting = None if lowest is None else float(model.run([limits.voltage_min], lowest)[0][0])
         found.append(
             UnreachablePart(
                 period * float(a),
@@ -130,10 +129,22 @@ def _parts(
                 high,
                 slew,
                 limit,
-                limit == "voltage_min" and resting is not None and bool(aim[worst] >= resting - TOLERANCE * span),
+                limit == "voltage_min" and direction * (float(aim[worst]) - lowest) >= -TOLERANCE * span,
             )
         )
     return tuple(found)
+
+
+def _at_the_lowest_voltage(model: Model, limits: Limits) -> tuple[float, float]:
+    """Displacement of a stage settled at `voltage_min` [m], and the direction in which a higher voltage moves it (±1).
+
+    Zeros without a `voltage_min`.
+    """
+    if not np.isfinite(limits.voltage_min):
+        return 0.0, 0.0
+    higher = min(limits.voltage_max, limits.voltage_min + model.voltage_scale)
+    at, above = (float(model.run([u], model.rest(u))[0][0]) for u in (limits.voltage_min, higher))
+    return at, float(np.sign(above - at))
 
 
 def _nearest(

@@ -62,6 +62,8 @@ class Plan:
         Number of samples by which the drive is ahead of the path.
     end : ChainState
         State of the model after the drive.
+    band : Band
+        Low-pass filter of the path.
     """
 
     wanted: Array
@@ -75,6 +77,7 @@ class Plan:
     not_on_path: tuple[str, ...]
     preview: int
     end: ChainState
+    band: Band
 
     @property
     def path_predicted(self) -> Array:
@@ -180,4 +183,5 @@ def plan(
         inverse.not_on_path,
         inverse.preview,
         end,
+        band,
     )

@@ -69,7 +69,7 @@ class UnreachablePart:
         if self.after_loop:
             message += (
                 "; the displacement can be reached from rest, but not after this motion, because the hysteresis keeps "
-                "the stage above it"
+                "the stage beyond it"
             )
         return message
 

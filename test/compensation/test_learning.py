@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from piezo_hysteresis.compensation import IterativeLearning, LearningFilter, Limits, ResponseCheck, learn, plan
+from piezo_hysteresis.compensation import Band, IterativeLearning, LearningFilter, Limits, ResponseCheck, learn, plan
 from piezo_hysteresis.compensation.learning import default_filter
 from piezo_hysteresis.effects import Arx, Creep, HysteresisMemory
 from piezo_hysteresis.errors import ModelError
@@ -97,6 +97,14 @@ def test_a_round_that_got_worse_is_the_last() -> None:
     assert "no better" in got.reason and got.best is got.rounds[0]
     with pytest.raises(ModelError, match="ended"):
         got.update(second.predicted)
+
+
+def test_every_round_has_the_band_of_the_first_plan() -> None:
+    model, band = stage(), Band(200.0, 500.0, 0.02)
+    got = IterativeLearning(model, plan(model, WANTED, LIMITS, band=band), LIMITS)
+    got = learn(got, stage_with_noise(0.0), rounds=2)
+    assert len(got.rounds) == 3 and {r.plan.preview for r in got.rounds} == {got.rounds[0].plan.preview}
+    assert got.rounds[0].plan.preview > plan(model, WANTED, LIMITS).preview
 
 
 def test_the_gain_is_zero_where_the_response_makes_convergence_unsure() -> None:

@@ -23,7 +23,7 @@ import pytest
 
 from piezo_hysteresis.compensation import Limits, plan, reachable
 from piezo_hysteresis.compensation.expected_error import free_run_error, parameter_error
-from piezo_hysteresis.effects import Creep
+from piezo_hysteresis.effects import BoucWen, Creep
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.parameter_covariance import ParameterCovariance
 
@@ -63,6 +63,17 @@ def test_zero_after_a_loop_on_unipolar_drive_needs_a_negative_voltage() -> None:
     less = plan(model, y + 0.5 * nearest.offset, UNIPOLAR)
     assert not less.reachability.is_whole, "the nearest is no farther than it must be"
     assert reachable(model, Limits(-2.0, 10.0), y).is_whole
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_only_what_rest_reaches_is_said_to_be_kept_by_the_hysteresis(sign: float) -> None:
+    loop = BoucWen()
+    numbers = {name: sign * loop[name] for name in ("A", "p1", "p2", "gamma")} | {"beta": loop["beta"]}
+    model = stage().with_effect(BoucWen(**numbers))
+    after = reachable(model, UNIPOLAR, sign * swing(50.0, 0.0, 6e-6, 1), search=False)
+    assert after.parts[-1].after_loop and "keeps the stage beyond it" in str(after.parts[-1])
+    outside = reachable(model, UNIPOLAR, -sign * swing(50.0, 0.0, 1e-6, 1), search=False)
+    assert {(part.limit, part.after_loop) for part in outside.parts} == {("voltage_min", False)}
 
 
 def test_too_high_and_too_fast_are_distinguished() -> None:
