@@ -26,7 +26,7 @@ from ..blocks.block import Block, State
 from ..blocks.inverses.inverted_block import InvertedBlock
 from ..blocks.inverses.linear_inverse import InvertedLinear
 from ..c_form import CForm
-from ..effects import Invertibility
+from ..effects import ChainPosition, Effect, Invertibility
 from ..errors import ModelError
 from ..inverse_terms import InverseTerms
 from ..model.chain import Chain, ChainState
@@ -81,7 +81,8 @@ class Inverse:
     Raises
     ------
     ModelError
-        If the chain contains an effect without an inverse and `approximate` is not set.
+        If the chain contains an effect without an inverse and `approximate` is not set, or two forms of one part of the
+        amplifier.
 
     Examples
     --------
@@ -110,7 +111,7 @@ class Inverse:
         self.sample_period = model.sample_period
         self.chain: Chain = model.at(model.sample_period)
         kept = Model(
-            tuple(e for e in model.effects if e.invertibility is not Invertibility.IMPOSSIBLE),
+            tuple(e for e in model.effects if e.invertibility is not Invertibility.IMPOSSIBLE and not _is_idle(e)),
             model.sample_period,
             model.voltage_scale,
             model.displacement_scale,
@@ -202,15 +203,20 @@ class Inverse:
         return found | {"drive": (0, self._nonlinear.c_form())}
 
 
+def _is_idle(effect: Effect) -> bool:
+    """Whether an effect of the drive is switched off, so that another form of it can take its place in the inverse."""
+    return effect.place is ChainPosition.DRIVE and effect.is_off
+
+
 def _terms_of_nonlinear_part(blocks: Sequence[Block], labels: Sequence[str]) -> list[InverseTerms]:
     """Terms of drive, hysteresis and creep: of all blocks up to the first that belongs to the dynamics.
 
     Raises
     ------
     ModelError
-        If a block of the drive has no terms.
+        If a block of the drive has no terms, or the same ones as another.
     """
-    scale, terms = labels.index("voltage_scale"), list[InverseTerms]()
+    scale, terms, owners = labels.index("voltage_scale"), list[InverseTerms](), dict[str, str]()
     for k, block in enumerate(blocks):
         own = block.inverse_terms()
         if own is None and k < scale:
@@ -219,6 +225,9 @@ def _terms_of_nonlinear_part(blocks: Sequence[Block], labels: Sequence[str]) -> 
             )
         if own is None or (k > scale and own.drive):
             break
+        for other in {owners[name] for name in own.drive if name in owners}:
+            raise ModelError(f"{labels[k]}: cannot be inverted together with {other}; expected one of them")
+        owners |= dict.fromkeys(own.drive, labels[k])
         terms.append(own)
     return terms
 

@@ -27,6 +27,8 @@ from piezo_hysteresis.blocks.inverses.inverted_block import InvertedBlock
 from piezo_hysteresis.compensation import Inverse
 from piezo_hysteresis.effects import (
     CHAIN,
+    AmplifierBandwidth,
+    AmplifierBandwidthHeld,
     Arx,
     BoucWen,
     ChainPosition,
@@ -264,6 +266,15 @@ def test_an_effect_outside_the_package_brings_its_inverse(monkeypatch) -> None:
     monkeypatch.delattr(OwnSensorBlock, "inverted")
     with pytest.raises(ModelError, match="own_sensor: OwnSensorBlock has no inverse"):
         Inverse(model)
+
+
+def test_two_forms_of_the_pole_of_the_amplifier_are_refused_and_one_is_inverted() -> None:
+    both = AmplifierBandwidth(tau=3e-5), AmplifierBandwidthHeld(tau=3e-5)
+    with pytest.raises(ModelError, match="amplifier_bandwidth_held: cannot be inverted together with amplifier_bandwi"):
+        Inverse(model_with(*both))
+    for k, effect in enumerate(both):
+        model = model_with(effect, both[1 - k].off())
+        assert mismatch(model, Inverse(model)) < 1e-12, effect.name
 
 
 def test_several_together_are_exact() -> None:
