@@ -73,7 +73,7 @@ def structures(prefix: str, name: str, form: CForm) -> Iterator[str]:
 
 
 def functions(prefix: str, name: str, form: CForm, *, always_rest: bool = True) -> Iterator[str]:
-    """The functions ``NAME_rest`` and ``NAME_step`` of a form, after those of its parts.
+    """The functions ``PREFIX_NAME_rest`` and ``PREFIX_NAME_step`` of a form, after those of its parts.
 
     Without `always_rest` a form without state has no ``rest``.
     """
@@ -85,10 +85,10 @@ def functions(prefix: str, name: str, form: CForm, *, always_rest: bool = True) 
         if function == "rest" and not (always_rest or form.has_state):
             continue
         inputs = "double x" + (channel if function == "step" else "")
-        text = body.replace("ME_", f"{name}_").rstrip()
+        text = body.replace("ME_", f"{prefix}_{name}_").rstrip()
         lines = [*constants(form.numbers, body), *text.splitlines()]
         inside = "".join(f"{INDENT}{line}\n" if line else "\n" for line in lines)
-        yield f"static double {name}_{function}({state}{inputs})\n{{\n{inside}}}\n"
+        yield f"static double {prefix}_{name}_{function}({state}{inputs})\n{{\n{inside}}}\n"
 
 
 def library(forms: Mapping[str, CForm]) -> tuple[str, ...]:

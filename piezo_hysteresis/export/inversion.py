@@ -43,19 +43,19 @@ class CInverse:
     stages: dict[str, int | None]
     preview: int
 
-    def rest_calls(self, chain: dict[str, CForm]) -> Iterator[str]:
+    def rest_calls(self, prefix: str, chain: dict[str, CForm]) -> Iterator[str]:
         """C calls that set every stage to rest, between the calls of the prediction, which pass on x."""
         waiting = {at: name for name, at in self.stages.items() if self.forms[name].has_state}
         for k, (name, form) in enumerate(chain.items()):
             if k in waiting:
-                yield f"{waiting[k]}_rest(&state->{waiting[k]}, x);"
-            yield f"x = {name}_rest({f'&stage.{name}, ' if form.has_state else ''}x);"
+                yield f"{prefix}_{waiting[k]}_rest(&state->{waiting[k]}, x);"
+            yield f"x = {prefix}_{name}_rest({f'&stage.{name}, ' if form.has_state else ''}x);"
         if None in waiting:
-            yield f"{waiting[None]}_rest(&state->{waiting[None]}, x);"
+            yield f"{prefix}_{waiting[None]}_rest(&state->{waiting[None]}, x);"
 
-    def step_calls(self) -> list[str]:
+    def step_calls(self, prefix: str) -> list[str]:
         """C calls of one sample."""
-        return list(step_calls(self.forms, "state"))
+        return list(step_calls(prefix, self.forms, "state"))
 
 
 def inversion(inverse: Inverse) -> CInverse:

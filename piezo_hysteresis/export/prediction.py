@@ -58,17 +58,19 @@ def prediction(model: Model) -> CChain:
     return CChain(forms, tuple(sorted({form.channel for form in forms.values() if form.channel})))
 
 
-def rest_calls(forms: dict[str, CForm], state: str) -> Sequence[str]:
+def rest_calls(prefix: str, forms: dict[str, CForm], state: str) -> Sequence[str]:
     """C calls that set every form in turn to rest at x, and set x to its output."""
-    return [f"x = {name}_rest({f'&{state}->{name}, ' if form.has_state else ''}x);" for name, form in forms.items()]
+    return [
+        f"x = {prefix}_{name}_rest({f'&{state}->{name}, ' if form.has_state else ''}x);" for name, form in forms.items()
+    ]
 
 
-def step_calls(forms: dict[str, CForm], state: str) -> Sequence[str]:
+def step_calls(prefix: str, forms: dict[str, CForm], state: str) -> Sequence[str]:
     """C calls of one sample."""
     calls = []
     for name, form in forms.items():
         arguments = [f"&{state}->{name}"] * form.has_state + ["x"] + [form.channel] * bool(form.channel)
-        calls.append(f"x = {name}_step({', '.join(arguments)});")
+        calls.append(f"x = {prefix}_{name}_step({', '.join(arguments)});")
     return calls
 
 

@@ -34,7 +34,7 @@ from .prediction import prediction, rest_calls, step_calls, units
 from .vectors import vectors
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,40}")
-"""Valid names of a program; every function, type and file begins with the name."""
+"""Valid names of a program; every file, type and function of a block begins with the name."""
 
 
 @cache
@@ -80,8 +80,8 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
         "library": c_text.library(found.forms),
         "functions": {n: "\n".join(c_text.functions(name, n, form)) for n, form in found.forms.items()},
         "units": units(tuple(found.forms)),
-        "rest_calls": rest_calls(found.forms, "state"),
-        "step_calls": step_calls(found.forms, "state"),
+        "rest_calls": rest_calls(name, found.forms, "state"),
+        "step_calls": step_calls(name, found.forms, "state"),
         "vectors": vectors(model, inverse),
         "inverse": None,
     }
@@ -96,8 +96,8 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
             "functions": {
                 n: "\n".join(c_text.functions(name, n, form, always_rest=False)) for n, form in turned.forms.items()
             },
-            "rest_calls": list(turned.rest_calls(found.forms)),
-            "step_calls": turned.step_calls(),
+            "rest_calls": list(turned.rest_calls(name, found.forms)),
+            "step_calls": turned.step_calls(name),
         }
         values["library"] = c_text.library({**found.forms, **turned.forms})
     files = {f"{name}.h": "header.h.jinja", f"{name}.c": "source.c.jinja", f"{name}_test.c": "self_test.c.jinja"}

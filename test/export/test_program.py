@@ -126,6 +126,19 @@ def test_two_models_and_cpp_share_a_program(tmp_path):
         assert done.returncode == 0, done.stderr
 
 
+@needs_compiler
+@pytest.mark.parametrize("name", ["arx", "creep", "hysteresis_bouc_wen", "inverse_arx", "ramp"])
+def test_a_name_that_a_block_has_too_compiles(name, tmp_path):
+    files = c_program(MODEL, name, Inverse(MODEL))
+    for file, text in files.items():
+        (tmp_path / file).write_text(text)
+    done = subprocess.run(
+        ["gcc", "-Wall", "-Wextra", "-Werror", "-std=c99", *sorted(f for f in files if f.endswith(".c")), "-lm"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
 def test_the_header_identifies_the_model():
     header = c_program(MODEL, "stage_x")["stage_x.h"]
     (digest,) = re.findall(r'#define STAGE_X_MODEL_HASH "(sha256:\w+)"', header)
