@@ -20,6 +20,7 @@ node is a valid model file, and a model file is a valid ``--params-file``. Units
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import yaml
@@ -124,6 +125,8 @@ def save(model: Model, path: str | Path) -> Path:
         draft.write_text(text, encoding="utf-8")
         draft.replace(path)
     except (OSError, UnicodeError) as error:
+        with suppress(OSError):
+            draft.unlink()
         raise ModelError(f"{path}: cannot write the model file: {error}") from None
     return path
 

@@ -237,6 +237,13 @@ def test_any_text_is_refused_in_one_line(text: str) -> None:
     assert "\n" not in str(error.value)
 
 
+def test_a_file_that_cannot_be_written_leaves_no_draft(tmp_path: Path) -> None:
+    (tmp_path / "model.yaml").mkdir()
+    with pytest.raises(ModelError, match="cannot write the model file"):
+        save(MODEL, tmp_path / "model.yaml")
+    assert [path.name for path in tmp_path.iterdir()] == ["model.yaml"]
+
+
 def test_a_missing_file_and_a_foreign_one(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="No such file"):
         load(tmp_path / "absent.yaml")
