@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class RunningRms:
-    """Rms over the newest blocks that together hold `count` samples; None until there are as many.
+    """Rms over the newest blocks that together hold `count` samples, or over all samples while there are fewer.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class RunningRms:
 
     @property
     def value(self) -> float | None:
-        """Rms of the samples [unit of the samples]; None while there are too few."""
+        """Rms of the samples [unit of the samples]; None before the first."""
         return float(np.sqrt(sum(s for _, s in self._squares) / self._held)) if self._held else None
 
     def add(self, values: Array) -> None:

@@ -27,7 +27,8 @@ class InitialState(Term):
     Parameters
     ----------
     h0 : float
-        h at the start [normalised, 1]; its absolute value is at most |A|/(β + γ sgn A).
+        h at the start [normalised, 1]. Motion of the drive leaves at most |A|/(β + γ sgn A); a larger value is not
+        refused, and decays as soon as the drive moves.
     """
 
     name = "initial_state"

@@ -37,7 +37,8 @@ class RateDependentHysteresis(Term):
     a : float
         Exponent of the rate law [1]; 0 is the logarithm, 1 is proportional to speed.
     jumps : float
-        Duration of a jump in a slow record [1]: at 0 the sample period of the record, at 1 that of the model.
+        Duration of a jump in a slow record [1]: at 0 the sample period of the record, at 1 that of the model. There is
+        nothing between: every value but 0 acts as 1.
 
     Notes
     -----

@@ -43,7 +43,7 @@ class UnnamedPlays(UnnamedCorrection):
 
     Notes
     -----
-    The half widths are a geometric grid from ``reach``/64 to ``reach``.
+    The half widths are a geometric grid from ``reach``/64 to ``reach``; a single play has ``reach``/64.
     """
 
     name = "unnamed_plays"
