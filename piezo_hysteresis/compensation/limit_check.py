@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
+from .approach import APPROACH, settled_start, smooth_way
 from .band import Band
 from .inverse import Inverse
 from .limits import Limits
@@ -74,7 +75,7 @@ def reachable(
         As `Inverse`.
     """
     y = samples(wanted, "displacement")
-    state = start or model.at(model.sample_period).rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
+    state = start or settled_start(model, limits)
     limits = limits.resolved
     limited = Inverse(model, limits, band=band, approximate=approximate)
     free = Inverse(model, Limits(resolution=limits.resolution), band=band, approximate=approximate)
@@ -161,9 +162,8 @@ def _nearest(
 
     def led(path: Array) -> Array:
         """The path, with an approach from the present position of the stage."""
-        lead = max(1, round(0.05 / model.sample_period))
-        rise = 0.5 - 0.5 * np.cos(np.pi * np.arange(lead) / lead)
-        return np.concatenate((at_start + (path[0] - at_start) * rise, path))
+        way = smooth_way(at_start, float(path[0]), round(APPROACH / model.sample_period))
+        return np.concatenate((way, path))
 
     most = span or model.displacement_scale
     shifts = [_smallest(lambda c, s=s: is_whole(led(y + s * c)), most) for s in (1, -1)]  # type: ignore[misc]

@@ -68,7 +68,7 @@ class NonlinearPart:
         drive[[r.PER_VOLT, r.LEAD]] = 1.0
         drive[[r.LOWER, r.UPPER, r.REACH]] = -np.inf, np.inf, np.inf
         drive[[r.LOWEST, r.HIGHEST]] = limits.voltage_min, limits.voltage_max
-        drive[[r.STEP, r.RESOLUTION]] = limits.max_slew_rate * sample_period, limits.resolution
+        drive[[r.STEP, r.RESOLUTION]] = limits.max_slew_rate * sample_period, limits.resolution or 0.0
         for name, value in (item for t in terms for item in t.drive.items()):
             drive[r.DRIVE.index(name)] = value
         hysteresis = next((t for t in terms if t.is_hysteresis), InverseTerms(polynomial={"p2": 1.0}))

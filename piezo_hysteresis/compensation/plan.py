@@ -26,6 +26,7 @@ from ..errors import ModelError
 from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
+from .approach import APPROACH, settled_start, smooth_way
 from .band import Band
 from .expected_error import ExpectedError, free_run_error, parameter_error
 from .inverse import Inverse
@@ -95,11 +96,6 @@ class Plan:
         return float(np.ptp(self.wanted))
 
 
-def smooth_way(begin: float, end: float, count: int) -> Array:
-    """Smooth transition between two levels, shape (count,); the first sample is `begin`."""
-    return np.asarray(begin + (end - begin) * (0.5 - 0.5 * np.cos(np.pi * np.arange(count) / max(count, 1))))
-
-
 def _way_back(last: float, rest: float, duration: float, limits: Limits, period: float) -> Array:
     """Drive from `last` to `rest` [V] inside the slew limit, shape (k,), without the first; empty for no duration."""
     if duration == 0.0:
@@ -115,7 +111,7 @@ def plan(
     limits: Limits,
     *,
     start: ChainState | None = None,
-    approach: float = 0.05,
+    approach: float = APPROACH,
     way_back: float = 0.0,
     band: Band | None = None,
     approximate: bool = False,
@@ -151,7 +147,7 @@ def plan(
     for name, duration in (("approach", approach), ("way_back", way_back)):
         if not duration >= 0.0:
             raise ModelError(f"{name}: got {duration!r} s, expected zero or more")
-    state = start or model.at(model.sample_period).rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
+    state = start or settled_start(model, limits)
     band = band or Band.of(model.sample_period)
     at = float(model.run([state.inputs[0]], state)[0][0])
     way = smooth_way(at, float(y[0]), round(approach / model.sample_period))

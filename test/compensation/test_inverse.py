@@ -24,7 +24,7 @@ import pytest
 from piezo_hysteresis.blocks.inverses.factors import factors, preview_taps, zero_phase_taps
 from piezo_hysteresis.blocks.inverses.linear_inverse import LinearInverse
 from piezo_hysteresis.compensation import Band, Inverse, Limits, plan
-from piezo_hysteresis.compensation.plan import smooth_way
+from piezo_hysteresis.compensation.approach import smooth_way
 from piezo_hysteresis.effects import AmplifierBandwidth, Arx, Backlash, BoucWen, Creep, ExtraResonance, HysteresisMemory
 from piezo_hysteresis.errors import ModelError, StageError
 from piezo_hysteresis.model.model import Model
@@ -135,6 +135,8 @@ def test_invalid_values_are_refused() -> None:
         Inverse(Model((BoucWen(p2=0.0), ARX), PERIOD))
     with pytest.raises(StageError, match="minimum below"):
         Limits(1.0, 0.0)
+    assert Limits(0.0, 10.0).resolved.resolution == pytest.approx(5e-4)
+    assert Limits(0.0, 10.0, resolution=0.0).resolved.resolution == 0.0
     with pytest.raises(StageError, match="slew"):
         Limits(max_slew_rate=0.0)
     with pytest.raises(StageError, match="resolution"):

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ...channel_mapping import quantity_of
 from ...identification.fit.form_uncertainty import ADEQUACY
 from ...identification.records.excitation_content import noise_on_motion
-from ...record import Record
+from ...record import Experiment, Record
 
 Array = NDArray[np.float64]
 
@@ -48,16 +48,15 @@ TOP_BAND = 0.7
 
 def stroke(records: Sequence[Record]) -> float:
     """Range of the displacement over all records [m], to which all percentages refer."""
-    low = min(float(r.displacement.min()) for r in records)
-    return max(float(r.displacement.max()) for r in records) - low
+    return Experiment(tuple(records)).range
 
 
 def white_noise(record: Record) -> float:
     """RMS of the white noise of a record [m], from the median of its spectrum near the Nyquist frequency."""
     if record.size < 32:
         return float(np.std(np.diff(record.displacement)) / np.sqrt(2.0))
-    third = np.diff(record.displacement, 2)
-    _, density = scipy.signal.periodogram(third, window=scipy.signal.windows.hann(third.size), detrend=False)
+    second = np.diff(record.displacement, 2)
+    _, density = scipy.signal.periodogram(second, window=scipy.signal.windows.hann(second.size), detrend=False)
     frequency = np.linspace(0.0, np.pi, density.size)
     response = (2.0 * np.sin(frequency / 2.0)) ** 4
     top = slice(int(TOP_BAND * density.size), -1)
