@@ -19,14 +19,17 @@ Exit status: 0 done (also for every verdict of ``piezo diagnose``), 1 not conver
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
-from collections.abc import Sequence
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import IdentificationError, PiezoError, printable
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
 
 COMMANDS = {
     "stage": {
@@ -89,6 +92,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
+    import argparse  # nothing slow is imported before `main` can report an interrupt
+
     parser = argparse.ArgumentParser(
         prog="piezo",
         description="Identify models of piezo stages, check them, and find missing physical effects.",

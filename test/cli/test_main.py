@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
 
@@ -24,7 +26,7 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis import recording
-from piezo_hysteresis.cli.main import COMMANDS
+from piezo_hysteresis.cli.main import COMMANDS, INTERRUPTED
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model import model_file
 from piezo_hysteresis.model.model import Model
@@ -51,6 +53,17 @@ def test_every_command_explains_itself(piezo, command):
     done = piezo(command, "--help")
     assert done.status == 0
     assert done.out.startswith(f"usage: piezo {command}")
+
+
+def test_an_interrupt_while_a_command_loads_is_reported_in_one_line():
+    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "effects"]
+    listing = {**os.environ, "PYTHONPROFILEIMPORTTIME": "1"}
+    loading = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=listing)
+    assert any("argparse" in line for line in loading.stderr)  # the first import of the command, others follow
+    loading.send_signal(signal.SIGINT)
+    _, after = loading.communicate(timeout=60.0)
+    assert [line for line in after.splitlines() if not line.startswith("import time")] == ["piezo: interrupted"]
+    assert loading.returncode == INTERRUPTED
 
 
 def test_a_closed_output_pipe_is_not_an_error():

@@ -86,7 +86,7 @@ def test_a_stage_that_changes_is_reported_with_its_group(lab, tmp_path):
     lab.wait(lambda: any("no baseline" in s.message for s in list(reported)), "a first status")
     lab.wait(lambda: stage.play(0.5) or any(s.hardware_id for s in list(reported)), "a prediction")
 
-    assert lab.call(Trigger, "model_node/baseline").success
+    lab.wait(lambda: stage.play(0.5) or lab.call(Trigger, "model_node/baseline").success, "an accepted baseline")
     stage.play(22.0)
     lab.wait(lambda: stage.play(0.5) or any("no change" in s.message for s in list(reported)), "a baseline")
     assert list(tmp_path.glob("baseline_*.npz"))
@@ -152,7 +152,7 @@ def test_after_an_alarm_the_group_is_recalibrated_and_the_residual_is_back(lab, 
     lab.wait(lambda: lab.node.count_subscribers("recalibrated_model") > 0, "the identification node")
     lab.wait(lambda: stage.play(0.5) or any(s.hardware_id for s in list(reported)), "a prediction")
     assert "nothing to recalibrate" in refused(lab) or "no baseline" in refused(lab)
-    assert lab.call(Trigger, "model_node/baseline").success
+    lab.wait(lambda: stage.play(0.5) or lab.call(Trigger, "model_node/baseline").success, "an accepted baseline")
     lab.wait(lambda: stage.play(0.5) or any("no change" in s.message for s in list(reported)), "a baseline")
     assert "nothing to recalibrate" in refused(lab)
     stage.play(4.0)
@@ -194,7 +194,7 @@ def test_a_change_of_shape_needs_a_full_identification(lab, tmp_path):
     stage = Stage(lab)
     lab.wait(lambda: lab.node.count_subscribers("samples") > 0, "the model node")
     lab.wait(lambda: stage.play(0.5) or any(s.hardware_id for s in list(reported)), "a prediction")
-    assert lab.call(Trigger, "model_node/baseline").success
+    lab.wait(lambda: stage.play(0.5) or lab.call(Trigger, "model_node/baseline").success, "an accepted baseline")
     lab.wait(lambda: stage.play(0.5) or any("no change" in s.message for s in list(reported)), "a baseline")
     stage.change(
         MODEL.with_values(

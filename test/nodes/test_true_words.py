@@ -17,13 +17,17 @@
 import signal
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
 
 from benchmarks.naming_cases import Case
+from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_file import save
 from piezo_hysteresis.nodes.messages.conversions import values_of
 from piezo_hysteresis.recording import read, write
 
@@ -65,7 +69,55 @@ def test_plan_of_a_driver_that_was_killed_has_no_limits(lab):
     lab.pause(3.5)
     answer = identification.ask("plan")
     assert not answer.success
-    assert answer.message.startswith("no limits")
+    assert answer.message.startswith("no limits: waiting for an answer of 'driver_node'")
+    assert identification.ask("identify").message.startswith("waiting up to 30 s for an answer of 'driver_node'")
+
+
+def test_identify_without_a_driver_answers_that_it_waits_for_one(lab):
+    identification = Identification(lab)
+    answer = identification.ask("identify")
+    assert answer.message.startswith("waiting up to 30 s for a configured 'driver_node' in /")
+    assert "; then recording to " in answer.message
+    assert identification.ask("abort").success
+
+
+def test_a_claimed_stage_is_not_identified(lab):
+    lab.driver(sample_period=PERIOD)
+    identification, claims = Identification(lab), lab.publisher(KeyValue, "claim")
+    lab.wait(lambda: identification.ask("plan").success, "the driver's limits")
+    owners = lab.listen(String, "claimed_by", EVERY)
+    lab.wait(
+        lambda: claims.publish(KeyValue(key="me", value="claim")) or (owners and owners[-1].data == "me"), "the claim"
+    )
+    lab.wait(lambda: "claimed by me" in identification.ask("identify").message, "the refusal")
+    assert not identification.ask("identify").success
+
+
+def test_a_recording_that_is_not_there_is_not_diagnosed(lab):
+    identification = Identification(lab, experiment=str(lab.folder / "nowhere"))
+    answer = identification.ask("diagnose")
+    assert not answer.success
+    assert answer.message == f"no experiment {lab.folder / 'nowhere'}; set 'experiment', or identify first"
+
+
+def test_services_that_need_samples_refuse_after_the_driver_has_died(lab):
+    driver = lab.driver(sample_period=PERIOD)
+    save(Model((BoucWen(), Arx()), PERIOD), lab.folder / "model.yaml")
+    model = {"model_file": str(lab.folder / "model.yaml")}
+    lab.start("model_node", baseline_folder=str(lab.folder), **model)
+    lab.start("compensation_node", **model)
+    lab.wait(lambda: lab.call(Trigger, "model_node/baseline").success, "a prediction")
+    lab.wait(lambda: "no trajectory" in lab.call(Trigger, "compensation_node/learn").message, "the driver")
+    driver.signal(signal.SIGKILL)
+    driver.wait()
+    lab.pause(3.5)
+    for service, reason in (
+        ("model_node/baseline", "no prediction: start the driver"),
+        ("compensation_node/learn", "no driver: waiting for an answer"),
+    ):
+        answer = lab.call(Trigger, service)
+        assert not answer.success
+        assert answer.message.startswith(reason)
 
 
 def test_every_phase_is_logged_and_reported_to_late_subscribers(lab):

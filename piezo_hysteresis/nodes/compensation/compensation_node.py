@@ -28,7 +28,7 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from ...compensation import Limits
-from ...errors import ModelError, PiezoError, StageError, printable, reason_of
+from ...errors import ModelError, PiezoError, StageError, reason_of
 from ...model.model import Model
 from ...model.model_file import load, loads
 from ...online.warmup import compile_kernels
@@ -168,10 +168,8 @@ class CompensationNode(GuardedNode):
         driver = self._driver.limits
         if driver is None or self._driver.missing:
             raise StageError(f"no driver: waiting for {self._driver.missing}")
-        if self._driver.stopped:
-            raise StageError(self._driver.stopped)
-        if self._driver.holder and not self._driver.owns:
-            raise StageError(f"the stage is claimed by {printable(self._driver.holder)}; wait until it is released")
+        if self._driver.blocked:
+            raise StageError(self._driver.blocked)
         if self._applied is None:
             raise StageError("no samples yet; is the driver active?")
         if self._model is None:

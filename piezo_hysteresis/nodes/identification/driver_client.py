@@ -32,7 +32,7 @@ from rclpy.task import Future
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
-from ...errors import PiezoError
+from ...errors import PiezoError, printable
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import ProtocolPhase
 from ..messages.conversions import values_of
@@ -119,10 +119,21 @@ class DriverClient:
         """What is missing before a phase can be sent; empty where nothing is missing."""
         if self.limits is None:
             return f"a configured '{self._driver}' in {self._node.get_namespace()}"
+        if not self.is_fresh:
+            return f"an answer of '{self._driver}', which has ended or is busy"
         if not self._command.reaches(self._driver):
             return f"a subscription of '{self._driver}' to 'command'"
         if self._newest is None:
             return "a first 'voltage'; is the driver active?"
+        return ""
+
+    @property
+    def blocked(self) -> str:
+        """Why the driver refuses commands of this client; empty where it accepts them."""
+        if self.stopped:
+            return self.stopped
+        if self.holder and not self.owns:
+            return f"the stage is claimed by {printable(self.holder)}; wait until it is released"
         return ""
 
     @property

@@ -44,7 +44,7 @@ from .fit_jobs import diagnosis, identification
 from .live_process import LiveSettings
 from .live_protocols import LiveProtocols
 from .parameter_check import ParameterCheck
-from .protocol_runner import Progress, run_protocol, run_protocols
+from .protocol_runner import PATIENCE, Progress, run_protocol, run_protocols
 from .served_model import ServedModel
 from .settings import IDENTIFICATION, PROTOCOLS
 from .status import ENDED, IdentificationStatus
@@ -100,7 +100,7 @@ class IdentificationNode(GuardedNode):
 
     def _on_plan(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._driver.limits is None or not self._driver.is_fresh:
-            response.message = f"no limits: {self._driver.missing or 'the driver does not answer any more'}"
+            response.message = f"no limits: waiting for {self._driver.missing}"
             return response
         try:
             protocol = self._planned(self._driver.limits)
@@ -115,24 +115,28 @@ class IdentificationNode(GuardedNode):
 
     def _on_drive(self, response: Trigger.Response, job: Callable[[Path], Generator[Progress]]) -> Trigger.Response:
         """Begin a job that moves the stage, unless it is already known to be impossible."""
-        if self._driver.stopped:
-            response.message = self._driver.stopped
-            return response
         path = self._folder.new()
+        message = f"recording to {path}"
+        if self._driver.missing:
+            message = f"waiting up to {PATIENCE:g} s for {self._driver.missing}; then {message}"
+        elif self._job is None and self._driver.blocked:
+            response.message = self._driver.blocked
+            return response
         if self._driver.is_fresh and self._driver.limits is not None:
             try:
                 self._planned(self._driver.limits)
             except PiezoError as error:
                 response.message = str(error)
                 return response
-        return self._begin(response, job(path), f"recording to {path}")
+        return self._begin(response, job(path), message)
 
     def _on_diagnose(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if read(self, IDENTIFICATION)["live"]:
             return self._on_drive(response, self._diagnose_live)
         path = self._folder.chosen(self._value("experiment"))
-        if path is None:
-            response.message = f"no experiment in {self._folder.root}; set 'experiment', or identify first"
+        if path is None or not path.exists():
+            where = f"in {self._folder.root}" if path is None else str(path)
+            response.message = f"no experiment {where}; set 'experiment', or identify first"
             return response
         return self._begin(response, self._fit(diagnosis, path), f"diagnosing {path}")
 

@@ -21,7 +21,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...errors import PiezoError, RecordingError, StageError, printable
+from ...errors import PiezoError, RecordingError, StageError
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import Protocol, ProtocolPhase
 from ..runtime.guarded_node import GuardedNode
@@ -193,7 +193,7 @@ def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Generat
 
 def _require_claim(driver: DriverClient) -> None:
     if driver.holder and not driver.owns:
-        raise StageError(f"the stage is claimed by {printable(driver.holder)}; wait until it is released")
+        raise StageError(driver.blocked)
     if not driver.owns:
         raise StageError("the claim on the stage has ended: this node was suspended or the driver restarted")
 

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -66,6 +68,10 @@ STRONG = 4.0
 """Ratio of the statistic to its threshold from which a change is an ERROR."""
 
 
+_LONGEST_SILENCE = 3.0
+"""Time without a prediction after which no baseline is begun [s]."""
+
+
 class ChangeReporter:
     """Follows the predictor of a model node.
 
@@ -97,7 +103,7 @@ class ChangeReporter:
         self._model: Model | None = None
         self._adopted: tuple[Model, Baseline] | None = None
         self._frame = self._problem = self._recalibration = ""
-        self._alarms = 0
+        self._alarms, self._predicted = 0, -math.inf
         self._publisher = advertise(node, "change")
         self.status = DiagnosticStatus(level=DiagnosticStatus.STALE)
         node.create_service(Trigger, "~/baseline", self._on_baseline)
@@ -107,7 +113,7 @@ class ChangeReporter:
         """Follow the samples of a block that `answer` predicts."""
         if answer.model is not None and answer.model is not self._model:
             self._follow(answer.model)
-        self._frame = block.frame
+        self._frame, self._predicted = block.frame, time.monotonic()
         stamp = block.stamp + round(float(block.time[-1]) * 1e9)
         try:
             completed = self.watch.add(np.ascontiguousarray(block.voltage), answer, predictor, stamp)
@@ -166,14 +172,14 @@ class ChangeReporter:
         self._node.get_logger().warning(problem, throttle_duration_sec=1.0)
 
     def _on_baseline(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self._model is not None
+        response.success = time.monotonic() - self._predicted < _LONGEST_SILENCE
         if response.success:
             self.watch.take_baseline(self._duration)
             response.message = (
                 f"taking the baseline over the next {self._duration:g} s; drive the stage as in normal use"
             )
         else:
-            response.message = "no prediction yet: start the driver and give a model first"
+            response.message = "no prediction: start the driver and give a model first"
         return response
 
     def _publish(self) -> None:

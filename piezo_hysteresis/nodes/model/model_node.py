@@ -178,7 +178,7 @@ class ModelNode(GuardedNode):
         else:
             self._predictor.zero()
             self._changes.restart()
-            response.message = "the offset is the mean residual of the next 0.1 s"
+            response.message = "the offset is the mean residual of the next 0.1 s of samples"
         return response
 
     def _check(self, parameters: list[RosParameter]) -> SetParametersResult:
