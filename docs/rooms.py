@@ -34,6 +34,10 @@ WIDTH, CHAIN_WIDTH, MARGIN = 1080, 680, 20
 """Width of the picture, and of the column in which the levels stand [px]."""
 ROW, GAP = 66, 12
 """Height of a level, and the space between two [px]."""
+MOST = 3
+"""Boxes side by side; the names of more would not fit into them."""
+CLOSE = 4
+"""Space between two rows of one level [px]."""
 LETTER = 6.3
 """Width of a small letter, about [px]."""
 
@@ -100,15 +104,20 @@ def picture() -> str:
     """The picture as SVG."""
     levels, beside = contract()
     top = 48
-    height = top + len(levels) * (ROW + GAP) + MARGIN
+    rows = [[level[first : first + MOST] for first in range(0, len(level), MOST)] for level in levels]
+    height = top + sum(len(level) * (ROW + CLOSE) - CLOSE + GAP for level in rows) + MARGIN
     drawn = [HEAD.format(width=WIDTH, height=height)]
     drawn.append(f'<text class="head" x="{MARGIN + 24}" y="32">Each room imports only rooms below it.</text>')
     drawn.append(f'<text class="head" x="{MARGIN + CHAIN_WIDTH + 40}" y="32">Beside the chain</text>')
     drawn.append(f'<path class="line" d="M{MARGIN + 4} {top}V{height - MARGIN - GAP}"/>')
-    for k, level in enumerate(levels):
-        width = (CHAIN_WIDTH - 24 - (len(level) - 1) * GAP) / len(level)
-        for j, name in enumerate(level):
-            drawn.append(_box(MARGIN + 24 + j * (width + GAP), top + k * (ROW + GAP), width, ROW, name, "chain"))
+    y = top
+    for level in rows:
+        for row in level:
+            width = (CHAIN_WIDTH - 24 - (len(row) - 1) * GAP) / len(row)
+            for j, name in enumerate(row):
+                drawn.append(_box(MARGIN + 24 + j * (width + GAP), y, width, ROW, name, "chain"))
+            y += ROW + CLOSE
+        y += GAP - CLOSE
     x, width = MARGIN + CHAIN_WIDTH + 40, WIDTH - CHAIN_WIDTH - 60 - MARGIN
     for k, name in enumerate(beside):
         drawn.append(_box(x, top + k * (ROW + GAP + 14), width, ROW + 14, name, "beside"))

@@ -22,6 +22,7 @@ from pathlib import Path
 
 from ...channel_mapping import quantity_of
 from ...errors import RecordingError
+from ...gcs_header import END, gcs_header, gcs_separator
 from ...record import Experiment, Notice
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
@@ -29,9 +30,6 @@ from ..table.dialect import Dialect, decoded
 from ..table.read_options import ReadOptions, is_channel
 from ..table.table import resolve, table_records
 from ..table.text_cells import BLOCK_BYTES, Cells, read_cells
-
-_END = "# END_HEADER"
-"""Last line of the header."""
 
 
 class GcsArrayFormat:
@@ -46,7 +44,7 @@ class GcsArrayFormat:
         if not path.is_file():
             return False
         with path.open("rb") as file:
-            return _END.encode() in file.read(BLOCK_BYTES // 16)
+            return f"# {END}".encode() in file.read(BLOCK_BYTES // 16)
 
     def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The array as phases, which are named by the shape of the drive unless `ReadOptions.phases` names them."""
@@ -63,8 +61,7 @@ class GcsArrayFormat:
             inferred = {"voltage": _first(titles, "volt"), "displacement": _first(titles, "position|displacement")}
             columns = {c: at for c, at in inferred.items() if at} | dict(parts[0].columns)
             places = resolve(titles, width, ReadOptions(columns=columns, sample_period=1.0)).columns
-            separator = int(header.get("SEPARATOR", "32"))
-            dialect = Dialect(None if separator in (9, 32) else chr(separator), False, skipped, (), width)
+            dialect = Dialect(gcs_separator(header), False, skipped, (), width)
             numbers = {name: at for name, (at, _) in places.items() if is_channel(name)}
             said = ", ".join(f"{name} = '{titles[at]}'" for name, at in numbers.items())
             used = Notice("columns", f"columns used: {said}; positions without a unit are taken in µm")
@@ -94,15 +91,10 @@ def _experiment(path: Path, cells: Cells, header: dict[str, str], used: Notice, 
 def _header(path: Path) -> tuple[dict[str, str], int]:
     """Keys of the header and its number of lines."""
     with path.open("rb") as file:
-        lines = decoded(file.read(BLOCK_BYTES // 16)).splitlines()
-    keys: dict[str, str] = {}
-    for number, line in enumerate(lines, 1):
-        if line.strip() == _END:
-            return keys, number
-        key, separator, value = line.lstrip("# ").partition("=")
-        if separator:
-            keys[key.strip()] = value.strip()
-    raise RecordingError(f"got no line '{_END}', expected a GCS array")
+        found = gcs_header(decoded(file.read(BLOCK_BYTES // 16)).splitlines())
+    if found is None:
+        raise RecordingError(f"got no line '# {END}', expected a GCS array")
+    return found
 
 
 def _first(titles: list[str], words: str) -> int | None:

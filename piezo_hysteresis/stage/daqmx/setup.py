@@ -104,7 +104,7 @@ class DaqmxSetup:
     def __post_init__(self) -> None:
         for name in ("device", "output", "displacement_input"):
             if not getattr(self, name):
-                raise StageError(f"daqmx.{name}: got no name, expected one as NI MAX shows it")
+                raise StageError(f"nidaqmx.{name}: got no name, expected one as NI MAX shows it")
         for name in (
             "sample_period",
             "sample_period_min",
@@ -114,7 +114,7 @@ class DaqmxSetup:
             "voltage_tolerance",
         ):
             if not getattr(self, name) > 0:
-                raise StageError(f"daqmx.{name}: got {getattr(self, name)!r}, expected more than 0")
+                raise StageError(f"nidaqmx.{name}: got {getattr(self, name)!r}, expected more than 0")
         if not 0 < self.max_slew_rate < math.inf:
             raise StageError(
                 f"nidaqmx.max_slew_rate: got {slew_text(self.max_slew_rate)}, expected the steepest drive that the "
@@ -123,9 +123,9 @@ class DaqmxSetup:
             )
         for name in ("amplifier_gain", "monitor_gain", "sensor_gain"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) != 0):
-                raise StageError(f"daqmx.{name}: got {getattr(self, name)!r}, expected a number other than 0")
+                raise StageError(f"nidaqmx.{name}: got {getattr(self, name)!r}, expected a number other than 0")
         if not 0 <= self.io_delay < 1:
-            raise StageError(f"daqmx.io_delay: got {self.io_delay!r} s, expected 0 to 1 s")
+            raise StageError(f"nidaqmx.io_delay: got {self.io_delay!r} s, expected 0 to 1 s")
 
     def description(self) -> Description:
         """Limits and scales of the stage; `latency` is that of the output buffer."""

@@ -21,11 +21,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...gcs_header import END, gcs_header, gcs_separator
 from ..description import Samples
 from .connection import Gcs2Error
-
-_END = "END_HEADER"
-"""Last line of the header."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -52,10 +50,13 @@ class ArrayAnswer:
         Gcs2Error
             Without a header, with another number of rows or columns, or with a row that holds no finite numbers.
         """
-        header, first = _header(lines)
+        found = gcs_header(lines)
+        if found is None:
+            raise Gcs2Error(f"got '{' '.join(lines)[:60]}', expected a header that ends with '# {END}'")
+        header, first = found
         if len(lines) - first != rows:
             raise Gcs2Error(f"got {len(lines) - first} rows, expected {rows}")
-        separator = _separator(header.get("SEPARATOR", "32"))
+        separator = gcs_separator(header)
         values = np.empty((rows, columns))
         for row, line in enumerate(lines[first:]):
             cells = line.split(separator)
@@ -76,21 +77,3 @@ class ArrayAnswer:
         except (KeyError, ValueError):
             return None
         return period if 0 < period < math.inf else None
-
-
-def _separator(code: str) -> str | None:
-    """The character of a code; None for white space and for invisible characters."""
-    visible = code.isascii() and code.isdecimal() and len(code) <= 3 and 32 < int(code) < 127
-    return chr(int(code)) if visible else None
-
-
-def _header(lines: list[str]) -> tuple[dict[str, str], int]:
-    header: dict[str, str] = {}
-    for number, line in enumerate(lines, 1):
-        words = line.lstrip("# ").strip()
-        if words == _END:
-            return header, number
-        key, equals, value = words.partition("=")
-        if equals:
-            header[key.strip().upper()] = value.strip()
-    raise Gcs2Error(f"got '{' '.join(lines)[:60]}', expected a header that ends with '# {_END}'")
