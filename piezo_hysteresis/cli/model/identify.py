@@ -19,7 +19,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ...effects import HYSTERESIS, MEMORY, OPERATORS, PublishedBoucWen
+from ...effects import MEMORY, OPERATORS, PublishedBoucWen
 from ...identification.identification import Identification, undetermined
 from ...identification.identify import identify
 from ...identification.records.roles import HELD_OUT
@@ -31,6 +31,7 @@ from ...report.tables.table import Table
 from ...report.words import describes, error_sentence
 from ..options import reading_options
 from ..options.destination import add_results, require_new_results
+from ..options.operator_option import add_operator
 from ..terminal import console, progress, show, show_notices
 from . import several_axes
 
@@ -51,13 +52,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--taps", metavar="N", type=int, help="several axes: length of every impulse response (default: 250)"
     )
     operator = parser.add_mutually_exclusive_group()
-    operator.add_argument(
-        "--hysteresis",
-        metavar="NAME",
-        choices=OPERATORS,
-        default=HYSTERESIS.name,
-        help=f"operator to identify: {', '.join(OPERATORS)} (default: {HYSTERESIS.name})",
-    )
+    add_operator(operator)
     operator.add_argument(
         "--published",
         dest="hysteresis",

@@ -23,7 +23,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ...effects import HYSTERESIS, OPERATORS
 from ...errors import ParameterError
 from ...fleet.attempt import RowStatus
 from ...fleet.cluster import cluster
@@ -36,6 +35,7 @@ from ...fleet.work import TASKS, work_for
 from ...model import model_file
 from ..options import reading_options
 from ..options.destination import add_force, require_new_file
+from ..options.operator_option import add_operator
 from ..terminal import console, progress
 
 TIME_LIMIT = 600.0
@@ -57,13 +57,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--task", choices=TASKS, default=TASKS[0], help=f"task (default: {TASKS[0]})")
     parser.add_argument("--model", metavar="FILE", help="model file to validate, or start of a diagnosis")
-    parser.add_argument(
-        "--hysteresis",
-        metavar="NAME",
-        choices=OPERATORS,
-        default=HYSTERESIS.name,
-        help=f"operator to identify: {', '.join(OPERATORS)} (default: {HYSTERESIS.name})",
-    )
+    add_operator(parser)
     parser.add_argument(
         "--time-limit", metavar="S", type=float, default=TIME_LIMIT, help="per recording (default: %(default)g s)"
     )

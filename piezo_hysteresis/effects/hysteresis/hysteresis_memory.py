@@ -24,13 +24,13 @@ from ...blocks.block import Array, Block, State
 from ...blocks.kernel import kernel
 from ...c_form import CForm
 from ...errors import ParameterError
-from ...inverse_terms import InverseStart, InverseTerms, PlayTerms
+from ...inverse_terms import InverseTerms, PlayTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect, Term
 from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
-from .level_dependent_memory import LevelDependentMemory, LevelDependentMemoryBlock, plays_in_c
+from .level_dependent_memory import LevelDependentMemory, LevelDependentMemoryBlock, PlaysBlock, plays_in_c
 
 SPAN = 32.0
 """Ratio of the largest to the smallest half width."""
@@ -143,13 +143,8 @@ def linearise_plays(v, dv, c, radii, plays, dplays, y, dy, own):
             dy[r, i] = slope
 
 
-class HysteresisMemoryBlock(Block):
+class HysteresisMemoryBlock(PlaysBlock):
     """Σ c_j play(v, r_j); state p (s,)."""
-
-    keeps_state = True
-
-    def __init__(self, names: tuple[str, ...], c: Array, radii: Array, virgin: float) -> None:
-        self.names, self.c, self.radii, self.virgin = names, c, radii, virgin
 
     def static(self, x0: float) -> float:
         return float(self.c @ self.rest(x0, 0.0))
@@ -157,19 +152,10 @@ class HysteresisMemoryBlock(Block):
     def static_slopes(self, x0: float) -> tuple[float, Array]:
         return float(self.c @ self._rest_slopes(x0)), self.rest(x0, 0.0)
 
-    def rest(self, x0: float, time: float) -> State:
-        return x0 - self.virgin * np.clip(x0, -self.radii, self.radii)
-
-    def _rest_slopes(self, x0: float) -> Array:
-        return np.asarray(1.0 - self.virgin * (abs(x0) < self.radii))
-
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         y, state = np.empty_like(x), state.copy()
         run_plays(x, self.c, self.radii, state, y)
         return y, state
-
-    def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.outer(dx0, self._rest_slopes(x0))
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
@@ -187,6 +173,3 @@ class HysteresisMemoryBlock(Block):
 
     def inverse_terms(self) -> InverseTerms:
         return InverseTerms(plays=PlayTerms(self.c, np.zeros(self.c.size), self.radii, self.virgin))
-
-    def inverse_start(self, x: float, state: State) -> InverseStart:
-        return InverseStart(plays=state)

@@ -126,29 +126,54 @@ def plays_in_c(value: str, c: Array, radii: Array, virgin: float, **numbers: Arr
     return CForm(step, rest, constants, (f"double p[{c.size}]",))
 
 
-class LevelDependentMemoryBlock(Block):
-    """Σ c_j (p_j + b_j p_j²), b = numbers @ by_bend; state p (s,).
+class PlaysBlock(Block):
+    """A sum over plays p_j of one input; state p (s,).
 
     Parameters
     ----------
     names : tuple of str
-        Names of the weights, then of the k numbers.
+        Names of the numbers, those of the weights first.
     c, radii : (s,) ndarray
         Weights and half widths of the plays.
     virgin : float
         State at rest: 0 for centred plays, 1 for the state after a ramp from 0 V.
+    """
+
+    keeps_state = True
+
+    def __init__(self, names: tuple[str, ...], c: Array, radii: Array, virgin: float) -> None:
+        self.names, self.c, self.radii, self.virgin = names, c, radii, virgin
+
+    def rest(self, x0: float, time: float) -> State:
+        return x0 - self.virgin * np.clip(x0, -self.radii, self.radii)
+
+    def _rest_slopes(self, x0: float) -> Array:
+        return np.asarray(1.0 - self.virgin * (abs(x0) < self.radii))
+
+    def rest_tangent(self, x0: float, dx0: Array) -> State:
+        return np.outer(dx0, self._rest_slopes(x0))
+
+    def inverse_start(self, x: float, state: State) -> InverseStart:
+        return InverseStart(plays=state)
+
+
+class LevelDependentMemoryBlock(PlaysBlock):
+    """Σ c_j (p_j + b_j p_j²), b = numbers @ by_bend; state p (s,).
+
+    Parameters
+    ----------
+    names, c, radii, virgin
+        As for `PlaysBlock`; the names of the k numbers follow those of the weights.
     numbers : (k,) ndarray
         Numbers of the bends.
     by_bend : (k, s) ndarray
         Share of each number in the bend of each play.
     """
 
-    keeps_state = True
-
     def __init__(
         self, names: tuple[str, ...], c: Array, radii: Array, virgin: float, numbers: Array, by_bend: Array
     ) -> None:
-        self.names, self.c, self.radii, self.virgin = names, c, radii, virgin
+        super().__init__(names, c, radii, virgin)
         self.by_bend, self.bends = by_bend, numbers @ by_bend
 
     def static(self, x0: float) -> float:
@@ -160,19 +185,10 @@ class LevelDependentMemoryBlock(Block):
         slope = float(self.c @ ((1.0 + 2.0 * self.bends * p) * self._rest_slopes(x0)))
         return slope, np.concatenate((p + self.bends * p * p, self.by_bend @ (self.c * p * p)))
 
-    def rest(self, x0: float, time: float) -> State:
-        return x0 - self.virgin * np.clip(x0, -self.radii, self.radii)
-
-    def _rest_slopes(self, x0: float) -> Array:
-        return np.asarray(1.0 - self.virgin * (abs(x0) < self.radii))
-
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         y, state = np.empty_like(x), state.copy()
         run_level_plays(x, self.c, self.bends, self.radii, state, y)
         return y, state
-
-    def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.outer(dx0, self._rest_slopes(x0))
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
@@ -187,6 +203,3 @@ class LevelDependentMemoryBlock(Block):
 
     def inverse_terms(self) -> InverseTerms:
         return InverseTerms(plays=PlayTerms(self.c, self.bends, self.radii, self.virgin))
-
-    def inverse_start(self, x: float, state: State) -> InverseStart:
-        return InverseStart(plays=state)

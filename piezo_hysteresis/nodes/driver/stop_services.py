@@ -24,6 +24,8 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from ..runtime.companion_node import companion_node
+
 SUFFIX = "_stop"
 """Suffix that makes the name of the stop node from the name of the driver."""
 
@@ -43,14 +45,7 @@ class StopServices:
     """
 
     def __init__(self, driver: Node, **actions: Callable[[], str]) -> None:
-        self._node = Node(
-            f"{driver.get_name()}{SUFFIX}",
-            context=driver.context,
-            namespace=driver.get_namespace(),
-            use_global_arguments=False,  # they may rename the driver
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
+        self._node = companion_node(driver, SUFFIX)
         for word, action in actions.items():
             self._node.create_service(Trigger, f"{driver.get_fully_qualified_name()}/{word}", _answering(action))
         self._executor = SingleThreadedExecutor(context=driver.context)

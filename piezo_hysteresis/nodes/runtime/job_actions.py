@@ -29,11 +29,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from ...errors import reason_of
 from ..messages.conversions import values_of
+from .companion_node import companion_node
 from .guarded_node import GuardedNode
 
 INTERFACES = "piezo_hysteresis_interfaces"
@@ -83,14 +83,7 @@ class JobActions:
         if find_spec(INTERFACES) is None:
             return
         types = import_module(f"{INTERFACES}.action")
-        self._node = Node(
-            f"{node.get_name()}{SUFFIX}",
-            context=node.context,
-            namespace=node.get_namespace(),
-            use_global_arguments=False,  # they may rename the node
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
+        self._node = companion_node(node, SUFFIX)
         for name in begin:
             kind = getattr(types, name.capitalize())
             ActionServer(
