@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ..effects import BASELINE, CATALOGUE, Arx, BoucWen, Offset
+from ..effects import BASELINE, CATALOGUE, HYSTERESIS, Arx, Offset
 from ..errors import RecordingError
 from ..model.model import Model
 from ..record import Record
@@ -43,7 +43,7 @@ def warm_up() -> None:
     """Load the compiled kernels into this process, and limit every library to one thread."""
     threadpool_limits(limits=1)
     drive = 3.0 + np.sin(np.arange(64.0))
-    base = Model((BoucWen(), Arx(a=(-1.6, 0.8), b=(0.1, 0.1), delay=3), Offset()), PERIOD)
+    base = Model((HYSTERESIS(), Arx(a=(-1.6, 0.8), b=(0.1, 0.1), delay=3), Offset()), PERIOD)
     for model in [base, *(base.with_effect(effect()) for effect in CATALOGUE if effect not in BASELINE)]:
         record = Record(drive, drive, PERIOD)
         model.simulate(record)

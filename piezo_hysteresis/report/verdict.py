@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..discrepancy.residual.residual import Errors
 from .figures.comparison import ModelComparison
 from .words import nanometre
 
@@ -59,14 +60,16 @@ def verdict(comparison: ModelComparison, answer: Mapping[str, Any] | None = None
     """
     severe = [n.message for n in comparison.experiment.notices if n.severe]
     cautions = tuple(f"Caution: {message}." for message in severe)
-    if comparison.now is None:
+    now = comparison.now
+    if now is None:
         return VerdictText(
             "The recording, without a model", (*cautions, "No model was given. Only the data are shown.")
         )
     if answer is None:
         more = "`piezo diagnose` looks for the missing effect."
-        advice = (more,) if _excess(comparison) > ENOUGH else ()
-        return VerdictText(_fit_headline(comparison), (*cautions, *_fit_sentences(comparison), *advice))
+        advice = (more,) if _excess(comparison, now) > ENOUGH else ()
+        headline = f"The model predicts this experiment to {now.percent:.2g} % of range"
+        return VerdictText(headline, (*cautions, *_fit_sentences(comparison, now), *advice))
     said = answer_verdict(answer)
     return VerdictText(said.headline, (*said.sentences, *cautions, *_per_record_sentences(comparison)))
 
@@ -76,21 +79,13 @@ def answer_verdict(answer: Mapping[str, Any]) -> VerdictText:
     return VerdictText(_headline(answer), _sentences(answer))
 
 
-def _excess(comparison: ModelComparison) -> float:
-    assert comparison.now is not None
-    ratios = [(row.rms / comparison.floors[row.index]) ** 2 for row in comparison.now.judged]
+def _excess(comparison: ModelComparison, now: Errors) -> float:
+    ratios = [(row.rms / comparison.floors[row.index]) ** 2 for row in now.judged]
     return float(sum(ratios) / len(ratios))
 
 
-def _fit_headline(comparison: ModelComparison) -> str:
-    now = comparison.now
-    assert now is not None
-    return f"The model predicts this experiment to {now.percent:.2g} % of range"
-
-
-def _fit_sentences(comparison: ModelComparison) -> tuple[str, ...]:
-    now, before = comparison.now, comparison.before
-    assert now is not None
+def _fit_sentences(comparison: ModelComparison, now: Errors) -> tuple[str, ...]:
+    before = comparison.before
     worst = max(now.judged, key=lambda row: row.rms / comparison.floors[row.index])
     floor = 100.0 * comparison.floor / now.range
     sentences = [
@@ -100,7 +95,7 @@ def _fit_sentences(comparison: ModelComparison) -> tuple[str, ...]:
     if before is not None:
         sentences.append(f"Before, it was {nanometre(before.rms)}, {before.percent:.3g} % of range.")
     sentences += _per_record_sentences(comparison)
-    if _excess(comparison) <= ENOUGH:
+    if _excess(comparison, now) <= ENOUGH:
         sentences.append("This error is at the noise floor: only noise remains.")
     else:
         times = worst.rms / comparison.floors[worst.index]

@@ -48,7 +48,18 @@ from piezo_hysteresis.parameter import Parameter
 from piezo_hysteresis.record import Experiment, Record
 
 SOURCE = Path(piezo_hysteresis.__file__).parent
-ROOMS = ("cli", "compensation", "discrepancy", "identification", "model", "nodes", "online", "report")
+ROOMS = (
+    "cli",
+    "compensation",
+    "discrepancy",
+    "export",
+    "fleet",
+    "identification",
+    "model",
+    "nodes",
+    "online",
+    "report",
+)
 ORDINARY = {"offset"}
 OTHER_MEANINGS = {("report/figures/creep.py", "creep")}  # the name of the figure
 ABOUT_ONE_OPERATOR = {

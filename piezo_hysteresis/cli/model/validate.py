@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ...discrepancy.residual.correlation import CAPTION, correlate
-from ...discrepancy.residual.residual import zero_per_phase
+from ...discrepancy.residual.residual import Errors, zero_per_phase
 from ...errors import RecordError
 from ...identification.identified_range import outside
 from ...identification.records.conditioning_split import known_from_within
@@ -65,20 +65,20 @@ def run(args: argparse.Namespace) -> int:
     experiment, conditioned = known_from_within(reading_options.read(args))
     nuisances = None if args.one_zero else {"error": zero_per_phase(model)}
     comparison = compare(experiment, {"error": model}, nuisances)
-    tests = _tests(comparison)
+    now = comparison.errors["error"]
+    tests = _tests(experiment, now)
     if args.json is not None:
-        write_json(args.json, answer(comparison, tests))
+        write_json(args.json, answer(comparison, now, tests))
     if args.figures is not None:
         _draw(comparison, Path(args.figures).expanduser())
     show(error_table(comparison), frequency_table(comparison), _test_table(tests))
     show_notices((*experiment.notices, *conditioned, *outside(model, experiment)))
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
-    assert comparison.now is not None
-    verdict = f"{error_sentence(comparison.now.percent)}{_left(tests)}{_caveats(experiment)}"
+    verdict = f"{error_sentence(now.percent)}{_left(tests)}{_caveats(experiment)}"
     console().print(f"Verdict: {verdict}", style="bold")
     severe = any(notice.severe for notice in experiment.notices)
-    return 0 if describes(comparison.now.percent) and not severe else 1
+    return 0 if describes(now.percent) and not severe else 1
 
 
 def _left(tests: list[dict[str, Any]]) -> str:
@@ -100,10 +100,8 @@ def _caveats(experiment: Experiment) -> str:
     return message + (f" The state at the start is unknown: {', '.join(unknown)}." if unknown else "")
 
 
-def answer(comparison: ModelComparison, tests: list[dict[str, Any]]) -> dict[str, Any]:
+def answer(comparison: ModelComparison, now: Errors, tests: list[dict[str, Any]]) -> dict[str, Any]:
     """The result for machines."""
-    now = comparison.now
-    assert now is not None
     return {
         "schema": 1,
         "range_m": now.range,
@@ -128,10 +126,9 @@ def answer(comparison: ModelComparison, tests: list[dict[str, Any]]) -> dict[str
     }
 
 
-def _tests(comparison: ModelComparison) -> list[dict[str, Any]]:
-    assert comparison.now is not None
+def _tests(experiment: Experiment, now: Errors) -> list[dict[str, Any]]:
     tests = []
-    for record, residual in zip(comparison.experiment, comparison.now.residuals, strict=True):
+    for record, residual in zip(experiment, now.residuals, strict=True):
         try:
             found = correlate(residual, record.voltage, record.sample_period)
         except RecordError:

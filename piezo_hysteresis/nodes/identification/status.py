@@ -60,7 +60,7 @@ class IdentificationStatus:
         self._diagnostics = advertise(node, DIAGNOSTICS)
         self.experiment = self.owner = self.goal = self.likely = ""
         self.listener: Callable[[DiagnosticStatus], None] = lambda status: None
-        self._shown: DiagnosticStatus | None = None
+        self._shown = DiagnosticStatus()
         self._logged = ("", "")
         self._show(DiagnosticStatus.OK, "idle", "nothing is under way")
         node.create_timer(1.0, self._repeat, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -68,7 +68,7 @@ class IdentificationStatus:
     @property
     def state(self) -> str:
         """The last published state."""
-        return "" if self._shown is None else values_of(self._shown)["state"]
+        return values_of(self._shown).get("state", "")
 
     def progress(self, progress: Progress) -> None:
         """Report the progress of the running job. New states and phases are also logged."""
@@ -119,5 +119,4 @@ class IdentificationStatus:
             self.listener(status)
 
     def _repeat(self) -> None:
-        assert self._shown is not None
         send(self._diagnostics, self._node.reported(self._shown))

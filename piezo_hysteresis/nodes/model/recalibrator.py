@@ -132,15 +132,15 @@ class Recalibrator:
             return response
         watch, predictor, recent = self._changes.watch, self._predictor, self._recent
         model = None if predictor is None else predictor.model
-        if predictor is None or recent is None or model is None or watch.baseline is None:
+        baseline = watch.baseline
+        if predictor is None or recent is None or model is None or baseline is None:
             response.message = "no prediction yet: start the driver and give a model first"
             return response
         minute = Minute(predictor.drive, recent.copy(), predictor.offset)
         statistic = watch.change.statistic
 
         def write(folder: Path) -> None:
-            assert watch.baseline is not None
-            write_task(folder, minute, watch.baseline, group, self._changes.interval, statistic)
+            write_task(folder, minute, baseline, group, self._changes.interval, statistic)
 
         self._fit = _Fit(write, model, predictor, predictor.offset)
         self._changes.report_recalibration(f"fitting {group}")

@@ -142,7 +142,6 @@ def compare_diagnosis(found: Diagnosis) -> ModelComparison:
     if found.baseline is not None:
         models["before"] = found.baseline
     is_named = found.change is not None or (found.selection is not None and bool(found.selection.accepted))
-    if is_named and found.model not in (None, found.baseline):
-        assert found.model is not None
+    if is_named and found.model is not None and found.model is not found.baseline:
         models["after"] = found.model
     return compare(found.experiment, models, {label: zero_per_phase(model) for label, model in models.items()})

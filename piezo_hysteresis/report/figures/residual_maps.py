@@ -21,6 +21,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ...discrepancy.residual.residual import Errors
 from ..palette import BLUE, GREY, ORANGE
 from .comparison import ModelComparison
 from .drawing import Drawing
@@ -42,7 +43,7 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
     now = comparison.now
     if now is None:
         return None
-    u, y, rate, e = (np.concatenate(parts) for parts in zip(*_samples(comparison), strict=True))
+    u, y, rate, e = (np.concatenate(parts) for parts in zip(*_samples(comparison, now), strict=True))
     limit = float(np.quantile(np.abs(e), 0.9995)) or 1e-12
     figure, axes = canvas(1, 3, 3.4, sharey=True)
     fast = max(float(np.abs(rate).max()), 1e-9)
@@ -94,11 +95,10 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
     )
 
 
-def _samples(comparison: ModelComparison) -> list[tuple[Array, Array, Array, Array]]:
-    assert comparison.now is not None
+def _samples(comparison: ModelComparison, now: Errors) -> list[tuple[Array, Array, Array, Array]]:
     parts = []
     for index in comparison.drawn():
-        record, residual = comparison.experiment[index], comparison.now.residuals[index]
+        record, residual = comparison.experiment[index], now.residuals[index]
         if record.size < 2:
             continue
         step = max(1, record.size // PER_RECORD)
