@@ -51,6 +51,8 @@ class ExtraResonance(Effect):
     Notes
     -----
     Exact for an input that is linear between samples. The start value of f0 is the peak of |E(f)|/|Y(f)|.
+    A converter holds the drive, and a delay is interpolated between samples. Both damp the fitted mode, so r is larger
+    than the share of the mode: up to 9 times at 0.45 cycles per sample.
     """
 
     name = "extra_resonance"
@@ -62,7 +64,7 @@ class ExtraResonance(Effect):
     signature = "The stage rings at one frequency after steps. The ratio of residual to response has a peak there"
     source = "modes of the structure, ζ 0.005–0.03"
     parameters = (
-        Parameter("r", "r", "1", 0.0, -2.0, 2.0, "share of the mode", "modal superposition", 0.0, 0.02),
+        Parameter("r", "r", "1", 0.0, -10.0, 10.0, "share of the mode", "modal superposition", 0.0, 0.02),
         Parameter("f0", "f0", "Hz", 500.0, 1.0, 1e5, "natural frequency", "modal superposition", scale=10.0),
         Parameter("zeta", "ζ", "1", 0.01, 1e-4, 1.0, "damping ratio", "0.005–0.03 in structures", scale=0.005),
     )
