@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -25,9 +25,10 @@ import numpy as np
 from ..effects import CATALOGUE, Effect
 from ..errors import IdentificationError, ParameterError
 from ..identification.fit.fit import Progress
+from ..identification.inputs import experiment_of
 from ..identification.one_core import on_one_core
 from ..model.model import Model
-from ..record import Experiment
+from ..record import Record
 from .changes.same_stage import UNCHANGED
 from .diagnosis import Conclusion, Diagnosis, Verdict
 from .diagnosis_state import DiagnosisState
@@ -36,7 +37,7 @@ from .passes import PASSES, subtract_explicit_steps
 
 @on_one_core
 def diagnose(
-    experiment: Experiment,
+    experiment: Record | Iterable[Record],
     model: Model | None = None,
     *,
     effects: Collection[type[Effect]] = CATALOGUE,
@@ -48,7 +49,7 @@ def diagnose(
 
     Parameters
     ----------
-    experiment : Experiment
+    experiment : Experiment, Record, or iterable of Record
         Records of any kind. More kinds, and more realisations of each kind, make the name more certain.
     model : Model, optional
         Model with which the search begins; identified from the experiment by default.
@@ -72,6 +73,8 @@ def diagnose(
     ------
     ParameterError
         If the time limit is not positive.
+    RecordError
+        If `experiment` holds no records.
     IdentificationError
         If the drive does not move in any record.
     ModelError
@@ -80,7 +83,7 @@ def diagnose(
     if not time_limit > 0.0:
         raise ParameterError(f"diagnose: got a time limit of {time_limit:g} s, expected more than 0 s")
     end = time.monotonic() + time_limit
-    state = DiagnosisState(experiment, model, effects, progress or (lambda word, fraction: None), end)
+    state = DiagnosisState(experiment_of(experiment), model, effects, progress or (lambda word, fraction: None), end)
     with np.errstate(over="ignore", invalid="ignore"):  # diverging trials have a large cost
         for run in (p for p in PASSES if explicit_step or p is not subtract_explicit_steps):
             found = run(state)

@@ -20,7 +20,7 @@ free run. G(1) is held, because only the product of the gains of hysteresis and 
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -30,13 +30,14 @@ from ..errors import IdentificationError
 from ..model.model import Model
 from ..model.provenance import provenance
 from ..model.sample_periods import identified_periods
-from ..record import Experiment, Notice
+from ..record import Notice, Record
 from .fit.fit import Fit, Progress
 from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
 from .fit.joint import fit_dynamics, fit_lag
 from .fit.normal_equations import Nuisance, residuals
 from .identification import INSEPARABLE, Identification, correlated_pairs, phase_errors, undetermined
 from .identified_range import identified_range
+from .inputs import check_gauge, experiment_of
 from .one_core import on_one_core
 from .published_steps import delay_of_steps, published_steps
 from .records.conditioning import select
@@ -63,7 +64,7 @@ HIGHEST_ORDER = 10
 
 @on_one_core
 def identify(
-    experiment: Experiment,
+    experiment: Record | Iterable[Record],
     *,
     voltage_scale: float | None = None,
     displacement_scale: float | None = None,
@@ -78,7 +79,7 @@ def identify(
 
     Parameters
     ----------
-    experiment : Experiment
+    experiment : Experiment, Record, or iterable of Record
         Records of any kind and sample period; a record that continues starts with the state of the one before.
     voltage_scale : float, optional
         v = u / voltage_scale [V]; default the largest absolute voltage.
@@ -108,7 +109,9 @@ def identify(
     IdentificationError
         If the drive does not move in any record, or a fit cannot be started.
     RecordError
-        If `held_out` names a phase that the experiment does not have.
+        If `experiment` holds no records, or `held_out` names a phase that it does not have.
+    ParameterError
+        If a scale is not positive, or `gain` is 0.
 
     Notes
     -----
@@ -117,7 +120,8 @@ def identify(
     (`with_form_uncertainty`).
     """
     report = progress or (lambda word, fraction: None)
-    experiment, conditioning_notices = known_from_within(experiment)
+    check_gauge(voltage_scale, displacement_scale, gain, hysteresis)
+    experiment, conditioning_notices = known_from_within(experiment_of(experiment))
     records = experiment.records
     roles = roles_of(experiment, held_out)
     if not any(roles.contents[i].span > 0.0 for i in roles.fitted):
@@ -130,8 +134,8 @@ def identify(
     reach = max(float(np.ptp(r.displacement)) for r in records)
     if reach == 0.0:
         raise IdentificationError("identify: the displacement never changes; expected that of a stage that is driven")
-    scale_v = voltage_scale or max(float(np.max(np.abs(r.voltage))) for r in records)
-    scale_y = displacement_scale or reach
+    scale_v = max(float(np.max(np.abs(r.voltage))) for r in records) if voltage_scale is None else voltage_scale
+    scale_y = reach if displacement_scale is None else displacement_scale
     floors = [max(c.noise, ADEQUACY * reach) for c in roles.contents]
     period = experiment.fastest_period
     notices: list[Notice] = [*experiment.notices, *conditioning_notices]
