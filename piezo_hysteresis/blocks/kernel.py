@@ -25,6 +25,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -42,6 +43,7 @@ try:
     if _IS_PLAIN:
         raise ImportError
     import numba
+    from numba.core import event
     from numba.extending import intrinsic, overload
 except ImportError:
     if not _IS_PLAIN:
@@ -55,6 +57,11 @@ except ImportError:
         return function
 
     inlined = kernel
+
+    def on_compilation(call: Callable[[], object]) -> AbstractContextManager[object]:
+        """Context in which nothing is compiled."""
+        return nullcontext()
+
 else:
 
     def kernel(function: F) -> F:
@@ -64,6 +71,24 @@ else:
     def inlined(function: F) -> F:
         """A kernel of one sample that is inlined into the loops that call it, which avoids the cost of a call."""
         return numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)(function)
+
+    class _FirstCompilation(event.Listener):  # type: ignore[misc]
+        """Calls a function when the first kernel is compiled; a kernel that is loaded from disk does not count."""
+
+        def __init__(self, call: Callable[[], object]) -> None:
+            self._call: Callable[[], object] | None = call
+
+        def on_start(self, event: object) -> None:
+            call, self._call = self._call, None
+            if call is not None:
+                call()
+
+        def on_end(self, event: object) -> None:
+            """Nothing follows."""
+
+    def on_compilation(call: Callable[[], object]) -> AbstractContextManager[object]:
+        """Context that calls a function once if a kernel is compiled in it, not only loaded from disk."""
+        return event.install_listener("numba:compile", _FirstCompilation(call))
 
     @intrinsic
     def _rounded_once(typing: Any, x: Any, y: Any, z: Any) -> Any:

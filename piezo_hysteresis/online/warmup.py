@@ -16,11 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..blocks.kernel import on_compilation
 from ..effects import BY_NAME, CHAIN
 from ..errors import PiezoError
 from ..model.chain import ChainState
@@ -109,11 +111,21 @@ class Warmup:
         self._weight += factor * (last - first)
 
 
-def compile_kernels() -> None:
+def compile_kernels(inform: Callable[[str], object] = str) -> None:
     """Run every effect once at the fast and at the slow rate, so that its kernels are compiled before a stream begins.
 
     An effect that needs a further effect (softening needs a resonance) is compiled when it is first used.
+
+    Parameters
+    ----------
+    inform : callable
+        Called with one line as soon as a kernel is really compiled; later starts only load it.
     """
+    with on_compilation(lambda: inform("compiling kernels, once; this takes about 30 s")):
+        _run_every_effect()
+
+
+def _run_every_effect() -> None:
     for kind in CHAIN:
         rows = [p for p in kind.parameters if p.off is not None and not p.is_array]
         host = (BY_NAME[kind.host](),) if kind.host else ()

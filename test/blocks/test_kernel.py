@@ -43,3 +43,27 @@ def test_numba_is_not_loaded_where_its_own_variable_switches_it_off():
     )
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     subprocess.run([sys.executable, "-W", "error", "-c", program], env=environment, check=True)
+
+
+def test_a_compilation_is_reported_once_and_loading_is_not(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(
+        """
+from piezo_hysteresis.blocks.kernel import kernel, on_compilation
+
+@kernel
+def first(x):
+    return x + 1.0
+
+@kernel
+def second(x):
+    return x + 2.0
+
+with on_compilation(lambda: print("compiling")):
+    print(first(1.0), second(1.0))
+"""
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, str(program)]
+    runs = [subprocess.run(command, env=environment, check=True, capture_output=True, text=True) for _ in range(2)]
+    assert [run.stdout for run in runs] == ["compiling\n2.0 3.0\n", "2.0 3.0\n"]

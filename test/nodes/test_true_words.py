@@ -160,6 +160,15 @@ def test_missing_simulated_time_is_reported(lab):
     assert reported()[0].level != DiagnosticStatus.OK
 
 
+def test_only_a_cold_start_reports_that_kernels_are_compiled(lab):
+    warm = lab.start("model_node")
+    lab.wait(lambda: "listening on samples" in warm.output, "the model node")
+    assert "compiling" not in warm.output
+    cold = lab.start("model_node", fresh=True, environment={"NUMBA_CACHE_DIR": str(lab.folder)})
+    lab.wait(lambda: "compiling kernels, once; this takes about 30 s" in cold.output, "the line of a cold start")
+    cold.signal(signal.SIGKILL)
+
+
 @pytest.mark.parametrize("after", [0.1, 0.4, 0.8])
 @pytest.mark.parametrize("executable", ["driver_node", "model_node", "identification_node"])
 def test_an_interrupt_while_a_node_starts_shows_no_traceback(lab, executable, after):

@@ -57,7 +57,7 @@ class CompensationNode(GuardedNode):
         super().__init__("compensation_node", **options)
         declare(self, COMPENSATION, read_only=True)
         self._values = read(self, COMPENSATION)
-        compile_kernels()
+        compile_kernels(self.get_logger().info)
         self._status = CompensationStatus(self)
         self._driver = DriverClient(self, self._values["driver"])
         self._error, self._rms = advertise(self, "tracking_error"), advertise(self, "tracking_rms")

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 import sys
-import threading
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -48,9 +47,6 @@ from .publishers import ModelTopics
 from .recalibrator import Recalibrator
 from .residual_alarm import ALARM, ResidualAlarm
 
-_COLD = 3.0
-"""A start that takes longer than this is compiling kernels, not only loading them [s]."""
-
 _SOURCE = "model node"
 """Source of the parameters of the model node."""
 
@@ -71,10 +67,7 @@ class ModelNode(GuardedNode):
         super().__init__("model_node")
         declare(self, MODEL)
         self._values = read(self, MODEL)
-        slow = threading.Timer(_COLD, lambda: self.get_logger().info("compiling kernels, once; this takes about 30 s"))
-        slow.start()
-        compile_kernels()
-        slow.cancel()
+        compile_kernels(self.get_logger().info)
         self._model: Model | None = None
         self._predictor: Predictor | None = None
         self._before: SampleBlock | None = None
