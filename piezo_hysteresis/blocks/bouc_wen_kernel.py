@@ -42,6 +42,9 @@ H_REFERENCE = 0.2
 """State h_ref at which β and γ have the same meaning for every exponent n [1]."""
 SUB_STEP = 0.01
 """Longest step of v for n ≠ 1 [1]."""
+SUB_STEP_ROUNDING = 1e-9
+"""Part of a sub-step by which a step may exceed a whole number of them: a slew limit makes steps of just that length,
+and their rounding must not decide."""
 JUMP = 0.05
 """Change of v in one sample of a slow record from which it is a jump, which takes one sample period of the model."""
 SLOWEST = 1e-4
@@ -99,6 +102,12 @@ def plain_step(h, dv, a, beta, gamma):
 
 
 @inlined
+def sub_steps(length):
+    """Number of sub-steps of a step of `length` where n ≠ 1."""
+    return max(1, int(ceil(length / SUB_STEP - SUB_STEP_ROUNDING)))
+
+
+@inlined
 def general_step(h, dv, p, sample_period, jump_period):
     """h of the loop with all terms after a step dv ≠ 0. A jump takes `jump_period`, other steps `sample_period`."""
     n, k = p[EXPONENT], p[RATE]
@@ -109,7 +118,7 @@ def general_step(h, dv, p, sample_period, jump_period):
         drive = drive * (1.0 + k * rate_factor(abs(dv) / period, p[RATE_EXPONENT]))
     steps = 1
     if n != 1.0:
-        steps = max(1, int(ceil(abs(dv) / SUB_STEP)))
+        steps = sub_steps(abs(dv))
     length = abs(dv) / steps
     for _ in range(steps):
         g = copysign(1.0, drive if h == 0.0 else h)
@@ -190,7 +199,8 @@ static double plain_step(double h, double dv, double a, double beta, double gamm
 """C function of `plain_step`."""
 GENERAL_IN_C = (
     f"""\
-static const double JUMP = {JUMP!r}, SLOWEST = {SLOWEST!r}, SUB_STEP = {SUB_STEP!r}, H_REFERENCE = {H_REFERENCE!r};
+static const double JUMP = {JUMP!r}, SLOWEST = {SLOWEST!r}, SUB_STEP = {SUB_STEP!r};
+static const double SUB_STEP_ROUNDING = {SUB_STEP_ROUNDING!r}, H_REFERENCE = {H_REFERENCE!r};
 
 """
     """\
@@ -216,7 +226,7 @@ static double general_step(double h, double dv, const double *p, double sample_p
         drive = drive * (1.0 + k * (fabs(p[7]) < 1e-9 ? rate : expm1(p[7] * rate) / p[7]));
     }
     if (n != 1.0) {
-        steps = (int)larger(1.0, ceil(length / SUB_STEP));
+        steps = (int)larger(1.0, ceil(length / SUB_STEP - SUB_STEP_ROUNDING));
     }
     length = length / steps;
     for (i = 0; i < steps; i++) {

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from math import ceil, copysign, exp, log
+from math import copysign, exp, log
 
 import numpy as np
 
@@ -32,12 +32,12 @@ from .bouc_wen_kernel import (
     RATE,
     RATE_EXPONENT,
     SLOWEST,
-    SUB_STEP,
     A,
     advance,
     crossing,
     decay,
     rate_factor,
+    sub_steps,
 )
 from .kernel import inlined, kernel
 
@@ -156,7 +156,7 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, stat
             steps = 1
             whole_step = h
             if powered:
-                steps = max(1, int(ceil(abs(dv) / SUB_STEP)))
+                steps = sub_steps(abs(dv))
                 g = copysign(1.0, drive if h == 0.0 else h)
                 bend, gm, turn = p[PHI1] * s, p[PHI2] * g, p[GAMMA] * s * g
                 whole_step = advance(h, drive, abs(dv), p[BETA] + turn - bend - gm, p[BETA] - turn - bend + gm)

@@ -187,6 +187,21 @@ def test_the_published_form_converges_to_the_exact_one() -> None:
     assert error(2000) < 0.6 * error(1000) < 0.36 * error(500)
 
 
+def test_rounding_does_not_decide_the_number_of_sub_steps() -> None:
+    """A slew limit makes steps of exactly four sub-steps, but for their rounding."""
+    block = BoucWen().block(SETTING, (HysteresisExponent(n=1.3),))
+    start, tangent = block.rest(0.2, 0.0), block.rest_tangent(0.2, np.empty(0))
+    exact, larger, sensitive = np.empty(9), np.empty(9), np.empty(9)
+    for k in range(9):
+        step = np.array([0.21, 0.21 + 0.01 * (k + 1)])
+        exact[k] = block.run(np.array([step[0], step[1] - 1e-14]), start)[0][1]
+        larger[k] = block.run(np.array([step[0], step[1] + 1e-14]), start)[0][1]
+        state = block.run(step[:1].copy(), start)[1]
+        sensitive[k] = block.linearise(step[1:] + 1e-14, np.empty((0, 1)), state, tangent)[0][0]
+    np.testing.assert_allclose(larger, exact, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(sensitive, exact, rtol=0.0, atol=1e-12)
+
+
 @pytest.mark.parametrize("kind", [BoucWen, PublishedBoucWen])
 def test_own_sensitivities_do_not_depend_on_upstream_ones_bit_for_bit(kind) -> None:
     turns = np.random.default_rng(5).normal(scale=0.3, size=40)

@@ -27,7 +27,15 @@ import pytest
 from piezo_hysteresis import __version__
 from piezo_hysteresis.blocks.block import Block
 from piezo_hysteresis.compensation import Inverse, Limits
-from piezo_hysteresis.effects import Arx, BoucWen, Creep, HysteresisMemory, Offset
+from piezo_hysteresis.effects import (
+    AmplifierSlewLimit,
+    Arx,
+    BoucWen,
+    Creep,
+    HysteresisExponent,
+    HysteresisMemory,
+    Offset,
+)
 from piezo_hysteresis.effects.sensor.sensor_nonlinearity import SensorNonlinearity, SensorNonlinearityBlock
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.export import c_program
@@ -73,6 +81,15 @@ def test_the_self_test_passes_and_notices_another_number(tmp_path):
     assert spoilt != files["piezo.c"]
     program = compiled({**files, "piezo.c": spoilt}, tmp_path)
     assert subprocess.run([program], capture_output=True, check=False).returncode == 1
+
+
+@needs_compiler
+def test_the_inverse_of_a_loop_with_exponent_passes_at_a_round_slew_limit(tmp_path):
+    effects = (BoucWen(), HysteresisExponent(n=1.3), AmplifierSlewLimit(S=2e4), Arx(a=[-1.2, 0.5], b=[0.2, 0.06]))
+    model = Model(effects, PERIOD, 10.0, 1e-5)
+    program = compiled(c_program(model, inverse=Inverse(model)), tmp_path)
+    done = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
 
 
 @needs_compiler
