@@ -61,9 +61,21 @@ class Block(ABC):
     def static_slopes(self, x0: float) -> tuple[float, Array]:
         """∂static/∂x0, and ∂static/∂θ for the own parameters, shape (p,)."""
 
+    def static_at(self, x0: float, time: float) -> float:
+        """`static` at a time [s], for the blocks after one whose factor depends on time."""
+        return self.static(x0)
+
+    def static_slopes_at(self, x0: float, time: float) -> tuple[float, Array]:
+        """`static_slopes` at a time [s]."""
+        return self.static_slopes(x0)
+
     @abstractmethod
     def rest(self, x0: float, time: float) -> State:
         """State of a stage settled at x0; `time` is that of the first sample [s]."""
+
+    def resume(self, x: float, state: State, time: float) -> State:
+        """State after one of the same block at another sample period; x is its last input, `time` the present one."""
+        return state if self.keeps_state else self.rest(x, time)
 
     @abstractmethod
     def run(self, x: Array, state: State) -> tuple[Array, State]:
@@ -183,14 +195,13 @@ class SumBlock(Block):
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         y, mapped = np.zeros_like(x), np.zeros_like(dx)
-        mine, states, tangents = [], [], []
+        mine, states, tangents = list[Array](), list[State](), list[State]()
         for member, s, t in zip(self.members, state, tangent, strict=True):
             part, dpart, s, t = member.linearise(x, dx, s, t)
             y += part
             mapped += dpart[: len(dx)]
             mine.append(dpart[len(dx) :])
-            states.append(s)
-            tangents.append(t)
+            states, tangents = [*states, s], [*tangents, t]
         return y, np.vstack((mapped, *mine)), tuple(states), tuple(tangents)
 
     def c_form(self) -> CForm | str:
@@ -246,9 +257,8 @@ class SeriesBlock(Block):
         return tuple(tangents)
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        states, tangents = [], []
+        states, tangents = list[State](), list[State]()
         for member, s, t in zip(self.members, state, tangent, strict=True):
             x, dx, s, t = member.linearise(x, dx, s, t)
-            states.append(s)
-            tangents.append(t)
+            states, tangents = [*states, s], [*tangents, t]
         return x, dx, tuple(states), tuple(tangents)

@@ -26,7 +26,13 @@ from .inverses.inverted_block import InvertedBlock
 
 
 class TimeBlock(Block):
-    """y = x + d(t; θ), or x·(…): functions of absolute time; state is (time of the record's start, samples since)."""
+    """y = x + d(t; θ), or x·(…): functions of time.
+
+    The state is (time t at which the sample period began, samples since, time of the experiment at which t = 0).
+    """
+
+    from_rest = False
+    """Whether t counts from the last rest, and not from the start of the experiment."""
 
     def __init__(self, sample_period: float) -> None:
         self.sample_period = sample_period
@@ -50,14 +56,18 @@ class TimeBlock(Block):
         return 1.0, np.zeros(len(self.names))
 
     def rest(self, x0: float, time: float) -> State:
-        return time, 0
+        return (0.0, 0, time) if self.from_rest else (time, 0, 0.0)
+
+    def resume(self, x: float, state: State, time: float) -> State:
+        origin = state[2]
+        return time - origin, 0, origin
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
         return None
 
     def _times(self, n: int, state: State) -> tuple[Array, State]:
-        start, count = state
-        return start + self.sample_period * (count + np.arange(n)), (start, count + n)
+        start, count, origin = state
+        return start + self.sample_period * (count + np.arange(n)), (start, count + n, origin)
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         t, state = self._times(x.size, state)

@@ -108,31 +108,41 @@ class Chain:
         self._factor_out, end = (last.factor, -1) if isinstance(last, ChangeOfUnit) else (1.0, None)
         self._inner = range(len(self.blocks))[begin:end]
 
-    def rest(self, voltage: float, time: float = 0.0) -> ChainState:
-        """State of a stage settled at `voltage` [V]; `time` is that of the first sample [s]."""
+    def rest(self, voltage: float, time: float = 0.0, since: float | None = None) -> ChainState:
+        """State of a stage settled at `voltage` [V].
+
+        Parameters
+        ----------
+        voltage : float
+            Drive voltage [V].
+        time : float
+            Of the first sample [s].
+        since : float, optional
+            Time since which the stage has been settled [s]; default `time`.
+        """
         states, inputs, x = [], [], float(voltage)
         for block in self.blocks:
-            states.append(block.rest(x, time))
+            state = block.rest(x, time if since is None else since)
+            states.append(state if since is None else block.resume(x, state, time))
             inputs.append(x)
-            x = block.static(x)
+            x = block.static_at(x, time)
         return ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period)
 
-    def rest_tangent(self, voltage: float, wanted: Collection[str]) -> ChainTangent:
-        """Tangent state at rest for the parameters `wanted`."""
+    def rest_tangent(self, voltage: float, wanted: Collection[str], time: float = 0.0) -> ChainTangent:
+        """Tangent state of `rest` for the parameters `wanted`."""
         states, inputs, x, dx = [], [], float(voltage), np.empty(0)
         for block in self.blocks:
             states.append(block.rest_tangent(x, dx))
             inputs.append(dx)
-            slope, own = block.static_slopes(x)
+            slope, own = block.static_slopes_at(x, time)
             dx = np.concatenate((slope * dx, own[[n in wanted for n in block.names]] if block.names else own))
-            x = block.static(x)
+            x = block.static_at(x, time)
         return ChainTangent(tuple(states), tuple(inputs))
 
     def resume(self, state: ChainState) -> ChainState:
-        """Continue from a chain at another sample period: memories keep their states, filters start settled."""
+        """Continue from a chain at another sample period: memories and clocks continue, filters start settled."""
         states = tuple(
-            s if block.keeps_state else block.rest(x, state.time)
-            for block, s, x in zip(self.blocks, state.blocks, state.inputs, strict=True)
+            block.resume(x, s, state.time) for block, s, x in zip(self.blocks, state.blocks, state.inputs, strict=True)
         )
         return ChainState(states, state.inputs, state.time, self.setting.sample_period)
 

@@ -99,7 +99,7 @@ def linearised_run(
         before, chain = chain, model.at(record.sample_period, chain.setting.sample_period if chain else None)
         if state is None or tangent is None or not record.continues:
             state = chain.rest(record.settled_voltage, record.start_time)
-            tangent = chain.rest_tangent(record.settled_voltage, wanted)
+            tangent = chain.rest_tangent(record.settled_voltage, wanted, record.start_time)
         elif before is not chain:
             tangent = chain.resume_tangent(state, tangent)
             state = chain.resume(state)

@@ -67,7 +67,7 @@ class Warmup:
         self._sum, self._weight = 0.0, 0
         rest = history.rest_voltage
         time = history.start * history.sample_period
-        self.state: ChainState = self._slow.rest(rest, time)
+        self.state: ChainState = self._slow.rest(rest, time, since=0.0)
         if zero.start < history.start:
             settled, _ = self._slow.run(np.array([rest]), self.state)
             self._add(settled, zero.start, history.start - zero.start)

@@ -16,10 +16,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from piezo_hysteresis.effects import Arx, AxisCoupling, GainDrift, MainsHum, SensorNonlinearity, ThermalDrift
+from piezo_hysteresis.effects import (
+    Arx,
+    AxisCoupling,
+    GainDrift,
+    MainsHum,
+    SensorBandwidth,
+    SensorNonlinearity,
+    ThermalDrift,
+)
 from piezo_hysteresis.effects import ThermalExpansion as Expansion
 from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.model.model import Model
@@ -54,6 +64,26 @@ def test_hum_counts_time_from_the_start_of_the_record() -> None:
     expected = 1e-8 * np.cos(2 * np.pi * 17.0 * t) + 3e-9 * np.sin(4 * np.pi * 17.0 * t)
     for start in (0.0, 123.4):
         np.testing.assert_allclose(added(hum, record(start)), expected, atol=1e-19)
+
+
+def test_a_drifted_gain_is_at_rest_at_any_time() -> None:
+    """The filter behind it starts at the level that the gain has reached."""
+    model = PLAIN.with_effect(GainDrift(g=0.05, tau=60.0)).with_effect(SensorBandwidth(tau=0.1))
+    still = Record(np.full(300, 5.0), np.zeros(300), PERIOD, start_time=1e4)
+    y, slopes = model.sensitivities(still, ["gain_drift.g", "arx.b[0]"])
+    np.testing.assert_allclose(y, y[-1], rtol=1e-12)
+    np.testing.assert_allclose(slopes["gain_drift.g"], y / 1.05, rtol=1e-9)
+    np.testing.assert_allclose(slopes["arx.b[0]"], y, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("missing", "period"), [(0, 2 * PERIOD), (3, PERIOD), (40, PERIOD)])
+def test_hum_keeps_its_phase_over_gaps_and_other_sample_periods(missing: int, period: float) -> None:
+    first = record(77.0)
+    later = replace(first, sample_period=period, start_time=77.0 + (300 + missing) * PERIOD, continues=True)
+    hum = MainsHum(f=17.3, cosine=[1e-8], sine=[3e-9])
+    measured, plain = (model.simulate([first, later])[1] for model in (PLAIN.with_effect(hum), PLAIN))
+    angle = 2 * np.pi * 17.3 * (later.time - 77.0)
+    np.testing.assert_allclose(measured - plain, 1e-8 * np.cos(angle) + 3e-9 * np.sin(angle), atol=1e-16)
 
 
 def test_hum_needs_both_parts_of_every_harmonic() -> None:

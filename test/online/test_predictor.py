@@ -22,7 +22,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from piezo_hysteresis.effects import Arx, BoucWen, Offset
+from piezo_hysteresis.effects import Arx, BoucWen, MainsHum, Offset
 from piezo_hysteresis.errors import DivergenceError, ModelError, RecordError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.online.prediction import Prediction
@@ -95,6 +95,18 @@ def test_a_model_swapped_in_mid_sine_is_right_at_once() -> None:
     cold, _ = OTHER.run(top, OTHER.rest(top[0]))
     assert np.abs(cold - measured[101_500:])[100:].min() > 0.05 * stroke
     assert np.abs(residual(before)[20_000:]).max() > 0.01 * stroke
+
+
+def test_hum_keeps_its_phase_over_a_swap() -> None:
+    """Its time counts from the first sample, also where the history of the drive begins later."""
+    model = MODEL.with_effect(MainsHum(f=51.3, cosine=[1e-7], sine=[2e-7]))
+    drive = sine(6_000, rest=2_345)
+    expected = truth(model, drive)
+    predictor = Predictor(PERIOD)
+    feed(predictor, drive[:5_000], expected[:5_000])
+    predictor.swap(model, offset=0.0)
+    predictions = np.concatenate([a.prediction for a in feed(predictor, drive[5_000:], expected[5_000:], first=5_000)])
+    np.testing.assert_allclose(predictions[-500:], expected[-500:], rtol=0.0, atol=1e-12)
 
 
 def test_models_that_come_faster_than_they_warm_up_take_over_in_turn() -> None:

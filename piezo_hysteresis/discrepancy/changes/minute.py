@@ -73,8 +73,8 @@ def _brought_up(
     """Chain, state and sensitivities of a model before sample `first` of the part of the drive stored in full."""
     fast = model.at(drive.sample_period)
     chain = model.at(drive.slow_period) if drive.slow.size else fast
-    state = chain.rest(drive.rest_voltage, drive.start_time)
-    tangent = chain.rest_tangent(drive.rest_voltage, loop)
+    state = chain.rest(drive.rest_voltage, drive.start_time, since=0.0)
+    tangent = chain.rest_tangent(drive.rest_voltage, loop, drive.start_time)
     for running, voltage in ((chain, drive.slow), (fast, drive.full[:first])):
         if running is not chain:
             state, tangent, chain = running.resume(state), running.resume_tangent(state, tangent), running

@@ -20,7 +20,7 @@ from typing import Self
 
 import numpy as np
 
-from ...blocks.block import Array, Block, State
+from ...blocks.block import Array, Block
 from ...blocks.time import TimeBlock
 from ...c_form import CForm
 from ...errors import ParameterError
@@ -116,7 +116,9 @@ return x;
 
 
 class MainsHumBlock(TimeBlock):
-    """x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)], t from the start of the record."""
+    """x + Σ_k [c_k cos(2π k f t) + s_k sin(2π k f t)], t from the start of the first of continuing records."""
+
+    from_rest = True
 
     def __init__(
         self, names: tuple[str, ...], frequency: float, cosine: Array, sine: Array, sample_period: float
@@ -124,9 +126,6 @@ class MainsHumBlock(TimeBlock):
         super().__init__(sample_period)
         self.names, self.cosine, self.sine = names, cosine, sine
         self.frequency = frequency
-
-    def rest(self, x0: float, time: float) -> State:
-        return 0.0, 0
 
     def value(self, x: Array, t: Array) -> Array:
         if not (self.cosine.any() or self.sine.any()):

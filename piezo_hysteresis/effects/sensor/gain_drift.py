@@ -85,6 +85,13 @@ class GainDriftBlock(TimeBlock):
     def value(self, x: Array, t: Array) -> Array:
         return x * self.slope(x, t)
 
+    def static_at(self, x0: float, time: float) -> float:
+        return x0 * float(self.slope(np.array([x0]), np.array([time]))[0])
+
+    def static_slopes_at(self, x0: float, time: float) -> tuple[float, Array]:
+        x, at = np.array([x0]), np.array([time])
+        return float(self.slope(x, at)[0]), self.by_parameter(x, at)[:, 0]
+
     def by_parameter(self, x: Array, t: Array) -> Array:
         return x * np.vstack((-np.expm1(-t / self.tau), -self.change * t / self.tau**2 * np.exp(-t / self.tau)))
 

@@ -128,7 +128,7 @@ class ChangeWatch:
             self.since, self._wanted = 0, 0
         self._model = model
         loop = loop_heights(model)
-        self._scores = Scores(chain, state, loop, chain.rest_tangent(voltage, loop))
+        self._scores = Scores(chain, state, loop, chain.rest_tangent(voltage, loop, state.time))
         self._watch(self.baseline, same_offset=False)
 
     def _watch(self, baseline: Baseline | None, *, same_offset: bool) -> None:
