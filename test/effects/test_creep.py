@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy import signal
+from scipy.special import gamma
 
 from piezo_hysteresis.effects import Creep, CreepExponential, CreepFractional, Discretisation, Effect
 from piezo_hysteresis.errors import ParameterError
@@ -62,6 +63,9 @@ def test_the_fractional_law_is_a_power_of_time(exponent: float) -> None:
     y = run(CreepFractional(gamma=0.02, exponent=exponent, tau_min=1e-6, tau_max=1e7), np.ones(100001), 1e-3)
     rises = [y[10 * k] - y[k] for k in (100, 1000, 10000)]
     np.testing.assert_allclose(np.log10(np.array(rises[1:]) / rises[:-1]), exponent, atol=0.01)
+    scale = 0.02 * gamma(1.0 - exponent) / (exponent * np.log(10.0))
+    expected = [scale * ((1e-2 * k) ** exponent - (1e-3 * k) ** exponent) / 0.1**exponent for k in (100, 1000, 10000)]
+    np.testing.assert_allclose(rises, expected, rtol=0.03)
 
 
 def test_exponential_creep_is_the_transfer_function_of_scipy() -> None:

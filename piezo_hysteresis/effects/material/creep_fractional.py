@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...blocks.block import Block
@@ -32,7 +34,7 @@ class CreepFractional(Creep):
     Parameters
     ----------
     gamma : float
-        Creep per decade around 0.1 s after a step, relative to the response there [1/decade].
+        Creep per decade at 0.1 s after a step, divided by Γ(1 − λ), relative to the response there [1/decade].
     exponent : float
         λ of the power law [1]; 0 is logarithmic creep.
     tau_min, tau_max : float
@@ -40,7 +42,8 @@ class CreepFractional(Creep):
 
     Notes
     -----
-    The relaxations of `Creep` with weights ∝ (τ/0.1 s)^λ.
+    The relaxations of `Creep` with weights ∝ (τ/0.1 s)^λ. Γ is the gamma function: Γ(1 − λ) is 1 for logarithmic creep,
+    0.89 for λ = −0.5 and 1.77 for λ = 0.5.
 
     Examples
     --------
@@ -57,12 +60,12 @@ class CreepFractional(Creep):
     entry = "creep"
     equation = (
         "y = w + γ Σ_j g_j (x_j − w (1 − e^(−0.1/τ_j))),  τ_j ẋ_j + x_j = w,  g_j = ½ (τ_j/0.1)^λ;  "
-        "after a step: 1 + γ ((t/0.1 s)^λ − 1)/(λ ln 10)"
+        "after a step: 1 + γ Γ(1 − λ) ((t/0.1 s)^λ − 1)/(λ ln 10)"
     )
     signature = "The residual is similar to that of logarithmic creep, but grows faster or slower than log t"
     source = "fractional creep as a bank of relaxations; Croft, Shed, Devasia 2001 for λ = 0"
     parameters = (
-        Creep.parameters[0],
+        replace(Creep.parameters[0], meaning="creep per decade at 0.1 s, divided by Γ(1 − λ)"),
         Parameter(
             "exponent",
             "λ",
