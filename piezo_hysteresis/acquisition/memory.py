@@ -21,7 +21,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..errors import StoppedError
+from ..errors import StageError, StoppedError
 from ..stage.stage import Acquired, MemoryStage
 from .playback import Playback
 from .streaming import StreamingAcquisition
@@ -34,6 +34,9 @@ class MemoryAcquisition(StreamingAcquisition):
     The index follows the clock, so that it jumps over the time in which nothing was measured; such a block is marked by
     `SampleBlock.follows_gap`.
 
+    A block that was given to the device is played to its end, and only a stop breaks it off. A set-point that arrives
+    meanwhile is approached from the voltage at the end of the block; a waveform is refused.
+
     Parameters
     ----------
     rest_period : float
@@ -45,6 +48,23 @@ class MemoryAcquisition(StreamingAcquisition):
     def __init__(self, *arguments: Any, rest_period: float, **named: Any) -> None:
         super().__init__(*arguments, **named)
         self._rest_period = rest_period
+        self._given = False
+        self._next_target: float | None = None
+
+    def ramp_to(self, voltage: float) -> None:
+        """See `Playback.ramp_to`; while the device plays a block, the ramp begins at the end of that block."""
+        with self._access:
+            self._latch.require_released("set_voltage")
+            self.playback.require_free("set_voltage")
+            if self._given:
+                self._next_target = voltage
+            else:
+                self.playback.ramp_to(voltage)
+
+    def _require_free(self, name: str) -> None:
+        super()._require_free(name)
+        if self._given:
+            raise StageError(f"{name}: the stage is on its way to another voltage; wait until it is there")
 
     def _run(self) -> None:
         cast(MemoryStage, self.stage).watch(self._is_interrupted)
@@ -89,6 +109,7 @@ class MemoryAcquisition(StreamingAcquisition):
         stage = cast(MemoryStage, self.stage)
         with self._access:
             voltage = playback.preview(count).voltage
+            self._given = True
         try:
             stage.upload(voltage)
             stage.arm()
@@ -108,10 +129,18 @@ class MemoryAcquisition(StreamingAcquisition):
             return
         with self._access:
             drive = None if self._is_interrupted() else playback.take(count)
+            if drive is not None:
+                self._continue(playback)
         if drive is None:
             self._break_off(playback)
         else:
             self._pass_on(first, drive, acquired)
+
+    def _continue(self, playback: Playback) -> None:
+        """After a block: approach the set-point that arrived meanwhile, if any."""
+        target, self._next_target, self._given = self._next_target, None, False
+        if target is not None:
+            playback.ramp_to(target)
 
     def _break_off(self, playback: Playback) -> None:
         """Let the device go to its safe voltage by itself; the samples on the way are not read."""
@@ -120,4 +149,5 @@ class MemoryAcquisition(StreamingAcquisition):
             self._keeper.require()
         with self._access:
             playback.jump(self.stage.description.safe_voltage)
+            self._next_target, self._given = None, False
         self._look(playback)

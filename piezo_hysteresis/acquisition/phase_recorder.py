@@ -26,9 +26,9 @@ from ..errors import PiezoError, StageError
 from ..record import Record
 from ..stage.stage import Samples
 from .drive import EventKind
-from .sample_block import SampleBlock
+from .sample_block import Delivery, SampleBlock
 from .session import DriverSession
-from .streaming import Delivery, StreamingAcquisition
+from .streaming import StreamingAcquisition
 
 SILENCE = 60.0
 """Time without a sample, beyond the length of the waveform, after which the recording ends with an error [s]."""

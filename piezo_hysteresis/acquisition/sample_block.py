@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`SampleBlock`: consecutive samples of a stage, and the phase that each belongs to."""
+"""`SampleBlock`: consecutive samples of a stage, and the phase of each. `Delivery`: a block with its events."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..stage.stage import Samples
+from .drive import Event
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -85,3 +86,22 @@ class SampleBlock:
     def sample_period(self) -> float | None:
         """Time between samples [s]; None for a block of one sample."""
         return float(self.time[-1] - self.time[0]) / (self.size - 1) if self.size > 1 else None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Delivery:
+    """One block and what happened in it.
+
+    Parameters
+    ----------
+    block : SampleBlock
+        The samples.
+    first : int
+        Number of the first sample, without the wrap at 2^32.
+    events : tuple of Event
+        With offsets into the block.
+    """
+
+    block: SampleBlock
+    first: int
+    events: tuple[Event, ...]

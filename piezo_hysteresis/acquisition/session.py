@@ -31,9 +31,10 @@ from .playback import Playback
 from .recorded_playback import RecordedPlayback
 from .safety.keeper_link import KeeperLink
 from .safety.stop_latch import StopLatch
+from .sample_block import Delivery
 from .settings import DriverSettings
 from .stage_lock import StageLock
-from .streaming import Delivery, Source, StreamingAcquisition
+from .streaming import Source, StreamingAcquisition
 from .time_base import TimeBase
 
 

@@ -27,35 +27,16 @@ import numpy as np
 from ..errors import PiezoError, StageError
 from ..stage.stage import Acquired, Samples, Stage, StreamingStage
 from .device_clock import DeviceClock
-from .drive import Drive, Event, Phase
+from .drive import Drive, Phase
 from .latency_buffer import LatencyBuffer
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
 from .safety.keeper_link import KeeperLink
 from .safety.stop_latch import StopLatch
-from .sample_block import SampleBlock
+from .sample_block import Delivery, SampleBlock
 from .time_base import TimeBase, read_together
 
 Source = Playback | RecordedPlayback
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Delivery:
-    """One block and what happened in it.
-
-    Parameters
-    ----------
-    block : SampleBlock
-        The samples.
-    first : int
-        Number of the first sample, without the wrap at 2^32.
-    events : tuple of Event
-        With offsets into the block.
-    """
-
-    block: SampleBlock
-    first: int
-    events: tuple[Event, ...]
 
 
 @dataclass(slots=True)
@@ -146,11 +127,15 @@ class StreamingAcquisition:
         """
         with self._access:
             self._latch.require_released(name)
-            self.playback.require_free(name)
+            self._require_free(name)
             check(waveform, self.playback.voltage)
             phase = self.playback.play(waveform, name, stamp)
             accepted(phase, waveform.size)
             return phase
+
+    def _require_free(self, name: str) -> None:
+        """Raise StageError where the waveform `name` cannot be played next."""
+        self.playback.require_free(name)
 
     def ramp_to(self, voltage: float) -> None:
         """See `Playback.ramp_to`."""

@@ -88,6 +88,21 @@ def test_a_stop_in_mid_waveform(wired, word):
     s.wait(lambda: any(e.kind is EventKind.STOPPED for d in list(s.deliveries) for e in d.events), "the report of it")
 
 
+@pytest.mark.parametrize("word", WORDS)
+def test_a_set_point_that_arrives_during_a_ramp_is_reached_without_a_step(wired, word):
+    s, _ = wired(word)
+    s.start()
+    s.wait(lambda: s.deliveries, "the stream")
+    for goals in ((5.0, 0.0), (5.0, 1.0, 3.0)):
+        for goal in goals:
+            s.acquisition.ramp_to(goal)
+            time.sleep(0.03)
+        s.wait(lambda goal=goal: s.acquisition.playback.voltage == goal, f"{goal:g} V")
+        s.wait(lambda goal=goal: abs(s.output - goal) <= SAFE_WITHIN, f"{goal:g} V at the wire")
+    assert np.abs(np.diff(s.wire)).max() <= RAMP * PERIOD + 2 * LSB
+    assert not s.failures
+
+
 def test_a_stop_during_an_upload_starts_nothing(wired):
     s, (controller, _) = wired("gcs2")
     heard, carry_out = [], controller.carry_out

@@ -31,8 +31,7 @@ from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-from piezo_hysteresis.acquisition.sample_block import SampleBlock
-from piezo_hysteresis.acquisition.streaming import Delivery
+from piezo_hysteresis.acquisition.sample_block import Delivery, SampleBlock
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.nodes.driver.publishers import DriverTopics

@@ -23,8 +23,7 @@ from rclpy.lifecycle import LifecycleNode
 from std_msgs.msg import Float64, String
 
 from ...acquisition.drive import Event, EventKind, Phase
-from ...acquisition.sample_block import SampleBlock
-from ...acquisition.streaming import Delivery
+from ...acquisition.sample_block import Delivery, SampleBlock
 from ..messages.conversions import diagnostic, live, to_stamp
 from ..messages.samples import SampleWriter
 from ..runtime.sending import is_heard, send
