@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import logging
 import os
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -72,14 +71,12 @@ def _beat_slowly(worker: Any) -> None:
     The scheduler asks for two reports a second, which cost 3 ms of processor time. It misses a worker that has ended
     at once, because the connection ends, and one that is silent after five minutes.
     """
-    callbacks, last = worker.periodic_callbacks, 0.0
+    callbacks = worker.periodic_callbacks
     asked = callbacks["heartbeat"]
 
     async def beat() -> None:
-        nonlocal last
-        if time.monotonic() - last > BEAT:
-            last = time.monotonic()
-            await worker.heartbeat()
+        await worker.heartbeat()
+        callbacks["heartbeat"].callback_time = 1e3 * BEAT  # the answer of the scheduler has set it
 
     callbacks["heartbeat"] = type(asked)(beat, asked.callback_time)
     if asked.is_running():
@@ -111,7 +108,8 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         "distributed.admin.tick.interval": "10s",
         "distributed.admin.tick.cycle": "10s",
         "distributed.admin.system-monitor.interval": "5s",
-        "distributed.worker.memory.monitor-interval": "1s",
+        "distributed.worker.memory.monitor-interval": "2s",
+        "distributed.scheduler.active-memory-manager.start": False,  # every result is one row
         "distributed.deploy.lost-worker-timeout": "120s",  # on a busy machine, the restart of a worker takes long
         "distributed.worker.profile.enabled": False,  # it samples the stack of a fit a hundred times a second
         # with this variable, every step of a fit allocates and frees arrays in the system: twice the processor time
