@@ -17,9 +17,11 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from .source import Source
 
@@ -51,12 +53,21 @@ def fetch(source: Source, stack: ExitStack) -> Path:
     name = (source.folder or source.files[0]).rstrip("/").rpartition("/")[2]
     target = copy / (name.partition("?")[0] or "recording")
     if not source.folder:
-        fs.get_file(source.files[0], str(target))
+        _copy(fs, source.files[0], target)
         return target
     target.mkdir()
     for file in source.files:
-        fs.get_file(file, str(target / file.rpartition("/")[2]))
+        _copy(fs, file, target / file.rpartition("/")[2])
     return target
+
+
+def _copy(fs: Any, file: str, target: Path) -> None:
+    """Copy a file; from S3 without asking first whether it is a folder, which takes a third of the time."""
+    if fs.protocol != "s3":
+        fs.get_file(file, str(target))
+        return
+    with fs.open(file, "rb") as content, target.open("wb") as copy:
+        shutil.copyfileobj(content, copy, BLOCK)
 
 
 def content_hash(source: Source, path: Path) -> str:
