@@ -33,12 +33,12 @@ ARGUMENTS = (
     ("namespace", "", "namespace of the axis, e.g. stage_x", None),
     ("params_file", "", "parameter file for all nodes, read after those in share/piezo_hysteresis/config", None),
     ("use_sim_time", "false", "the model node follows /clock; a driver never does", list(SWITCH)),
-    ("model_file", "", "first model of the model node; empty: it waits for the topic model", None),
+    ("model_file", "", "first model of the model and compensation node; empty: as the parameter files say", None),
     ("stage", "", f"back end of the driver: {', '.join(BACK_ENDS)}; empty: as the parameter files say",
      ["", *BACK_ENDS]),
     ("experiment", "", "recording for the back end replay, which it implies; all its phases are played", None),
     ("real_time_factor", "", "speed of a simulated or replayed stage; empty: as the parameter files say", None),
-    ("autostart", "true", "configure and activate the driver at start", list(SWITCH)),
+    ("autostart", "", "configure and activate the driver at start; empty: as the parameter files say", ["", *SWITCH]),
     ("compensation", "false", "start the compensation node, too: it follows trajectories in metres", list(SWITCH)),
     ("one_process", "false", "driver, model and identification node in one process", list(SWITCH)),
     ("page", "false", "show every axis on a page in the browser, http://127.0.0.1:5006", list(SWITCH)),
@@ -70,22 +70,23 @@ def nodes(context: LaunchContext) -> list[Node]:
             sigterm_timeout=SIGTERM_TIMEOUT,
         )
 
-    driver: dict[str, object] = {"autostart": switch("autostart", value["autostart"])}
+    driver: dict[str, object] = {}
+    if value["autostart"]:
+        driver["autostart"] = switch("autostart", value["autostart"])
     if value["experiment"]:
         driver |= {"stage": replayed(value["stage"]), "replay.experiment": value["experiment"]}
     elif value["stage"]:
         driver["stage"] = value["stage"]
     if value["real_time_factor"]:
         driver["real_time_factor"] = number("real_time_factor", value["real_time_factor"])
-    model: dict[str, object] = {"model_file": value["model_file"]} if value["model_file"] else {}
-    if switch("use_sim_time", value["use_sim_time"]):
-        model["use_sim_time"] = True
+    first: dict[str, object] = {"model_file": value["model_file"]} if value["model_file"] else {}
+    model = first | ({"use_sim_time": True} if switch("use_sim_time", value["use_sim_time"]) else {})
     if switch("one_process", value["one_process"]):
         started = [node("axis_node", "driver.yaml", **driver, **model)]
     else:
         started = [node("driver_node", "driver.yaml", **driver), node("model_node", "model.yaml", **model)]
     if switch("compensation", value["compensation"]):
-        started.append(node("compensation_node", "compensation.yaml", model_file=value["model_file"]))
+        started.append(node("compensation_node", "compensation.yaml", **first))
     if switch("page", value["page"]):
         started.append(page_node(config / "page.yaml"))
     return started

@@ -109,18 +109,31 @@ def test_unknown_words_are_refused(name, value):
         _ = [entity.visit(context) for entity in entities]
 
 
-def driver_parameters(**values):
+def parameters_of(executable, **values):
     context = launch.LaunchContext()
     stage = load("stage")
     context.launch_configurations.update({name: value for name, value, _, _ in stage.ARGUMENTS}, **values)
-    driver = next(node for node in stage.nodes(context) if node.node_executable == "driver_node")
-    return evaluate_parameters(context, driver._Node__parameters)[-1]
+    node = next(node for node in stage.nodes(context) if node.node_executable == executable)
+    return evaluate_parameters(context, node._Node__parameters)[-1]
+
+
+def driver_parameters(**values):
+    return parameters_of("driver_node", **values)
+
+
+def test_an_argument_that_is_not_given_leaves_the_parameter_files_as_they_are():
+    assert driver_parameters() == {}
+    assert parameters_of("model_node") == {}
+    assert parameters_of("compensation_node", compensation="true") == {}
+    assert driver_parameters(autostart="false") == {"autostart": False}
+    for node in ("model_node", "compensation_node"):
+        assert parameters_of(node, compensation="true", model_file="m.yaml") == {"model_file": "m.yaml"}
 
 
 def test_an_experiment_is_replayed_at_the_requested_speed():
     given = driver_parameters(experiment="/data/run 1", real_time_factor="2")
     assert given == {
-        "stage": "replay", "replay.experiment": "/data/run 1", "real_time_factor": 2.0, "autostart": True
+        "stage": "replay", "replay.experiment": "/data/run 1", "real_time_factor": 2.0
     }  # fmt: skip
     for wrong in ({"experiment": "x", "stage": "simulated"}, {"real_time_factor": "fast"}):
         with pytest.raises(ValueError, match="got"):
@@ -135,5 +148,4 @@ def test_only_the_model_node_follows_simulated_time():
     for node in stage.nodes(context):
         given[node.node_executable] = evaluate_parameters(context, node._Node__parameters)[-1]
     assert "use_sim_time" not in given["driver_node"]
-    assert given["driver_node"]["autostart"] is True
     assert given["model_node"]["use_sim_time"] is True
