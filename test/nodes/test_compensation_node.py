@@ -145,6 +145,39 @@ def test_a_displacement_is_set_and_a_slow_integral_removes_the_remaining_error(l
     assert "not reachable" in node.until("set_displacement", "refused").message
 
 
+@pytest.mark.parametrize("end", ["stop", "cancel", "kill"])
+def test_a_hold_that_the_driver_ended_is_not_resumed(lab, end):
+    node = Compensation(lab, integral_time=0.3)
+    publisher, sent = lab.publisher(Float64, "set_displacement"), lab.listen(Float64, "set_voltage")
+    publisher.publish(Float64(data=0.4 * STROKE))
+    lab.wait(lambda: node.samples.newest.voltage[-1] > 2.0 and len(sent) > 10, "the hold")
+    if end == "kill":
+        node.driver.signal(signal.SIGKILL)
+        node.driver.wait()
+        lab.driver(**DRIVER, real_time_factor=1.0)
+    else:
+        assert lab.call(Trigger, f"driver_node/{end}").success
+    assert "nothing is held any more: " in node.until("set_displacement", "stopped").message
+    if end == "stop":
+        assert lab.call(Trigger, "driver_node/release").success
+    before = len(sent)
+    lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
+    lab.pause(1.0)
+    assert len(sent) == before and abs(node.samples.newest.voltage[-1]) < 1e-3
+
+
+def test_nothing_moves_while_play_is_false(lab):
+    node = Compensation(lab, play=False)
+    node.send(scan())
+    node.until("scan", "planned")
+    lab.publisher(Float64, "set_displacement").publish(Float64(data=0.4 * STROKE))
+    assert "'play' is false" in node.until("set_displacement", "refused").message
+    answer = node.ask("learn")
+    assert not answer.success and "'play' is false" in answer.message
+    lab.pause(0.5)
+    assert np.ptp(node.samples.voltage) < 1e-3
+
+
 def test_stop_takes_the_stage_to_its_safe_voltage(lab):
     node = Compensation(lab)
     node.send(scan(duration=5.0))

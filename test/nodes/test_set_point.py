@@ -14,6 +14,8 @@
 
 """The slow integral behind a displacement that is held: what it settles to, and that it does not wind up."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -72,6 +74,46 @@ def test_what_follows_a_time_at_a_limit_does_not_depend_on_its_length(seed: int)
         assert abs(after[-1][0] - needed) < abs(at_limit[-1] - needed), "it leaves the limit at once"
         assert after[-1][-1] == pytest.approx(needed, abs=1e-6)
     assert after[0] == after[1]
+
+
+def test_the_integral_waits_until_the_stage_has_arrived() -> None:
+    driver = Driver(1e-6, 0.0)
+    point = SetPoint(driver, 0.5)
+    point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
+    for _ in range(50):
+        point.measured(0.0, 100)
+        assert not point.has_left("the stage is at 0 V"), "it is on its way"
+        point.tick(TICK)
+    assert driver.voltages == [0.0, 5.3]
+    assert not point.has_left("")
+    driver.hold(point, 1)
+    assert len(driver.voltages) == 3 and abs(driver.voltages[-1] - 5.3) < 0.2
+
+
+def test_a_stage_that_has_arrived_and_is_elsewhere_was_moved_by_something_else() -> None:
+    point = SetPoint(Driver(1e-6, 0.0), 0.5)
+    point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
+    assert not point.has_left("")
+    assert point.has_left("the stage is at 0 V") == "the stage is at 0 V"
+
+
+@pytest.mark.parametrize("reason", ["missing", "blocked"])
+def test_a_hold_ends_with_the_driver(reason) -> None:
+    driver = Driver(1e-6, 0.0)
+    point = SetPoint(driver, 0.5)
+    point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
+    client = SimpleNamespace(missing="", blocked="", misplaced=lambda voltage: "")
+    lost: list[str] = []
+    point.hold(TICK, client, lost.append)
+    assert not lost
+    setattr(client, reason, "the reason")
+    point.hold(TICK, client, lost.append)
+    setattr(client, reason, "")
+    for _ in range(10):
+        point.measured(0.0, 100)
+        point.hold(TICK, client, lost.append)
+    assert len(lost) == 1 and lost[0].endswith("the reason")
+    assert driver.voltages == [0.0, 5.3]
 
 
 def test_without_an_integral_time_nothing_is_corrected() -> None:

@@ -142,7 +142,7 @@ class CompensationNode(GuardedNode):
 
     def _on_set_displacement(self, message: Float64) -> None:
         try:
-            applied, limits = self._ready()
+            applied, limits = self._ready(moves=True)
             if not applied.is_ready:
                 raise ModelError("the new model is being run over the applied voltages; send it again in a moment")
             found = self._runs.planned(np.full(16, float(message.data)), limits, way_back=False)
@@ -151,11 +151,11 @@ class CompensationNode(GuardedNode):
         except PiezoError as error:
             self._status.refuse("set_displacement", str(error))
             return
-        slope = volts_per_metre(applied.model, limits)
-        self._set_point.go(float(message.data), float(found.voltage[-1]), slope, limits)
-        self._status.show("set", f"{1e6 * message.data:.6g} µm by {found.voltage[-1]:.6g} V", "set_displacement")
+        voltage, slope = float(found.voltage[-1]), volts_per_metre(applied.model, limits)
+        self._set_point.go(float(message.data), voltage, slope, limits)
+        self._status.show("set", f"{1e6 * message.data:.6g} µm by {voltage:.6g} V", "set_displacement")
 
-    def _ready(self) -> tuple[AppliedState, Limits]:
+    def _ready(self, moves: bool = False) -> tuple[AppliedState, Limits]:
         """The state of the model, and the limits of the driver.
 
         Raises
@@ -163,6 +163,8 @@ class CompensationNode(GuardedNode):
         PiezoError
             If something is missing, or a job is running.
         """
+        if moves and not self._values["play"]:
+            raise StageError("nothing moves, because the parameter 'play' is false")
         if self._job is not None:
             raise StageError(f"busy with '{self._phase}'; wait, or ~/stop first")
         driver = self._driver.limits
@@ -190,7 +192,7 @@ class CompensationNode(GuardedNode):
         if tracking is not None and (error := tracking.newest_error) is not None:
             send(self._error, Float64(data=error))
             send(self._rms, Float64(data=tracking.rms or 0.0))
-        self._set_point.tick(TICK)
+        self._set_point.hold(TICK, self._driver, self._status.lost)
         if self._job is None:
             return
         try:
@@ -228,7 +230,7 @@ class CompensationNode(GuardedNode):
 
     def _on_learn(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            _, limits = self._ready()
+            _, limits = self._ready(moves=True)
             if self._runs.last is None:
                 raise StageError("no trajectory yet: publish one on 'trajectory' first")
             name, found = self._runs.last

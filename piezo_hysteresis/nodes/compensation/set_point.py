@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from std_msgs.msg import Float64
 
 from ...compensation import Limits
 from ...model.model import Model
+from ..identification.driver_client import DriverClient
 from ..runtime.sending import send
 
 _INTERVAL = 0.1
@@ -40,7 +42,8 @@ class SetPoint:
     """Voltage for a displacement that is held.
 
     The integral is slow, because a fast feedback loop belongs in the controller of the stage. It stops where the
-    voltage is at a limit.
+    voltage is at a limit, and until the stage has reached the last voltage that was sent. A stage that leaves that
+    voltage afterwards is moved by something else, and the hold ends.
 
     Parameters
     ----------
@@ -56,16 +59,36 @@ class SetPoint:
         self._voltage = self._slope = self._waited = 0.0
         self._limits = Limits()
         self._sum, self._count = 0.0, 0
+        self._has_arrived = False
 
     def go(self, target: float, voltage: float, slope: float, limits: Limits) -> None:
         """Hold a displacement [m] by a voltage [V]; `slope` is that of voltage against displacement [V/m]."""
         self._target, self._voltage, self._slope, self._limits = target, voltage, slope, limits
-        self._waited, self._sum, self._count = 0.0, 0.0, 0
-        send(self._publisher, Float64(data=voltage))
+        self._send()
 
     def leave(self) -> None:
         """End the hold, because something else drives the stage."""
         self._target = None
+
+    def hold(self, elapsed: float, driver: DriverClient, lost: Callable[[str], None]) -> None:
+        """Advance by `elapsed` seconds. A driver that is stopped, gone or elsewhere ends the hold; `lost` tells why."""
+        if self._target is None:
+            return
+        why = driver.missing and f"no driver: waiting for {driver.missing}"
+        why = why or driver.blocked or self.has_left(driver.misplaced(self._voltage))
+        if why:
+            self.leave()
+            lost(why)
+        else:
+            self.tick(elapsed)
+
+    def has_left(self, misplaced: str) -> str:
+        """Reason why the hold has to end, from the reason why the stage is at another voltage; empty for both: none."""
+        if misplaced and not self._has_arrived:
+            self._waited, self._sum, self._count = 0.0, 0.0, 0  # still on the way
+            return ""
+        self._has_arrived = True
+        return misplaced
 
     def measured(self, mean: float, count: int) -> None:
         """Add the mean displacement [m] of a number of samples."""
@@ -79,7 +102,11 @@ class SetPoint:
             return
         error = self._target - self._sum / self._count
         change = self._slope * error * self._waited / self._integral_time
-        self._waited, self._sum, self._count = 0.0, 0.0, 0
         wanted = self._voltage + change
         self._voltage = float(np.clip(wanted, self._limits.voltage_min, self._limits.voltage_max))
+        self._send()
+
+    def _send(self) -> None:
+        self._waited, self._sum, self._count = 0.0, 0.0, 0
+        self._has_arrived = False
         send(self._publisher, Float64(data=self._voltage))

@@ -24,7 +24,11 @@ _SOURCE = "compensation node"
 COMPENSATION: tuple[Row, ...] = (
     Setting("model_file", "", "path of the first model; a model on the topic `model` replaces it between trajectories"),
     Setting("driver", "driver_node", "name of the driver node in the same namespace"),
-    Setting("play", True, "false: a trajectory is planned and kept for ~/plan and ~/learn, nothing moves"),
+    Setting(
+        "play",
+        True,
+        "false: a trajectory is planned for ~/plan, and nothing moves",
+    ),
     Setting("approximate", False, "leave out effects that cannot be inverted instead of refusing the model"),
     Setting("learning_rounds", 2, "corrections that ~/learn plays", lower=0, upper=100),
     Parameter(

@@ -81,6 +81,12 @@ class CompensationStatus:
         self._node.get_logger().warning(f"refused '{phase}': {reason}", throttle_duration_sec=0.1)
         self.show("refused", reason, phase, DiagnosticStatus.WARN)
 
+    def lost(self, reason: str) -> None:
+        """Report why a displacement is not held any more."""
+        message = f"nothing is held any more: {reason}"
+        self._node.get_logger().warning(message)
+        self.show("stopped", message, "set_displacement", DiagnosticStatus.WARN)
+
     def failed(self, phase: str, reason: str) -> None:
         """Report an error after the stage has moved."""
         self._node.get_logger().error(f"'{phase}': {reason}")

@@ -151,13 +151,13 @@ class DriverClient:
         return self.holder == self.owner
 
     def misplaced(self, voltage: float) -> str:
-        """Reason why a phase cannot begin at `voltage` [V]; empty where it can, or the voltage is unknown."""
+        """Where the stage is, if it is not at `voltage` [V]; empty where it is there, or its voltage is unknown."""
         if self.limits is None or self._newest is None:
             return ""
         near = max(_SAFE_WITHIN, _PLACE_TOLERANCE * (self.limits.voltage_max - self.limits.voltage_min))
         if abs(self._newest - voltage) <= near:
             return ""
-        return f"it begins at {voltage:.3g} V, and the stage is at {self._newest:.3g} V"
+        return f"the stage is at {self._newest:.3g} V instead of {voltage:.3g} V"
 
     def claim(self) -> None:
         """Claim the stage. A granted claim is renewed until it is released; a claim that has ended is not renewed."""

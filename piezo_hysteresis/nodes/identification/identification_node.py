@@ -94,7 +94,7 @@ class IdentificationNode(GuardedNode):
         self._actions.end()
         if self._job is not None:
             self._end_job()
-            asked = self._driver.stop()
+            asked = self._driver.stop() if self._driver.owns else None
             if asked is not None:
                 self.executor.spin_until_future_complete(asked, timeout_sec=2.0)
 
@@ -183,14 +183,16 @@ class IdentificationNode(GuardedNode):
     def _end_job(self) -> str:
         """End the running job. Returns a sentence about the stage and the recording."""
         job, self._job = self._job, None
+        owned = self._driver.owns
         try:
             if job is not None:
                 job.close()
         except Exception as error:
             return f"on request; {reason_of(error)}"
-        if self._moves:
+        if owned:
             return "on request; the stage goes to its safe voltage, the recording is readable"
-        return "on request; the fit was ended, the stage was left as it is"
+        ended = "nothing was played" if self._moves else "the fit was ended"
+        return f"on request; {ended}, the stage was left as it is"
 
     def _identify(self, path: Path) -> Generator[Progress]:
         planned: list[Protocol] = []

@@ -92,7 +92,7 @@ def run_protocols(node: GuardedNode, driver: DriverClient, following: Following,
     """Play protocols and record them into one bag. The generator has to be resumed at short intervals until it ends.
 
     Closing the generator aborts: the driver is asked to go to its safe voltage, and the recording is finished. A
-    failure does the same.
+    failure does the same. A stage that was not claimed by then is left to the program that drives it.
 
     Parameters
     ----------
@@ -128,7 +128,8 @@ def run_protocols(node: GuardedNode, driver: DriverClient, following: Following,
                 raise recorder.failure
             yield progress
     except BaseException as error:  # also where the generator was closed
-        driver.stop()
+        if driver.owns:
+            driver.stop()
         driver.release()
         _close_after(error, recorder)
         raise

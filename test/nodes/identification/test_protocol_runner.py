@@ -19,6 +19,8 @@ import time
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import KeyValue
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from piezo_hysteresis.errors import StageError
@@ -26,6 +28,7 @@ from piezo_hysteresis.identification.protocol.protocol import Protocol, Protocol
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.nodes.identification.driver_client import DriverClient
 from piezo_hysteresis.nodes.identification.protocol_runner import run_protocol
+from piezo_hysteresis.nodes.runtime.qos import LATCHED
 from piezo_hysteresis.recording import read
 from piezo_hysteresis.stage import back_ends
 from piezo_hysteresis.stage.opening import BackEnd
@@ -60,7 +63,11 @@ def begun(lab, voltage, before=lambda link: None, phases=1, first=lambda: None):
     job = run_protocol(lab.node, link, lambda limits: Protocol("long", limits, (phase,) * phases), path)
 
     def step():
-        before(link)
+        try:
+            before(link)
+        except StageError as error:
+            job.close()
+            return error
         try:
             return next(job)
         except (StageError, StopIteration) as error:
@@ -112,8 +119,31 @@ def test_a_stage_that_was_moved_between_two_phases_ends_the_protocol(lab, stage,
             lab.driver_node._session.streaming.ramp_to(3.0)
 
     ended_with = lab.wait(begun(lab, np.zeros(200), push, phases=2), "the end of the protocol")
-    assert "begins at 0 V, and the stage is at" in str(ended_with)
+    assert "instead of 0 V" in str(ended_with)
     assert "another program has moved the stage" in str(ended_with)
+
+
+@pytest.mark.parametrize("is_aborted", [False, True])
+def test_a_stage_that_another_program_claimed_is_left_to_it(lab, stage, is_aborted):
+    """Neither the refusal nor an abort before it ends what the owner plays."""
+
+    def claim_and_move():
+        claims, holders = lab.publisher(KeyValue, "claim"), lab.listen(String, "claimed_by", LATCHED)
+        lab.wait(claims.get_subscription_count, "the driver")
+        claims.publish(KeyValue(key="another_lab", value="claim"))
+        lab.wait(lambda: holders and holders[-1].data == "another_lab", "the claim")
+        lab.driver_node._session.streaming.ramp_to(3.0)
+        lab.wait(lambda: stage.voltage == 3.0, "the voltage of the owner")
+
+    def abort(link):
+        if is_aborted and link.holder:
+            raise StageError("aborted")
+
+    carry_on = begun(lab, np.zeros(200), abort, first=claim_and_move)
+    ended_with = lab.wait(carry_on, "the end of the protocol")
+    assert ("aborted" if is_aborted else "the stage is claimed by another_lab") in str(ended_with)
+    lab.pause(1.0)
+    assert stage.voltage == 3.0
 
 
 def test_a_protocol_does_not_begin_after_a_stop_without_release(lab, stage):
