@@ -33,19 +33,22 @@ names = st.sampled_from(["rest", "step", "sine_50hz", "my phase", 'a "b", c', "Â
 
 @st.composite
 def experiments(draw, periods=periods, names=names):
+    """Records that begin anew, follow without a gap, or follow after a hold or lost samples."""
     records = []
     end = 0.0
     for k in range(draw(st.integers(1, 3))):
-        n = draw(st.integers(1, 30))
+        n, period = draw(st.integers(1, 30)), draw(periods)
         follows = bool(records) and draw(st.booleans())
+        silent = draw(st.integers(0, 1000)) * period if follows else draw(st.floats(0.0, 100.0))
         records.append(
             Record(
                 draw(arrays(float, n, elements=numbers)),
                 draw(arrays(float, n, elements=numbers)),
-                draw(periods),
+                period,
                 phase=draw(names),
-                start_time=end if follows or k == 0 else end + draw(st.floats(0.0, 100.0)),
+                start_time=end + (silent if k else 0.0),
                 continues=follows,
+                truncated=follows and silent > 0.0 and draw(st.booleans()),
                 initial_voltage=None if follows else draw(st.none() | numbers),
             )
         )
@@ -85,6 +88,7 @@ def test_a_written_bag_reads_back_exactly(experiment):
         got = read(path)
     assert_same(got, experiment, but=("initial_voltage", "start_time", "sample_period"))
     for a, b in zip(got, experiment, strict=True):
+        assert a.start_time == pytest.approx(b.start_time, abs=2.01 * max(r.sample_period for r in experiment))
         assert b.continues or a.initial_voltage == b.settled_voltage
 
 
@@ -116,6 +120,29 @@ def test_optional_channels_and_flags_come_back(tmp_path, name):
             np.testing.assert_array_equal(a.channels[name], values)
         np.testing.assert_array_equal(a.channels["other_displacement"], b.channels["other_displacement"])
         np.testing.assert_array_equal(a.channels["temperature"], b.channels["temperature"])
+
+
+@pytest.mark.parametrize("period", [1e-3, 2e-3])
+def test_a_bag_keeps_holds_lost_samples_and_unknown_states(tmp_path, period):
+    u = np.linspace(0.0, 5.0, 200)
+
+    def record(start, **labels):
+        return Record(u, 1e-6 * u, period if start else 1e-3, f"phase_{start:g}", start, **labels)
+
+    records = (
+        record(0.0),
+        record(60.0, continues=True),
+        record(61.0, continues=True, truncated=True),
+        record(70.0, truncated=True),
+        record(80.0, initial_voltage=2.0),
+    )
+    write(Experiment(records), tmp_path / "bag.mcap")
+    got = read(tmp_path / "bag")
+    assert_same(got, records, but=("initial_voltage", "start_time"))
+    np.testing.assert_allclose([r.start_time for r in got], [r.start_time for r in records], atol=1e-9)
+    assert [n.phase for n in got.notices if n.kind == "truncated"] == ["phase_61", "phase_70"]
+    (slow, *_) = read(tmp_path / "bag", decimate={"phase_60": 10}).named("phase_60")
+    assert (slow.size, slow.start_time, slow.truncated) == (20, pytest.approx(60.0), False)
 
 
 def test_phases_are_averaged_on_reading_on_request(tmp_path):

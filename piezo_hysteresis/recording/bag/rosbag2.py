@@ -37,6 +37,9 @@ from .sample_stream import SampleStream
 _BLOCK_DURATION = 0.01
 """Length of the messages that are written [s]."""
 
+_LONGEST_SILENCE = 2**31 - 1
+"""Largest number of samples by which the running index can jump ahead."""
+
 
 class Rosbag2:
     """rosbag2 directory, .mcap or .db3 file, as the nodes or ``ros2 bag record -a`` write them.
@@ -70,25 +73,38 @@ class Rosbag2:
         """Write the records as the driver would send them, in blocks of 10 ms, to the folder `path` without its ending.
 
         A record that does not continue the one before it is preceded by one idle sample at its settled voltage, as from
-        a driver that was started again. Other channels follow as further fields of the samples.
+        a driver that was started again; a truncated one is not. Time between records in which the drive was held is
+        written as a pause, without samples. Before a truncated record that continues, samples are missing. Other
+        channels follow as further fields of the samples.
 
         Raises
         ------
         RecordingError
-            If the folder exists or cannot be written.
+            If the folder exists or cannot be written, or a pause is longer than the running index can express.
         """
         with BagWriter(path.with_suffix("") if path.suffix == ".mcap" else path) as bag:
             bag.add_topic("/samples", TYPE)
             bag.add_topic("/phase", STRING, depth=1, transient_local=True)
-            clock_ns, index = 1_000_000_000, 0
+            clock_ns, index, end = 1_000_000_000, 0, experiment[0].start_time
             for number, record in enumerate(experiment, 1):
+                silent = max(0, round((record.start_time - end) / record.sample_period))
+                if record.continues:
+                    silent = max(silent, int(record.truncated))  # the missing samples show that its state is unknown
+                    if silent > _LONGEST_SILENCE:
+                        reason = f"begins {silent} samples after the end of the one before it, expected fewer than 2³¹"
+                        raise RecordingError(f"record {number}: {reason}; write csv or npz")
+                    index += silent
+                else:
+                    silent, index = max(0, silent - (not record.truncated)), 0  # the idle sample takes one
+                clock_ns += round(silent * record.sample_period * 1e9)
                 if not record.continues and not record.truncated:
-                    clock_ns, index = clock_ns + 1_000_000_000, 0
                     bag.write("/phase", clock_ns, PhaseNames.to_cdr(0, IDLE))
                     settled = replace(record[:1], voltage=np.array([record.settled_voltage]))
                     clock_ns, index = _write_blocks(bag, settled, 0, clock_ns, index)
                 bag.write("/phase", clock_ns, PhaseNames.to_cdr(number, record.phase))
-                clock_ns, index = _write_blocks(bag, record, number, clock_ns, index)
+                is_held = record.continues and not record.truncated and silent > 0
+                clock_ns, index = _write_blocks(bag, record, number, clock_ns, index, follows_pause=is_held)
+                end = record.start_time + record.duration
 
 
 def recorded_model(path: str | Path, *, axis: str | None = None) -> str | None:
@@ -163,7 +179,9 @@ def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[No
     return records, [*notices, *more_notices, *more]
 
 
-def _write_blocks(bag: BagWriter, record: Record, number: int, clock_ns: int, index: int) -> tuple[int, int]:
+def _write_blocks(
+    bag: BagWriter, record: Record, number: int, clock_ns: int, index: int, *, follows_pause: bool = False
+) -> tuple[int, int]:
     """Write one record; return the time and the index after it."""
     longest = max(1, round(_BLOCK_DURATION / record.sample_period))
     channels = {"voltage": record.voltage, "displacement": record.displacement, **record.channels}
@@ -176,6 +194,7 @@ def _write_blocks(bag: BagWriter, record: Record, number: int, clock_ns: int, in
             np.full(n, number, np.uint32),
             np.asarray(np.arange(n) * record.sample_period),
             (index + a + np.arange(n)).astype(np.uint32),
+            follows_pause and a == 0,
         )
         bag.write("/samples", clock_ns, block.to_cdr())
         clock_ns += round(n * record.sample_period * 1e9)

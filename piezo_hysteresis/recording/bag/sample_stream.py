@@ -49,6 +49,7 @@ class _Run:
     first: bool
     period: float
     expected: int
+    begin: int
     pieces: list[tuple[int, int, int]] = field(default_factory=list)
 
 
@@ -138,7 +139,7 @@ class SampleStream:
                 end = max(end, seconds)
                 notices.append(Notice("restart", f"the driver was started again {end:.6g} s after the first sample"))
             segments += self._cut(run, end, split_phases, notices)
-            end = segments[-1].start_time + segments[-1].size * run.period
+            end = segments[-1].end_time
         return segments, notices
 
     def _block_periods(self) -> NDArray[np.float64]:
@@ -170,10 +171,10 @@ class SampleStream:
             period = float(periods[self._block_of(a)])
             run, step = (runs[-1], _signed(int(index[a]) - runs[-1].expected)) if runs else (None, 0)
             if run is None or self._restarted(a, step, period):
-                run, step = _Run(True, period, int(index[a])), 0
+                run, step = _Run(True, period, int(index[a]), int(index[a])), 0
                 runs.append(run)
             elif abs(period / run.period - 1) > PERIOD_TOLERANCE:
-                run = _Run(False, period, run.expected)
+                run = _Run(False, period, run.expected, run.expected)
                 runs.append(run)
             start = run.expected + step
             run.pieces.append((start, a, b))
@@ -199,7 +200,8 @@ class SampleStream:
                 Notice("non_monotonic", f"{late} pieces were received out of order and were sorted by their index")
             )
         starts = [start for start, _, _ in pieces]
-        lost = [0] + [start - _end(earlier) for start, earlier in zip(starts[1:], pieces, strict=False)]
+        origin = starts[0] if run.first else min(run.begin, starts[0])
+        lost = [starts[0] - origin, *(b - _end(a) for a, b in zip(pieces, starts[1:], strict=False))]
         pausing = self._after_pause if self._marks_pauses(pieces) else set()
         offsets = [0, *accumulate(b - a for _, a, b in pieces)]
         channels = {name: _gathered(column.array(), pieces) for name, column in self._channels.items()}
@@ -216,7 +218,7 @@ class SampleStream:
                 {name: values[i:j] for name, values in channels.items()},
                 run.period,
                 int(phase[i]),
-                begin + (starts[piece] + within - starts[0]) * run.period,
+                begin + (starts[piece] + within - origin) * run.period,
                 self._received_ns[self._block_of(pieces[piece][1] + within)],
                 breaks.pop(0, 0),
                 breaks,

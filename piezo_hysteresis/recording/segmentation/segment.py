@@ -51,6 +51,12 @@ class Segment:
         """Number of samples."""
         return self.channels["voltage"].size
 
+    @property
+    def end_time(self) -> float:
+        """Time of the sample after the last one since the first one of the stream [s]."""
+        missing = sum(n for at, n in (*self.breaks.items(), *self.pauses.items()) if at)
+        return self.start_time + (self.size + missing) * self.sample_period
+
     def averaged(self, average: int) -> Segment:
         """The segment with `average` samples averaged into one, not across gaps; the incomplete rest is dropped."""
         if average == 1:
