@@ -14,6 +14,8 @@
 
 """What is written is what is read, in every format that can be written: samples to the last bit."""
 
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -143,6 +145,48 @@ def test_a_bag_keeps_holds_lost_samples_and_unknown_states(tmp_path, period):
     assert [n.phase for n in got.notices if n.kind == "truncated"] == ["phase_61", "phase_70"]
     (slow, *_) = read(tmp_path / "bag", decimate={"phase_60": 10}).named("phase_60")
     assert (slow.size, slow.start_time, slow.truncated) == (20, pytest.approx(60.0), False)
+
+
+@pytest.mark.parametrize("name", ["folder", "table.csv", "matlab.mat"])
+def test_a_channel_that_not_every_record_has_comes_back(tmp_path, name):
+    u = np.linspace(0.0, 5.0, 200)
+    warm = {"temperature": 293.0 + u}
+    records = (Record(u, u, 1e-3, "a"), Record(u, u, 1e-3, "b", 0.2, continues=True, channels=warm))
+    write(Experiment(records), tmp_path / name)
+    got = read(tmp_path / name)
+    assert_same(got, records)
+    assert not got[0].channels
+    np.testing.assert_array_equal(got[1].channels["temperature"], warm["temperature"])
+
+
+@pytest.mark.parametrize("name", ["folder", "table.csv", "matlab.mat"])
+def test_times_that_count_from_an_epoch_come_back(tmp_path, name):
+    u = np.linspace(0.0, 5.0, 200)
+    begin = 1.7e9
+    records = tuple(Record(u, u, 2e-5, f"step_{k}", begin + 0.2 * k) for k in range(3))
+    write(Experiment(records), tmp_path / name)
+    assert_same(read(tmp_path / name), records)
+
+
+@pytest.mark.parametrize("name", ["folder", "table.csv", "matlab.mat"])
+def test_what_cannot_be_written_completely_leaves_no_file(tmp_path, name):
+    u = np.linspace(0.0, 5.0, 20_000)
+    few, many = Record(u[:9], u[:9], 1e-3, "a"), Record(u, u, 1e-3, "b")
+    code = (
+        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "from piezo_hysteresis.recording import read, write\n"
+        "experiment = read(sys.argv[1])\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
+        "write(experiment, sys.argv[2])"
+    )
+    write(Experiment((few, many)), tmp_path / "whole")
+    place = tmp_path / "full" / name
+    place.parent.mkdir()
+    command = [sys.executable, "-c", code, str(tmp_path / "whole"), str(place)]
+    failed = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "RecordingError" in failed.stderr
+    assert "expected a f" in failed.stderr
+    assert not [path for path in place.parent.rglob("*") if path.is_file()]
 
 
 def test_phases_are_averaged_on_reading_on_request(tmp_path):

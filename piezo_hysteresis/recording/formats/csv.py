@@ -19,11 +19,12 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from csv import writer
+from dataclasses import replace
 from pathlib import Path
 
 from ...channel_mapping import QUANTITIES, quantity_of
 from ...errors import RecordingError
-from ...record import Experiment, Notice, Record
+from ...record import Experiment, Notice, Record, Samples
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
 from ..table.dialect import Dialect
@@ -31,6 +32,7 @@ from ..table.read_options import LABELS, ReadOptions, is_channel
 from ..table.table import Places, resolve, table_records
 from ..table.text_cells import Cells, read_cells
 from ..table.time_column import TimeColumn
+from ..whole_file import whole_file
 
 _ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
 """Ends of the names of text tables."""
@@ -47,8 +49,9 @@ class Csv:
 
     Written with the header ``time_s,voltage_V,displacement_m,phase`` and, only where the records need them, the columns
     `record` (between neighbours of one name), `continues`, `truncated`, `initial_voltage_V`, `sample_period_s`,
-    those of `Record.channels` with their unit, e.g. `other_displacement_m` and `temperature_K`. Numbers are written
-    with all digits, so that reading returns the same values.
+    those of `Record.channels` with their unit, e.g. `other_displacement_m` and `temperature_K`, whose cells are empty
+    in records without them. Numbers are written with all digits, so that reading returns the same values. Where start
+    times count from an epoch, the column `start_time` holds them, and `time_s` counts from the first one.
     """
 
     def recognises(self, path: Path) -> bool:
@@ -80,15 +83,16 @@ class Csv:
         with naming(path, "a file that can be written"):
             if path.exists():
                 raise RecordingError("exists already; choose another name")
-            labels = _labels(experiment)
-            channels = [c for c in experiment[0].channels if all(c in r.channels for r in experiment)]
-            with path.open("w", encoding="utf-8", newline="") as file:
+            origin = experiment[0].start_time if abs(experiment[0].start_time) > _EPOCH else 0.0
+            labels = _labels(experiment, origin)
+            channels = list(dict.fromkeys(c for record in experiment for c in record.channels))
+            with whole_file(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
                 titles = [f"{c}_{QUANTITIES[quantity_of(c) or c]}" for c in channels]
                 units = {"initial_voltage": "initial_voltage_V", "sample_period": "sample_period_s"}
                 titles += [units.get(name, name) for name in labels]
                 file.write(",".join(["time_s", "voltage_V", "displacement_m", *titles]) + "\n")
                 for number, record in enumerate(experiment, 1):
-                    _write_record(file, record, channels, _row_end(number, record, labels))
+                    _write_record(file, record, origin, channels, _row_end(number, record, labels))
 
 
 def _experiment(path: Path, cells: Cells, found: Places, options: ReadOptions) -> Experiment:
@@ -115,7 +119,12 @@ def _is_table(path: Path) -> bool:
         return False
 
 
-def _labels(experiment: Experiment) -> list[str]:
+def _times(record: Record, origin: float) -> Samples:
+    """Time of every sample since `origin` [s]."""
+    return replace(record, start_time=record.start_time - origin).time
+
+
+def _labels(experiment: Experiment, origin: float) -> list[str]:
     """Label columns that are needed to read the same records again."""
     labels = ["phase"]
     pairs = list(zip(experiment.records, experiment.records[1:], strict=False))
@@ -128,8 +137,10 @@ def _labels(experiment: Experiment) -> list[str]:
         labels.append("truncated")
     if any(r.initial_voltage is not None for r in experiment):
         labels.append("initial_voltage")
-    if any(r.size < 2 or TimeColumn.of(r.time).period != r.sample_period for r in experiment):
+    if any(r.size < 2 or TimeColumn.of(_times(r, origin)).period != r.sample_period for r in experiment):
         labels.append("sample_period")
+    if origin:
+        labels.append("start_time")
     return labels
 
 
@@ -141,14 +152,16 @@ def _row_end(number: int, record: Record, labels: list[str]) -> str:
         "truncated": int(record.truncated),
         "initial_voltage": "" if record.initial_voltage is None else repr(record.initial_voltage),
         "sample_period": repr(record.sample_period),
+        "start_time": repr(record.start_time),
     }
     text = io.StringIO()
     writer(text, lineterminator="").writerow([values[name] for name in labels])
     return text.getvalue().replace("\n", " ").replace("\r", " ") + "\n"
 
 
-def _write_record(file: io.TextIOBase, record: Record, channels: list[str], end: str) -> None:
-    columns = [record.time, record.voltage, record.displacement, *(record.channels[c] for c in channels)]
+def _write_record(file: io.TextIOBase, record: Record, origin: float, channels: list[str], end: str) -> None:
+    columns = [_times(record, origin), record.voltage, record.displacement, *(record.channels.get(c) for c in channels)]
     for a in range(0, record.size, _ROWS):
-        rows = zip(*(column[a : a + _ROWS].tolist() for column in columns), strict=True)
-        file.write("".join(",".join(map(repr, row)) + "," + end for row in rows))
+        size = min(_ROWS, record.size - a)
+        cells = [[""] * size if c is None else map(repr, c[a : a + size].tolist()) for c in columns]
+        file.write("".join(",".join(row) + "," + end for row in zip(*cells, strict=True)))

@@ -24,6 +24,7 @@ from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
 from ..table.read_options import LABELS, ReadOptions
+from ..whole_file import whole_file
 from .hdf5 import Hdf5Arrays, is_hdf5
 from .mat5 import Mat5Arrays
 from .records_from_arrays import records_from_arrays
@@ -79,4 +80,5 @@ class Mat:
         with naming(path, "a file that can be written"):
             if path.exists():
                 raise RecordingError("exists already; choose another name")
-            io.savemat(path, structs, oned_as="column")
+            with whole_file(path) as draft:
+                io.savemat(draft, structs, appendmat=False, oned_as="column")

@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 import zipfile
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from ..segmentation.phases import labelled
 from ..table.column_inference import inference_notice, inferred_columns, inferred_period, unit_in
 from ..table.read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from ..table.time_column import TimeColumn
+from ..whole_file import whole_file
 from .npz_members import NpzMembers
 
 _EXPECTED = "an .npz file with voltage, displacement and sample_period"
@@ -92,9 +94,12 @@ class Npz:
             path.mkdir(parents=True, exist_ok=True)
             if any(path.glob("*.npz")):
                 raise RecordingError("holds an experiment already; choose an empty folder")
-            for number, record in enumerate(experiment, 1):
-                name = re.sub(r"[^\w.+-]", "_", record.phase)
-                np.savez(path / f"{number:02d}_{name}.npz", **_keys(record))
+            with ExitStack() as written:  # they get their names together, at the end
+                for number, record in enumerate(experiment, 1):
+                    name = re.sub(r"[^\w.+-]", "_", record.phase)
+                    draft = written.enter_context(whole_file(path / f"{number:02d}_{name}.npz"))
+                    with draft.open("wb") as file:
+                        np.savez(file, **_keys(record))
 
 
 def _places(values: NpzMembers, options: ReadOptions) -> tuple[dict[str, str], dict[str, str]]:
