@@ -85,7 +85,7 @@ class DriverCommands:
 
     def _stage(self) -> tuple[DriverSession, DriverTopics]:
         if self._attached is None:
-            raise StageError("the driver is not configured; configure and activate it")
+            raise StageError("the driver is not configured and does not know its stage; configure and activate it")
         return self._attached
 
     def _on_command(self, cloud: PointCloud2) -> None:
@@ -118,7 +118,11 @@ class DriverCommands:
         """Go to the safe voltage, and forbid all motion until the stop is released."""
         self._latch.set()
         self._publish_latch()
-        return f"{self._go_to_safety(latch=True)}; nothing moves until ~/release"
+        try:
+            message = self._go_to_safety(latch=True)
+        except StageError as error:
+            message = str(error)
+        return f"{message}; nothing moves until ~/release"
 
     def _cancel(self) -> str:
         """Go to the safe voltage. The next command is accepted when the stage has reached it."""
@@ -130,12 +134,9 @@ class DriverCommands:
         return "the driver accepts commands again" if was_set else "the driver was not stopped"
 
     def _go_to_safety(self, latch: bool) -> str:
-        try:
-            session, topics = self._stage()
-            streaming = session.streaming
-            phase, was_playing = streaming.stop() if latch else streaming.cancel()
-        except StageError as error:
-            return f"{error}; it was left at its safe voltage"
+        session, topics = self._stage()
+        streaming = session.streaming
+        phase, was_playing = streaming.stop() if latch else streaming.cancel()
         if not was_playing:
             topics.stopped(phase)
         message = f"on the way to the safe voltage, {session.limits.safe_voltage:g} V"

@@ -24,6 +24,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from ...errors import PiezoError
 from ..runtime.companion_node import companion_node
 
 SUFFIX = "_stop"
@@ -70,6 +71,8 @@ def _answering(action: Callable[[], str]) -> Callable[[Trigger.Request, Trigger.
     def answer(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
             response.message, response.success = action(), True
+        except PiezoError as error:
+            response.message = str(error)
         except Exception as error:  # the thread must survive to serve the next stop
             response.message = f"fault of the driver: {error!r}"
         return response

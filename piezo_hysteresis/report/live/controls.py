@@ -64,8 +64,9 @@ CONTROLS: tuple[Control, ...] = (
     Control(
         "Diagnose",
         "identification_node/diagnose",
-        "Looks for the effect that the model is missing in the last recording. The stage does not move. "
-        "If an effect is found, the extended model replaces the present one.",
+        "Looks for the effect that the model is missing in the last recording. With the parameter live of the "
+        "identification node it moves the stage and records instead. If an effect is found, the extended model "
+        "replaces the present one.",
         kind="primary",
     ),
     Control(
