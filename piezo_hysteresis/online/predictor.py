@@ -30,7 +30,7 @@ from .prediction import Prediction
 from .running_rms import RunningRms
 from .sensor_offset import SensorOffset, samples_to_average
 from .sequence_check import LONGEST_SILENCE, SequenceCheck
-from .voltage_history import FULL_SAMPLES, DriveHistory, VoltageHistory, is_held
+from .voltage_history import FULL_SAMPLES, REST_TOLERANCE, DriveHistory, VoltageHistory, is_held
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,8 @@ class Predictor:
     -----
     Without lost samples the prediction equals ``model.run`` from rest at the first voltage, plus `offset`, bit for bit.
     Effects that depend on time count it from the first sample. A new model replaces the old one between two blocks,
-    after it has been run over the history.
+    after it has been run over the history. Without a model, a drive below 5 mV counts as noise of a stage at rest; with
+    one, the limit is 1/2000 of its voltage scale.
 
     Raises
     ------
@@ -130,6 +131,7 @@ class Predictor:
             If the model diverges on the history; the present model stays.
         """
         chain = model.at(self.sample_period)
+        self._history.tolerance = REST_TOLERANCE * model.voltage_scale
         if self._history.count == 0:
             self.chain, self.model = chain, model
             return
@@ -181,14 +183,14 @@ class Predictor:
         drive, measured = samples(voltage, "voltage"), samples(displacement, "displacement")
         if drive.size != measured.size:
             raise RecordError(f"displacement: got {measured.size} samples, expected {drive.size} as in voltage")
-        arrival = self.sequence.join(index, stamp, drive.size, follows_gap)
+        arrival = self.sequence.join(int(index), int(stamp), drive.size, follows_gap)
         drive, measured = drive[arrival.repeated :], measured[arrival.repeated :]
         modelled: Array | None = None
         if drive.size:
             if arrival.restarted:
                 if self._history.count:
                     self._begin()
-                self._joined_moving = not (settled and is_held(drive))
+                self._joined_moving = not (settled and is_held(drive, self._history.tolerance))
                 if self._joined_moving:
                     self._history.mark_unknown()
             if arrival.missing:
@@ -243,7 +245,7 @@ class Predictor:
             self._joined_moving = False
             self._zero_from(start)
             self._zero.until = 2.0 * self._history.travel  # as long again as the part that was forgotten
-        elif self._zero.at_rest and not is_held(drive):
+        elif self._zero.at_rest and not is_held(drive, self._history.tolerance):
             self._zero.close()
         self._zero.add(measured, modelled, self._history.travel)
         return modelled

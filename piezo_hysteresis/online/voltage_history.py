@@ -27,8 +27,11 @@ Array = NDArray[np.float64]
 FULL_SAMPLES = 3_000_000
 """Largest number of samples at the full rate: a minute at 50 kHz, 36 MB."""
 
-REST_TOLERANCE = 5e-3
-"""Voltages within this distance [V] count as held; it allows for the noise of a measured drive."""
+REST_TOLERANCE = 5e-4
+"""Voltages within this distance count as held [voltage scales]; it allows for the noise of a measured drive."""
+
+USUAL_SCALE = 10.0
+"""Voltage scale [V] before a model is known."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -85,6 +88,8 @@ class VoltageHistory:
         self.sample_period = sample_period
         self.factor = max(1, round(slow_period / sample_period))
         """Number of samples in one average."""
+        self.tolerance = REST_TOLERANCE * USUAL_SCALE
+        """Voltages within this distance [V] count as held."""
         self.rest_voltage = 0.0
         """Voltage [V] held before the first sample kept."""
         self.count = 0
@@ -126,13 +131,13 @@ class VoltageHistory:
     def append(self, voltage: Array) -> None:
         """Add the next samples [V], shape (n,)."""
         low, high = float(voltage.min()), float(voltage.max())
-        held = _is_level(low, high)
+        held = high - low <= 2 * self.tolerance
         if self.count == 0:
-            self.rest_voltage = float(np.median(voltage)) if held else float(voltage[0])
+            self.rest_voltage = float(voltage[0])
             self._counted = self.rest_voltage
         self.count += voltage.size
         self.has_rested |= held
-        if not self._has_moved and held and max(high - self.rest_voltage, self.rest_voltage - low) <= REST_TOLERANCE:
+        if not self._has_moved and held and max(high - self.rest_voltage, self.rest_voltage - low) <= self.tolerance:
             return
         self._has_moved = True
         self._travel(low, high, float(voltage[-1]))
@@ -183,7 +188,7 @@ class VoltageHistory:
 
     def _travel(self, low: float, high: float, last: float) -> None:
         way = max(high, self._counted) - min(low, self._counted)
-        if way > 2 * REST_TOLERANCE:
+        if way > 2 * self.tolerance:
             self.travel += way
             self._counted = last
 
@@ -198,10 +203,6 @@ class VoltageHistory:
         self._kept -= old
 
 
-def is_held(voltage: Array) -> bool:
-    """True where a block of voltages [V] stays at one level."""
-    return _is_level(float(voltage.min()), float(voltage.max()))
-
-
-def _is_level(low: float, high: float) -> bool:
-    return high - low <= 2 * REST_TOLERANCE
+def is_held(voltage: Array, tolerance: float = REST_TOLERANCE * USUAL_SCALE) -> bool:
+    """True where a block of voltages [V] stays within `tolerance` [V] of one level."""
+    return float(voltage.max()) - float(voltage.min()) <= 2 * tolerance

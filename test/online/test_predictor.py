@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -73,6 +75,34 @@ def test_a_clean_stream_is_the_batch_simulation_bit_for_bit(size: int, rest: int
     np.testing.assert_array_equal(np.concatenate([a.prediction for a in answers]), measured)
     if rest >= size:
         assert not any(a.warming_up for a in answers)
+
+
+@pytest.mark.parametrize("size", [1, 10, 300])
+def test_noise_on_the_drive_is_predicted_as_in_batch_bit_for_bit(size: int) -> None:
+    voltage = 2e-3 * np.random.default_rng(4).standard_normal(600)
+    measured = truth(MODEL, voltage)
+    answers = feed(Predictor(PERIOD, MODEL), voltage, measured, size)
+    np.testing.assert_array_equal(np.concatenate([a.prediction for a in answers]), measured)
+
+
+def test_a_small_voltage_scale_makes_a_small_drive_a_motion() -> None:
+    small, other = (replace(model, voltage_scale=4e-3) for model in (MODEL, OTHER))
+    voltage = 5e-4 * sine(6_000, rest=700)
+    expected = truth(other, voltage)
+    predictor = Predictor(PERIOD, small)
+    feed(predictor, voltage[:3_000], expected[:3_000])
+    predictor.swap(other, offset=0.0)
+    error = residual(feed(predictor, voltage[3_000:], expected[3_000:], first=3_000))
+    np.testing.assert_allclose(error[-2_000:], 0.0, atol=1e-9 * np.ptp(expected))
+
+
+@pytest.mark.parametrize("number", [np.uint32, np.int64])
+def test_index_and_stamp_may_be_of_numpy(number: type) -> None:
+    predictor = Predictor(PERIOD, MODEL)
+    rest = np.zeros(10)
+    for first in (0, 10, 25):
+        predictor.predict(number(first), number(first * 20_000), rest, rest)
+    assert predictor.sequence.lost == 5
 
 
 def test_a_model_swapped_in_mid_sine_is_right_at_once() -> None:
