@@ -87,8 +87,7 @@ class Record(Pictured):
         put(self, "voltage", channel_samples("voltage", self.voltage, None))
         size = self.voltage.size
         put(self, "displacement", channel_samples("displacement", self.displacement, size))
-        others = {name: channel_samples(name, values, size) for name, values in self.channels.items()}
-        put(self, "channels", ChannelMapping(others))
+        put(self, "channels", ChannelMapping({n: channel_samples(n, c, size) for n, c in self.channels.items()}))
         period = float(self.sample_period)
         if not (np.isfinite(period) and period > 0):
             raise RecordError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
@@ -131,13 +130,25 @@ class Record(Pictured):
         """Voltage at which the stage had settled before the first sample [V]."""
         return float(self.voltage[0]) if self.initial_voltage is None else float(self.initial_voltage)
 
+    def is_named(self, *phases: str) -> bool:
+        """Whether the phase name, or its first word, is one of `phases`; words are separated by underscores.
+
+        >>> [Record([0.0], [0.0], 1.0, phase="sine_50hz").is_named(name) for name in ("sine", "sine_50hz", "sine_50")]
+        [True, True, False]
+        """
+        return self.phase in phases or self.phase.split("_")[0] in phases
+
     def __getitem__(self, part: slice) -> Record:
-        """A contiguous part; one that does not begin at the first sample continues what was before it."""
+        """A contiguous part; a later one continues what was before it, and has no `initial_voltage`."""
         start, stop, step = part.indices(self.size)
         if step != 1 or stop <= start:
             raise RecordError(f"slice {part}: expected a non-empty contiguous part of {self.size} samples")
-        begin = self.start_time + start * self.sample_period
-        return self.with_channels(lambda c: c[start:stop], start_time=begin, continues=self.continues or start > 0)
+        return self.with_channels(
+            lambda c: c[start:stop],
+            start_time=self.start_time + start * self.sample_period,
+            continues=self.continues or start > 0,
+            initial_voltage=None if start > 0 else self.initial_voltage,
+        )
 
     def with_channels(self, change: Callable[[Samples], Samples], **fields: Any) -> Record:
         """Voltage, displacement and every other channel changed alike, and the other fields given replaced.
@@ -212,8 +223,9 @@ class Experiment(Pictured):
         return "\n".join((self._title(), *(f"  {record!r}" for record in self)))
 
     def _repr_html_(self) -> str:
-        header = ("phase", "samples", "drive voltage", "displacement")
-        return html_table(self._title(), header, (record.summary() for record in self))
+        return html_table(
+            self._title(), ("phase", "samples", "drive voltage", "displacement"), map(Record.summary, self)
+        )
 
     def _title(self) -> str:
         return f"Experiment of {len(self)} phases, {self.size} samples, {len(self.notices)} findings"
@@ -248,10 +260,5 @@ class Experiment(Pictured):
         return replace(self, notices=(*self.notices, *notices))
 
     def named(self, *phases: str) -> tuple[Record, ...]:
-        """Records whose phase name is, or begins with, one of `phases`.
-
-        >>> r = Record([0.0], [0.0], 1.0, phase="sine_50hz")
-        >>> len(Experiment((r,)).named("sine"))
-        1
-        """
-        return tuple(r for r in self.records if r.phase in phases or r.phase.split("_")[0] in phases)
+        """Records whose phase name, or its first word, is one of `phases`; as `Record.is_named`."""
+        return tuple(r for r in self.records if r.is_named(*phases))

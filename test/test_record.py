@@ -118,3 +118,9 @@ def test_channels_are_frozen_cut_and_sent_to_other_processes():
         np.testing.assert_array_equal(other.channels["displacement_3"], 2 * Y)
     np.testing.assert_array_equal(record[2:5].channels["monitor_voltage"], U[2:5])
     np.testing.assert_array_equal(record.decimate(2).channels["displacement_3"], record.decimate(2).displacement * 2)
+
+
+def test_a_part_keeps_the_settled_voltage_only_from_the_first_sample() -> None:
+    ramp = np.linspace(1.0, 10.0, 10)
+    record = Record(ramp, ramp, 1.0, initial_voltage=0.0)
+    assert [part.settled_voltage for part in (record[:5], record[5:], *record.split(3))] == [0.0, 6.0, 0.0, 4.0]

@@ -69,7 +69,7 @@ def simulated(
         voltage = samples(cast(Array, given), "voltage")
         return model.run(voltage, model.rest(voltage[0], sample_period=sample_period))[0]
     records = [given] if isinstance(given, Record) else list(cast(Iterable[Record], given))
-    wanted = [i for i, r in enumerate(records) if phase is None or phase in (r.phase, r.phase.split("_")[0])]
+    wanted = [i for i, r in enumerate(records) if phase is None or r.is_named(phase)]
     if phase is not None and not wanted:
         held = ", ".join(dict.fromkeys(r.phase for r in records)) or "no record"
         raise ModelError(f"phase: got {phase!r}, expected one of {held}")

@@ -194,7 +194,7 @@ class Model(Composition):
             Give the whole experiment and `phase`, so that the state is carried into the records of that phase. An array
             is a drive voltage [V] of a stage settled at its first value.
         phase : str, optional
-            Return only records whose phase name is, or begins with, `phase`, as `Experiment.named`.
+            Return only records whose phase name, or its first word, is `phase`, as `Experiment.named`.
         sample_period : float, optional
             Of an array [s], as in `rest`; records have their own.
 

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -80,6 +79,6 @@ def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Re
         count = max(1, round((record.size - step) / length))
         edges = {step, *(step + round(k * (record.size - step) / count) for k in range(1, count))}
         cuts = record.split(*sorted(edges - {0}))
-        blocks += [cuts[0], *(replace(c, initial_voltage=None) for c in cuts[1:])]
+        blocks += cuts
         origin += [index] * len(cuts)
     return blocks, origin

@@ -75,7 +75,7 @@ def known_from_within(experiment: Experiment) -> tuple[Experiment, tuple[Notice,
         samples = conditioning_length(record) if record.truncated and record.phase != CONDITIONING else 0
         if samples:
             records.append(replace(record[:samples], phase=CONDITIONING))
-            record = replace(record[samples:], truncated=False, initial_voltage=None)
+            record = replace(record[samples:], truncated=False)
             message = f"the initial state is unknown; the first {samples} samples, up to a full loop, are not fitted"
             notices.append(Notice("conditioning_length", message, record.phase))
         records.append(record)

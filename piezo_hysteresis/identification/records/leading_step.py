@@ -21,7 +21,6 @@ distinguish them. They are few, and therefore form a separate block with its own
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -86,7 +85,7 @@ def steps_apart(records: Sequence[Record], floors: Sequence[float], fitted: Coll
             wanted.append(len(parts))
             parts.append(record[:length])
             sizes.append(floor / WEIGHT**0.5)
-            record = replace(record[length:], initial_voltage=None)
+            record = record[length:]
         if index in fitted:
             wanted.append(len(parts))
         parts.append(record)

@@ -23,7 +23,6 @@ were left out of the fit decide; the first block contains the initial loading fr
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,10 +156,10 @@ def _fit_plays(model: Model, blocks: Sequence[Record], used: Collection[int]) ->
 def _blocks(records: Sequence[Record], floors: Sequence[float]) -> tuple[list[Record], list[float]]:
     """Cut the records into about `BLOCKS` blocks of equal length, as far as they are long enough."""
     length = max(FEWEST, sum(r.size for r, f in zip(records, floors, strict=True) if np.isfinite(f)) // BLOCKS)
-    blocks, sizes = [], []
+    blocks, sizes = list[Record](), list[float]()
     for record, floor in zip(records, floors, strict=True):
         count = max(1, round(record.size / length)) if np.isfinite(floor) else 1
         cuts = record.split(*(round(k * record.size / count) for k in range(1, count)))
-        blocks += [cuts[0], *(replace(c, initial_voltage=None) for c in cuts[1:])]
+        blocks += cuts
         sizes += [floor] * count
     return blocks, sizes

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -124,7 +124,6 @@ def _cut(record: Record, index: int, run: int, largest: float) -> list[RecordPie
             stop = 0
     edges = opening + [(stop + end, Kind.LOOP, rate, size) for end, rate, size in _loops(record, u[stop:], largest)]
     parts = record.split(*(end for end, *_ in edges[:-1]))
-    parts = (parts[0], *(replace(part, initial_voltage=None) for part in parts[1:]))
     return [
         RecordPiece(part, index, kind, rate, size, run)
         for part, (_, kind, rate, size) in zip(parts, edges, strict=True)

@@ -23,6 +23,7 @@ from ...errors import ModelError
 from ...model.chain import ChainState
 from ...model.model import Model
 from ...online.predictor import Predictor
+from ...online.voltage_history import is_held
 
 
 class AppliedState:
@@ -110,7 +111,7 @@ class AppliedState:
             settled=block.index[0] == 0 or block.phase[0] == 0,
         )
         self.voltage = float(block.voltage[-1])
-        if block.size > 1 and self._predictor.is_held(block.voltage):
+        if block.size > 1 and is_held(block.voltage):
             self.noise = float(np.sqrt(0.5 * np.mean(np.diff(block.displacement) ** 2)))
 
 

@@ -90,8 +90,8 @@ class ModelComparison:
         return list(range(len(self.experiment))) if self.now is None else [row.index for row in self.now.judged]
 
     def indices(self, *phases: str) -> list[int]:
-        """Indices of the records whose phase name is, or begins with, one of `phases`."""
-        return [i for i, r in enumerate(self.experiment) if r.phase in phases or r.phase.split("_")[0] in phases]
+        """Indices of the records whose phase name, or its first word, is one of `phases`."""
+        return [i for i, r in enumerate(self.experiment) if r.is_named(*phases)]
 
 
 def compare(
