@@ -162,7 +162,6 @@ def may_be_off(candidate: FittedCandidate) -> bool:
     Time constants and exponents have no off value. They are held, so their correlation with a size does not matter.
     """
     fitted = candidate.fit
-    assert fitted is not None
     errors, rows = fitted.standard_errors, fitted.model.row
     own = [n for n in fitted.names if n.startswith(f"{candidate.name}.")]
     if all(rows(n).off is None for n in own):
