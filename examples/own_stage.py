@@ -136,6 +136,10 @@ class OwnStage:
     def close(self) -> None:
         """Make safe; every later call but `close` and `safe` raises StageError."""
         self.safe()
+        self.leave()
+
+    def leave(self) -> None:
+        """Release the device without moving it, because another program drives it."""
         self._closed = True
 
     def _go(self, voltage: float) -> None:

@@ -22,6 +22,7 @@ from typing import Any
 from ..errors import PiezoError, StageError
 from ..record import Record
 from ..stage.back_ends import BACK_ENDS, open_stage
+from ..stage.description import Description
 from ..stage.opening import Opening
 from ..stage.replay import ReplayStage
 from ..stage.stage import Stage
@@ -36,6 +37,9 @@ from .settings import DriverSettings
 from .stage_lock import StageLock
 from .streaming import Source, StreamingAcquisition
 from .time_base import TimeBase
+
+_KEEPER_TIME = 10.0
+"""Longest wait for the keeper of a stage that this driver could not make safe, beside the ramps [s]."""
 
 
 class DriverSession:
@@ -72,9 +76,10 @@ class DriverSession:
         self.latch = StopLatch() if latch is None else latch
         self._lock = StageLock([place])
         self._keeper: KeeperLink | None = None
+        self._acquisition: StreamingAcquisition | None = None
         opening = Opening(settings.sample_period, settings.real_time_factor, **({"read": read} if read else {}))
         try:
-            self.stage = open_stage(settings.stage, values, opening)
+            self.stage = open_stage(settings.stage, values, opening, self._lock_device)
         except BaseException:
             self._lock.release()
             raise
@@ -82,14 +87,11 @@ class DriverSession:
             self.limits = settings.limits(self.stage.description, self.stage.sample_period)
             self.stage.restrict(self.limits, settings.ramp_rate)
             self._keeper = self._kept()
-            if BACK_ENDS[settings.stage].is_device:
-                self._lock.add(f"device {self.limits.name}")
         except BaseException:
             self.close()
             raise
         self.sample_period = self.stage.sample_period
         self.check = CommandCheck(self.limits, self.sample_period, settings.command_max_age)
-        self._acquisition: StreamingAcquisition | None = None
 
     @property
     def streaming(self) -> StreamingAcquisition:
@@ -147,6 +149,10 @@ class DriverSession:
             "stopped": self.latch.is_set,
         }
 
+    def _lock_device(self, found: Description) -> None:
+        if BACK_ENDS[self.settings.stage].is_device:
+            self._lock.add(f"device {found.name}")
+
     def _kept(self) -> KeeperLink | None:
         """The keeper of a device that allows a second connection."""
         settings = self.settings
@@ -174,21 +180,43 @@ class DriverSession:
         StageError
             If the ramp was not finished in time. The stage was then asked to go there by itself.
         """
-        acquisition, self._acquisition = self._acquisition, None
-        if acquisition is None:
+        if self._acquisition is None:
             return
         timeout = 2.0 + 2.0 * self.settings.longest_ramp(self.limits)
-        if not acquisition.make_safe(timeout):
+        reached = self._acquisition.make_safe(timeout)
+        self._acquisition = None
+        if not reached:
             self.stage.safe()
             raise StageError(
                 f"{self.limits.name}: not at the safe voltage within {timeout:g} s; the stage went there by itself"
             )
 
     def close(self) -> None:
-        """Bring the stage to its safe voltage, and release stage and lock."""
+        """End the stream, bring the stage to its safe voltage, and release stage and lock.
+
+        Raises
+        ------
+        StageError
+            If the stage did not get there. Its keeper has then tried it, too, and the message says with what result.
+        """
+        try:
+            self.make_safe()
+        finally:
+            try:
+                self._close_stage()
+            finally:
+                self._lock.release()
+
+    def _close_stage(self) -> None:
+        keeper = self._keeper
         try:
             self.stage.close()
-        finally:
-            if self._keeper is not None:
-                self._keeper.close()
-            self._lock.release()
+        except BaseException as error:
+            if keeper is None:
+                raise
+            outcome = keeper.hand_over(_KEEPER_TIME + 2.0 * self.settings.longest_ramp(self.limits))
+            if not isinstance(error, StageError):
+                raise
+            raise StageError(f"{error}; {outcome}") from None
+        if keeper is not None:
+            keeper.close()

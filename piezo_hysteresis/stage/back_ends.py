@@ -20,13 +20,14 @@ found here without being listed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
 
 from ..errors import ParameterError
+from .description import Description
 from .opening import BackEnd, Opening
 from .stage import Stage
 
@@ -41,7 +42,9 @@ BACK_ENDS: Mapping[str, BackEnd] = {b.word: b for b in sorted(_found(), key=lamb
 """Every back end by the value of the parameter `stage`; devices come last."""
 
 
-def open_stage(word: str, values: Mapping[str, Any], opening: Opening) -> Stage:
+def open_stage(
+    word: str, values: Mapping[str, Any], opening: Opening, lock: Callable[[Description], None] = lambda found: None
+) -> Stage:
     """Open a stage at a sample period.
 
     Parameters
@@ -52,6 +55,9 @@ def open_stage(word: str, values: Mapping[str, Any], opening: Opening) -> Stage:
         Values of its parameters, by name.
     opening : Opening
         Sample period and speed; the reader of recordings for `replay`.
+    lock : callable, optional
+        Takes the description of the stage before anything else is done with it. If it raises an error, the stage is
+        released as it was found, because another program drives it.
 
     Raises
     ------
@@ -64,6 +70,11 @@ def open_stage(word: str, values: Mapping[str, Any], opening: Opening) -> Stage:
             "time"
         )
     stage = BACK_ENDS[word].open(values, opening)
+    try:
+        lock(stage.description)
+    except BaseException:
+        stage.leave()
+        raise
     try:
         stage.configure(opening.sample_period or stage.sample_period)
     except BaseException:

@@ -100,6 +100,10 @@ class Stage(Protocol):
         """Go to the safe voltage and release the device. A repeated call does no harm; any other raises StageError."""
         ...
 
+    def leave(self) -> None:
+        """Release the device without moving it, because another program drives it."""
+        ...
+
 
 class StreamingStage(Stage, Protocol):
     """A device whose clock keeps running while blocks are exchanged."""

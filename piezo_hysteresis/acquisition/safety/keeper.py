@@ -41,6 +41,10 @@ READY = "ready"
 """Answer of the keeper when it has opened the stage."""
 GOODBYE = b"q"
 """Sent by a driver that has made its stage safe itself."""
+HANDOVER = b"h"
+"""Sent by a driver that has released its stage and could not make it safe."""
+_HANDED_OVER = "the driver could not make the stage safe"
+"""Reason of a keeper that acts after a handover."""
 ATTEMPTS = 5
 """Number of attempts to bring the stage to its safe voltage."""
 _BETWEEN_ATTEMPTS = 0.2
@@ -67,7 +71,7 @@ def main() -> int:
     if not reason:
         os._exit(0)  # closing the stage would move it
     sys.stderr.write(f"keeper: {reason}; bringing {stage.description.name} to its safe voltage\n")
-    if order["ends_driver"]:
+    if order["ends_driver"] and reason != _HANDED_OVER:
         with suppress(ProcessLookupError):
             os.kill(order["driver"], signal.SIGKILL)
     return _make_safe(stage, order)
@@ -89,6 +93,8 @@ def _listen(timeout: float) -> str:
         heard = os.read(descriptor, 4096)
         if not heard:
             return "the driver has died"
+        if heard.endswith(HANDOVER):
+            return _HANDED_OVER
     return ""
 
 

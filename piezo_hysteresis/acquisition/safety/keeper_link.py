@@ -28,7 +28,7 @@ from typing import Any
 from ...errors import StageError
 from ...stage.back_ends import BACK_ENDS
 from ...stage.description import Description
-from .keeper import GOODBYE, READY
+from .keeper import GOODBYE, HANDOVER, READY
 
 _START = 30.0
 """Longest time that a keeper takes to start and to open the stage [s]."""
@@ -97,7 +97,8 @@ class KeeperLink:
                 "keeper_timeout to 0 to go without a keeper"
             )
         os.set_blocking(self._pipe, False)
-        threading.Thread(target=self._beat, name="heartbeat", daemon=True).start()
+        self._beats = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
+        self._beats.start()
 
     @property
     def is_lost(self) -> bool:
@@ -113,16 +114,47 @@ class KeeperLink:
             )
 
     def close(self) -> None:
-        """End the keeper, because the stage is safe or cannot be made safe; may be repeated."""
+        """End the keeper, because the stage is safe; may be repeated."""
         if self._ended.is_set():
             return
-        self._ended.set()
-        self._send(GOODBYE)
+        self._end(GOODBYE)
         try:
             self._process.wait(1.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._close_pipes()
+
+    def hand_over(self, timeout: float) -> str:
+        """Let the keeper bring the stage to its safe voltage; this driver has released it.
+
+        Parameters
+        ----------
+        timeout : float
+            Longest wait for the end of the keeper [s]; it goes on after that.
+
+        Returns
+        -------
+        str
+            What became of the stage, as the end of a message.
+        """
+        if self._ended.is_set() or self.is_lost:
+            return "its keeper had ended before"
+        self._end(HANDOVER)
+        try:
+            is_safe = self._process.wait(timeout) == 0
+        except subprocess.TimeoutExpired:
+            return f"its keeper has not reached the safe voltage within {timeout:g} s"
+        finally:
+            self._close_pipes()
+        return f"its keeper {'then brought it' if is_safe else 'could not bring it'} to its safe voltage"
+
+    def _end(self, last: bytes) -> None:
+        self._ended.set()
+        self._beats.join()
+        self._send(last)
+
+    def _close_pipes(self) -> None:
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 pipe.close()

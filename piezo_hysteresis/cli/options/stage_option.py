@@ -17,15 +17,16 @@
 from __future__ import annotations
 
 import argparse
-import signal
 import time
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ... import recording
 from ...acquisition.phase_recorder import record_phases
 from ...acquisition.session import DriverSession
+from ...acquisition.settings import DriverSettings
 from ...discrepancy.choice.live_diagnosis import ERROR_RATE, LONGEST, LiveDiagnosis, begin
 from ...errors import ParameterError
 from ...identification.protocol.protocol import Protocol
@@ -34,6 +35,7 @@ from ...report.tables.probability_table import probability_table
 from ...stage.back_ends import BACK_ENDS
 from ...yaml_file import read_yaml
 from ..stage.record import checked_settings, drive_limits, read_stage
+from ..stage.safe_session import safe_session
 from ..terminal import console, progress, show
 from .destination import require_new_experiment
 
@@ -82,28 +84,28 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
     if args.output is None:
         raise ParameterError("diagnose --stage: got no -o, expected the folder of the experiment to write")
     require_new_experiment("-o", args.output)
-    session = _open(Path(args.stage).expanduser())
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the stage goes to its safe voltage
+    path = Path(args.stage).expanduser()
+    settings, values = _settings(path)
     records: list[Record] = []
     try:
-        live = begin(
-            drive_limits(session),
-            error_rate=args.error_rate,
-            longest=args.stage_time,
-            seed=args.seed,
-            explicit_step=not args.no_explicit_step,
-        )
-        _show_plan(session, live)
-        started = time.monotonic()
-        with progress("diagnose") as report_progress:
-            while live.due:
-                report_progress(f"playing {live.due_name}", live.time / live.longest)
-                before = _clock(session, records, started)
-                records += _played(session, live, records, before)
-                live = live.advanced(Experiment(tuple(records)), report_progress)
-                console().print(f"{live.updates[-1].time:6.1f} s: {live.updates[-1].sentence()}", highlight=False)
+        with safe_session(settings, values, f"a recording with {path.resolve()}") as session:
+            live = begin(
+                drive_limits(session),
+                error_rate=args.error_rate,
+                longest=args.stage_time,
+                seed=args.seed,
+                explicit_step=not args.no_explicit_step,
+            )
+            _show_plan(session, live)
+            started = time.monotonic()
+            with progress("diagnose") as report_progress:
+                while live.due:
+                    report_progress(f"playing {live.due_name}", live.time / live.longest)
+                    before = _clock(session, records, started)
+                    records += _played(session, live, records, before)
+                    live = live.advanced(Experiment(tuple(records)), report_progress)
+                    console().print(f"{live.updates[-1].time:6.1f} s: {live.updates[-1].sentence()}", highlight=False)
     finally:
-        session.close()
         if records:
             recording.write(Experiment(tuple(records)), args.output)
             console().print(f"wrote {len(records)} phases to {args.output}")
@@ -111,15 +113,13 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
     return live
 
 
-def _open(path: Path) -> DriverSession:
-    """A session with the stage of a parameter file of the driver, or with a simulated one of plant parameters."""
+def _settings(path: Path) -> tuple[DriverSettings, dict[str, Any]]:
+    """Those of the stage of a parameter file of the driver, or of a simulated one of plant parameters."""
     content = read_yaml(path)
     if isinstance(content, Mapping) and "/**" in content:
-        settings, values = read_stage(path)
-    else:
-        given = {"stage": "simulated", "simulated.plant_file": str(path), "real_time_factor": FASTEST}
-        settings, values = checked_settings(given, path)
-    return DriverSession(settings, values, f"a recording with {path.resolve()}")
+        return read_stage(path)
+    given = {"stage": "simulated", "simulated.plant_file": str(path), "real_time_factor": FASTEST}
+    return checked_settings(given, path)
 
 
 def _show_plan(session: DriverSession, live: LiveDiagnosis) -> None:

@@ -21,7 +21,6 @@ and locks are those of the driver node. Ctrl-C brings the stage to its safe volt
 from __future__ import annotations
 
 import argparse
-import signal
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -34,8 +33,10 @@ from ...errors import ParameterError
 from ...identification.protocol.drive_limits import DriveLimits
 from ...record import Experiment
 from ...stage.back_ends import BACK_ENDS
+from ...stage.description import Description
 from ...yaml_file import read_yaml
 from ..terminal import console, progress
+from .safe_session import safe_session
 from .simulate import PROTOCOLS
 
 
@@ -58,27 +59,25 @@ def run(args: argparse.Namespace) -> int:
         If a file, a stage, limits or a folder is not acceptable. The stage is then at its safe voltage.
     """
     settings, values = read_stage(args.stage)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the stage goes to its safe voltage
-    session = DriverSession(settings, values, f"a recording with {args.stage.resolve()}")
+    limits: Description | None = None
     try:
-        protocol = PROTOCOLS[args.protocol](drive_limits(session), args.seed)
-        console().print(f"{session.limits.name}\n{args.protocol}: {protocol.summary}")
-        played = 0.0
-        durations = iter([phase.duration for phase in protocol])
-        with progress("record") as show:
+        with safe_session(settings, values, f"a recording with {args.stage.resolve()}") as session:
+            limits = session.limits
+            protocol = PROTOCOLS[args.protocol](drive_limits(session), args.seed)
+            console().print(f"{limits.name}\n{args.protocol}: {protocol.summary}")
+            played = 0.0
+            durations = iter([phase.duration for phase in protocol])
+            with progress("record") as show:
 
-            def phase_begins(name: str) -> None:
-                nonlocal played
-                show(name, played / protocol.summary.duration)
-                played += next(durations)
+                def phase_begins(name: str) -> None:
+                    nonlocal played
+                    show(name, played / protocol.summary.duration)
+                    played += next(durations)
 
-            records = record_phases(session, ((p.name, p.voltage, p.stored_every) for p in protocol), phase_begins)
+                records = record_phases(session, ((p.name, p.voltage, p.stored_every) for p in protocol), phase_begins)
     except KeyboardInterrupt:
-        session.close()
-        safe = f"{session.limits.name} is at its safe voltage, {session.limits.safe_voltage:g} V"
-        raise KeyboardInterrupt(f"{safe}; nothing was written") from None
-    finally:
-        session.close()
+        safe = f"{limits.name} is at its safe voltage, {limits.safe_voltage:g} V; " if limits else ""
+        raise KeyboardInterrupt(f"{safe}nothing was written") from None
     recording.write(Experiment(records), args.output)
     console().print(f"wrote {len(records)} records of {len(protocol)} phases to {args.output}")
     return 0

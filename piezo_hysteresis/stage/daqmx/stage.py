@@ -148,9 +148,13 @@ class DaqmxStage:
         try:
             self.safe()
         finally:
-            if not self._closed:
-                self._closed = True
-                self._tasks.close()
+            self.leave()
+
+    def leave(self) -> None:
+        """Release the device without moving it; every later call but `close` and `safe` raises StageError."""
+        if not self._closed:
+            self._closed = True
+            self._tasks.close()
 
     @property
     def _lead(self) -> int:

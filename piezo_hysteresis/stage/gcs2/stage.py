@@ -54,8 +54,7 @@ class Gcs2Stage:
 
     def __init__(self, setup: Gcs2Setup) -> None:
         self._setup, self._axis = setup, Axis(setup)
-        self._closed, self._armed, self._playing, self._played = False, False, False, False
-        self._due = 0.0
+        self._closed, self._armed, self._playing, self._played, self._due = False, False, False, False, 0.0
         self._waveform: Samples | None = None
         self._acquired: Acquired | None = None
         try:
@@ -128,7 +127,7 @@ class Gcs2Stage:
     def upload(self, voltage: Samples) -> None:
         """Store a waveform [V] in the wave table."""
         self._require_ready()
-        waveform = self._check(voltage).copy()
+        waveform = self._limiter.check(voltage, self._voltage, self._sample_period).copy()
         self._waveform = None
         self._forget()
         with self._guarded():
@@ -140,7 +139,7 @@ class Gcs2Stage:
         self._require_ready()
         if self._waveform is None:
             raise StageError(f"{self._description.name}: holds no waveform, expected upload() first")
-        self._check(self._waveform)
+        self._limiter.check(self._waveform, self._voltage, self._sample_period)
         with self._guarded():
             self._axis.open_loop()
             self._axis.arm(round(self._sample_period / self._axis.servo_time))
@@ -203,8 +202,12 @@ class Gcs2Stage:
         try:
             self.safe()
         finally:
-            self._closed = True
-            self._axis.client.connection.close()
+            self.leave()
+
+    def leave(self) -> None:
+        """Release the device without moving it; every later call but `close` and `safe` raises StageError."""
+        self._closed = True
+        self._axis.client.connection.close()
 
     def _forget(self) -> None:
         self._armed, self._playing, self._played, self._acquired = False, False, False, None
@@ -250,9 +253,6 @@ class Gcs2Stage:
         return (
             f"the voltage of the stage is unknown, last commanded {self._voltage:g} V; switch the amplifier off by hand"
         )
-
-    def _check(self, voltage: Samples) -> Samples:
-        return self._limiter.check(voltage, self._voltage, self._sample_period)
 
     def _require_ready(self) -> None:
         self._require_open()

@@ -169,6 +169,10 @@ class ReplayStage:
         """End the replay; every later call that takes samples raises StageError."""
         self._closed = True
 
+    def leave(self) -> None:
+        """As `close`: a replay moves nothing."""
+        self.close()
+
     @property
     def _last(self) -> NDArray[np.int64]:
         return np.array([max(self._position - 1, 0)])

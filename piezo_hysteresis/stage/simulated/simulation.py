@@ -130,6 +130,10 @@ class Simulation:
     def close(self) -> None:
         """Go to the safe voltage; every later call but `close` and `safe` raises StageError."""
         self.safe()
+        self.leave()
+
+    def leave(self) -> None:
+        """Release the device without moving it; every later call but `close` and `safe` raises StageError."""
         self._closed = True
 
     def play(

@@ -21,6 +21,7 @@ import pytest
 
 from piezo_hysteresis import recording
 from piezo_hysteresis.acquisition.phase_recorder import record_phases
+from piezo_hysteresis.acquisition.session import DriverSession
 from piezo_hysteresis.cli.stage import record
 
 pytestmark = pytest.mark.device
@@ -89,3 +90,27 @@ def test_ctrl_c_brings_the_stage_to_safety_with_a_message_and_writes_nothing(pie
     assert done.err.strip().endswith("is at its safe voltage, 0 V; nothing was written")
     assert sessions[0].stage.voltage == 0.0
     assert not folder.exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_more_signals_on_the_way_to_safety_are_ignored(piezo, tmp_path, monkeypatch, number):
+    file = tmp_path / "stage.yaml"
+    file.write_text(STAGE.format(memory="false"))
+    sessions, make_safe = [], DriverSession.make_safe
+
+    def signalled(session):
+        sessions.append(session)
+        signal.raise_signal(number)
+        make_safe(session)
+
+    def interrupted(session, phases, progress):
+        return record_phases(session, phases, lambda name: name == "noise" and signal.raise_signal(number))
+
+    before = signal.getsignal(number)
+    monkeypatch.setattr(DriverSession, "make_safe", signalled)
+    monkeypatch.setattr(record, "record_phases", interrupted)
+    done = piezo("record", file, "short", "-o", tmp_path / "experiment")
+    assert done.status == 130
+    assert "is at its safe voltage, 0 V" in done.err
+    assert sessions[0].stage.voltage == 0.0
+    assert signal.getsignal(number) is before

@@ -1,0 +1,68 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`safe_session`: a session on a stage that no number of Ctrl-C leaves energised."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+from ...acquisition.session import DriverSession
+from ...acquisition.settings import DriverSettings
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+"""Signals that end a command."""
+
+
+@contextmanager
+def safe_session(settings: DriverSettings, values: Mapping[str, Any], place: str) -> Iterator[DriverSession]:
+    """Open a session for the block, and bring its stage to the safe voltage at the end.
+
+    The first SIGINT or SIGTERM raises KeyboardInterrupt in the block. After it, and while the session closes, both
+    signals are ignored, because they would interrupt the ramp to the safe voltage.
+
+    Parameters
+    ----------
+    settings, values, place
+        As for `DriverSession`.
+    """
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+
+    def ignore() -> None:
+        for number in before:
+            signal.signal(number, signal.SIG_IGN)
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        ignore()
+        raise KeyboardInterrupt
+
+    for number, handler in before.items():
+        if handler is not signal.SIG_IGN:
+            signal.signal(number, interrupt)
+    try:
+        session = DriverSession(settings, values, place)
+        try:
+            yield session
+        finally:
+            try:
+                ignore()
+            finally:  # also where a signal has arrived just then
+                session.close()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,91 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A session that is interrupted or fails leaves no stage energised; one that is refused moves no stage."""
+
+import time
+
+import numpy as np
+import pytest
+
+from benchmarks.wire import LSB, SAFE_WITHIN, WiredSession, check_wire, device
+from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.daqmx.tasks import DaqmxError
+from piezo_hysteresis.stage.gcs2.connection import Gcs2Error
+
+pytestmark = pytest.mark.device
+
+pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
+
+
+def held(s, voltage=4.0):
+    s.start()
+    s.wait(lambda: s.deliveries, "the stream")
+    s.acquisition.ramp_to(voltage)
+    s.wait(lambda: s.acquisition.playback.voltage == voltage and abs(s.output - voltage) <= SAFE_WITHIN, "the voltage")
+
+
+@pytest.mark.parametrize("word", ["gcs2", "nidaqmx"])
+def test_a_stage_that_its_driver_cannot_make_safe_is_left_to_the_keeper(word, monkeypatch):
+    with device(word) as (name, parameters, amplifier, _):
+        s = WiredSession(name, parameters, amplifier, keeper_timeout=20.0)
+        held(s)
+
+        def fails(goal):
+            raise (Gcs2Error if word == "gcs2" else DaqmxError)("the fault that was asked for")
+
+        monkeypatch.setattr(s.session.stage, "_go", fails)
+        monkeypatch.setattr(s.session.stage._limiter, "way", lambda *_: fails(0.0), raising=False)
+        with pytest.raises(StageError, match=r"fault that was asked for; .*its keeper then brought it to its safe"):
+            s.session.close()
+        assert abs(s.output) <= SAFE_WITHIN
+        check_wire(s.wire)
+
+
+@pytest.mark.parametrize("word", ["simulated", "gcs2"])
+def test_an_interrupt_on_the_way_to_safety_is_followed_by_a_complete_close(word, monkeypatch):
+    with device(word) as (name, parameters, amplifier, _):
+        s = WiredSession(name, parameters, amplifier)
+        held(s)
+        end = s.acquisition.make_safe
+
+        def interrupted(timeout):
+            monkeypatch.setattr(s.acquisition, "make_safe", end)
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(s.acquisition, "make_safe", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            s.session.make_safe()
+        s.session.close()
+        assert not s.acquisition._thread.is_alive()
+        assert abs(s.output) <= SAFE_WITHIN
+        check_wire(s.wire)
+        assert not s.failures
+
+
+@pytest.mark.parametrize("word", ["gcs2", "nidaqmx"])
+@pytest.mark.parametrize("changes", [{}, {"sample_period": 3.0}])
+def test_a_refused_second_driver_touches_nothing(word, changes):
+    with device(word) as (name, parameters, amplifier, _):
+        s = WiredSession(name, parameters, amplifier)
+        held(s)
+        before = s.wire.size
+        with pytest.raises(StageError, match=r"is held by process|got sample period"):
+            WiredSession(name, parameters, amplifier, **changes)
+        time.sleep(0.3)
+        assert np.ptp(s.wire[before - 1 :]) <= LSB
+        assert not s.failures
+        s.acquisition.ramp_to(1.0)
+        s.wait(lambda: abs(s.output - 1.0) <= SAFE_WITHIN, "the next set-point")
+        s.end()
