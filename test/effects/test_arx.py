@@ -89,6 +89,32 @@ def test_a_slow_sine_is_the_decimated_fast_one() -> None:
     np.testing.assert_allclose(slow[100:], fast[100:], atol=1e-4 * arx.dc_gain)
 
 
+def slow_slopes(effect: Arx, drive: np.ndarray) -> np.ndarray:
+    block = effect.block(Discretisation(1e-3, 1e-4))
+    nothing = np.empty((0, drive.size))
+    return block.linearise(drive, nothing, block.rest(0.0, 0.0), block.rest_tangent(0.0, np.empty(0)))[1]
+
+
+@pytest.mark.parametrize("b", [(0.5, 0.2), (0.5, -0.4)])
+def test_slopes_in_slow_records_are_those_of_the_output(b: tuple[float, float]) -> None:
+    """The second numerator leads, which is cut off at no delay."""
+    values, drive, h = {"a": (-0.3,), "b": b, "delay": 0.0 if b[1] < 0.0 else 3.0}, np.sin(np.arange(50.0) / 5.0), 1e-6
+    slopes = slow_slopes(Arx(**values), drive)
+    for k, (name, index) in enumerate((("a", 0), ("b", 0), ("b", 1))):
+        ends = []
+        for step in (h, -h):
+            row = np.array(values[name])
+            row[index] += step
+            block = Arx(**{**values, name: row}).block(Discretisation(1e-3, 1e-4))
+            ends.append(block.run(drive, block.rest(0.0, 0.0))[0])
+        np.testing.assert_allclose(slopes[k], (ends[0] - ends[1]) / (2 * h), atol=1e-7)
+
+
+def test_no_response_at_dc_is_refused_in_slow_records() -> None:
+    with pytest.raises(ParameterError, match=r"got a group delay of inf samples near dc.*B\(1\)"):
+        Arx(a=(-0.3,), b=(0.5, -0.5)).block(Discretisation(1e-3, 1e-4))
+
+
 @pytest.mark.parametrize("values", [{"a": [-1.0]}, {"a": [0.0, 1.01]}, {"b": []}, {"delay": -0.5}])
 def test_an_unstable_or_empty_arx_is_refused(values: dict) -> None:
     with pytest.raises(ParameterError, match="arx"):

@@ -125,14 +125,15 @@ class Arx(Effect):
     def _lag(self, names: tuple[str, ...], setting: Discretisation) -> GroupDelayBlock:
         """G in records slower than the model."""
         a, b, ratio = self.array("a"), self.array("b"), setting.model_period / setting.sample_period
-        at_a, at_b = 1.0 + a.sum(), b.sum()
-        power = np.arange(1, a.size + 1)
-        lag_a, lag_b = power @ a / at_a, np.arange(b.size) @ b / at_b
-        lag_slopes = ratio * np.concatenate((-(power - lag_a) / at_a, (np.arange(b.size) - lag_b) / at_b, [1.0]))
-        if not self.group_delay <= LONGEST_DELAY:
+        at_a, at_b, delay = 1.0 + a.sum(), b.sum(), self.group_delay
+        if at_b == 0.0 or not delay <= LONGEST_DELAY:
             raise ParameterError(
-                f"arx: got a group delay of {self.group_delay:.3g} samples near dc, expected at most "
+                f"arx: got a group delay of {delay if at_b else np.inf:.3g} samples near dc, expected at most "
                 f"{LONGEST_DELAY:g}; B(1) or A(1) is almost zero"
             )
-        lag = max(0.0, ratio * self.group_delay)
-        return GroupDelayBlock(names, self.dc_gain, lag, dc_gain_slopes(a, b), lag_slopes)
+        if delay <= 0.0:  # a lead that slow samples cannot show
+            return GroupDelayBlock(names, self.dc_gain, 0.0, dc_gain_slopes(a, b), np.zeros(len(names)))
+        power_a, power_b = np.arange(1, a.size + 1), np.arange(b.size)
+        by_a, by_b = (power_a @ a / at_a - power_a) / at_a, (power_b - power_b @ b / at_b) / at_b
+        lag_slopes = ratio * np.concatenate((by_a, by_b, [1.0]))
+        return GroupDelayBlock(names, self.dc_gain, ratio * delay, dc_gain_slopes(a, b), lag_slopes)
