@@ -28,8 +28,12 @@ def in_chain_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     Raises
     ------
     ModelError
-        If an effect occurs twice, or a term has no host.
+        If an effect occurs twice, a term has no host, or something is not an effect.
     """
+    effects = tuple(effects)
+    for effect in effects:
+        if not isinstance(effect, Effect):
+            raise ModelError(f"effects: got {effect!r}, expected effects, e.g. BoucWen()")
     ordered = tuple(sorted(effects, key=_place))
     names = [e.name for e in ordered]
     for name in names:

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Self
@@ -110,15 +109,14 @@ class Composition:
         """
         changed: dict[str, dict[str, Value]] = {}
         for name, number in values.items():
-            owner, _, rest = name.partition(".")
+            parameter, (owner, _, rest) = self.row(name).name, name.partition(".")
             inside = changed.setdefault(owner, self[owner].values)
-            match = re.fullmatch(r"(\w+)\[(\d+)\]", rest)
-            if match:
-                row = list(inside[match[1]])  # type: ignore[arg-type]
-                row[int(match[2])] = number
-                inside[match[1]] = tuple(row)
+            if rest == parameter:
+                inside[parameter] = number
             else:
-                inside[rest] = number
+                elements = list(inside[parameter])  # type: ignore[arg-type]
+                elements[int(rest[len(parameter) + 1 : -1])] = number
+                inside[parameter] = tuple(elements)
         kept = (e.with_values(**changed[e.name]) if e.name in changed else e for e in self.effects)
         return replace(self, effects=tuple(kept))
 
@@ -127,6 +125,16 @@ class Composition:
         return {f"{e.name}.{n}": v for e in self.effects for n, v in zip(e.free_names(), e.free_values(), strict=True)}
 
     def row(self, name: str) -> Parameter:
-        """The table row of a number."""
+        """The table row of a number, or of all numbers of an array parameter.
+
+        Raises
+        ------
+        ModelError
+            If no effect has it.
+        """
         owner, _, rest = name.partition(".")
-        return next(p for p in self[owner].parameters if p.name == rest.partition("[")[0])
+        effect = self[owner]
+        for row in effect.parameters:
+            if rest == row.name or (rest.partition("[")[0] == row.name and rest in effect.free_names()):
+                return row
+        raise ModelError(f"no number '{name}', expected one of {', '.join(effect.free_names())} of '{owner}'")

@@ -33,7 +33,7 @@ from .composition import Composition
 from .free_run import free_run, linearised_run, simulated, standard_errors
 from .parameter_covariance import ParameterCovariance
 from .sample_periods import ChainCache, chain_period, stated_period
-from .samples import row
+from .samples import channels_of, row
 
 Array = NDArray[np.float64]
 
@@ -162,15 +162,20 @@ class Model(Composition):
         Raises
         ------
         ModelError
-            On empty or non-finite samples, and on a period shorter than the model's.
+            On empty or non-finite samples, a period shorter than the model's, and a state of a model of other length.
+        RecordError
+            On channels that a record would not have.
         DivergenceError
             If the output diverges.
         """
         before = state.sample_period
         chain = self.at(before if sample_period is None else sample_period, before)
+        if len(state.blocks) != len(chain.blocks):
+            raise ModelError(f"state: got one of another model, expected one of {self!r}")
         if chain.setting.sample_period != before:
             state = chain.resume(state)
-        return chain.run(row(voltage, "voltage"), state, channels)
+        u = row(voltage, "voltage")
+        return chain.run(u, state, channels and channels_of(channels, u.size))
 
     @overload
     def simulate(self, records: Record | Iterable[Record], phase: str | None = None) -> list[Array]: ...
@@ -252,6 +257,8 @@ class Model(Composition):
         return linearised_run(self, records, frozenset(wanted), block)
 
     def sensitivities(self, record: Record, wanted: Collection[str]) -> tuple[Array, dict[str, Array]]:
-        """Free-run displacement (n,) of a record from rest, and ∂y/∂θ (n,) of every number `wanted`."""
+        """Free-run displacement (n,) of a record from rest, and ∂y/∂θ (n,) of every number `wanted` of the model."""
+        for name in wanted:
+            self.row(name)
         ((_, _, y, names, slopes),) = self.linearise([record], wanted, block=record.size)
         return y, dict(zip(names, slopes, strict=True))

@@ -16,10 +16,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..channel_mapping import are_finite
+from ..channel_mapping import ChannelMapping, are_finite, channel_samples
 from ..errors import ModelError
 
 Array = NDArray[np.float64]
@@ -31,9 +33,13 @@ def row(values: ArrayLike, name: str) -> Array:
     Raises
     ------
     ModelError
-        On another shape, or no sample.
+        On another shape, no sample, or what is not a real number.
     """
-    array = np.asarray(values, dtype=np.float64)
+    try:
+        array = np.asarray(values)
+        array = array.astype(np.float64, casting="same_kind", copy=False)
+    except (TypeError, ValueError):
+        raise ModelError(f"{name}: got {type(values).__name__}, expected one dimension of real numbers") from None
     if array.ndim != 1 or array.size == 0:
         raise ModelError(f"{name}: got shape {array.shape}, expected one dimension with at least one sample")
     return array
@@ -45,6 +51,17 @@ def samples(values: ArrayLike, name: str) -> Array:
     if not are_finite(array):
         raise not_finite(name, array)
     return array
+
+
+def channels_of(given: Mapping[str, ArrayLike], size: int) -> ChannelMapping:
+    """The channels of a block of `size` samples, checked as those of a record.
+
+    Raises
+    ------
+    RecordError
+        On an unknown name, another length, or samples that are not finite.
+    """
+    return ChannelMapping({name: channel_samples(name, values, size) for name, values in given.items()})
 
 
 def not_finite(name: str, values: Array, first: int = 0) -> ModelError:

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -31,9 +32,10 @@ from piezo_hysteresis.effects import (
     SensorBandwidth,
     SensorNonlinearity,
     ThermalDrift,
+    ThermalExpansion,
     effect_named,
 )
-from piezo_hysteresis.errors import ModelError, ParameterError, UnknownStateWarning
+from piezo_hysteresis.errors import ModelError, ParameterError, RecordError, UnknownStateWarning
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.sample_periods import KEPT_CHAINS, identified_periods
 from piezo_hysteresis.record import Record
@@ -118,6 +120,19 @@ def test_a_run_continues_at_another_sample_period_with_its_state() -> None:
         (lambda: MODEL.run([], MODEL.rest(0.0)), "voltage: got shape"),
         (lambda: MODEL.run([[1.0]], MODEL.rest(0.0)), "voltage: got shape"),
         (lambda: MODEL.run([1.0, float("inf")], MODEL.rest(0.0)), "voltage: sample 1 is not finite"),
+        (lambda: Model((BoucWen,), PERIOD), r"effects: got <class .*BoucWen'>, expected effects, e.g. BoucWen\(\)"),
+        *((lambda p=p: MODEL.rest(0.0, sample_period=p), "sample period: got") for p in (0.0, np.nan, np.inf, -1.0)),
+        (lambda: MODEL.run([1.0], MODEL.rest(0.0), sample_period=0.0), "sample period: got 0 s"),
+        (lambda: MODEL.run([1.0], MODEL.without("arx").rest(0.0)), "state: got one of another model"),
+        (lambda: MODEL.run(["a"], MODEL.rest(0.0)), "voltage: got list, expected one dimension of real numbers"),
+        (lambda: MODEL.run([[1.0], [1.0, 2.0]], MODEL.rest(0.0)), "voltage: got list, expected one dimension"),
+        (lambda: MODEL.run(np.array([1j]), MODEL.rest(0.0)), "voltage: got ndarray, expected one dimension of real"),
+        *(
+            (lambda n=n: MODEL.with_values({n: 1.0}), f"no number '{re.escape(n)}', expected one of")
+            for n in ("arx.b[7]", "bouc_wen.A[0]", "arx.q[0]", "bouc_wen.q", "arx.b[0", "arx.b[-1]")
+        ),
+        (lambda: MODEL.row("bouc_wen.nope"), "no number 'bouc_wen.nope', expected one of A, beta"),
+        (lambda: MODEL.sensitivities(Record([1.0], [1.0], PERIOD), ["nope"]), "no effect 'nope'"),
         (lambda: effect_named("crepe"), "unknown effect 'crepe', expected one of"),
     ],
 )
@@ -132,8 +147,22 @@ def test_unknown_and_impossible_numbers_are_refused() -> None:
         Creep(gama=0.1)
     with pytest.raises(ParameterError, match=r"creep\.gamma: got 3 1/decade, expected -0\.2 to 0\.2"):
         Creep(gamma=3.0)
-    with pytest.raises(ParameterError, match="unknown parameter 'q'"):
-        MODEL.with_values({"bouc_wen.q": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("name", "samples", "message"),
+    [
+        ("temperature", [293.0], "temperature: got 1 samples, expected 3"),
+        ("temperature", [293.0, np.nan, 293.0], "temperature: sample 1 is nan"),
+        ("temprature", [293.0] * 3, "got the name 'temprature'"),
+    ],
+)
+def test_channels_are_checked_as_those_of_a_record(name: str, samples: list[float], message: str) -> None:
+    model = MODEL.with_effect(ThermalExpansion(kappa=1e-7))
+    with pytest.raises(RecordError, match=message):
+        model.run([0.0, 1.0, 2.0], model.rest(0.0), {name: samples})
+    y, _ = model.run([0.0, 1.0, 2.0], model.rest(0.0), {"temperature": [293.0, 294.0, 295.0]})
+    assert np.ptp(y - model.simulate([0.0, 1.0, 2.0])) > 1e-8
 
 
 def test_creep_continues_between_continuing_records() -> None:
