@@ -29,11 +29,14 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",
     "numpydoc",
     "symbol_links",
 ]
 html_theme = "furo"
 html_title = "piezo_hysteresis"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 root_doc = "index"
 exclude_patterns = ["_build"]
 myst_enable_extensions = ["dollarmath", "amsmath"]
