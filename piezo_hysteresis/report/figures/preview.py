@@ -25,6 +25,8 @@ from .thinning import thinned
 
 POINTS = 1500
 """Number of points drawn of a record."""
+APART = 0.022
+"""Least distance between the names of two phases, as a share of the duration."""
 
 
 @styled
@@ -40,13 +42,17 @@ def preview(experiment: Experiment) -> Drawing:
     (drive, loop), (motion, rest) = axes
     rest.remove()
     data: dict[str, np.ndarray] = {}
+    end = experiment[-1].start_time + experiment[-1].duration
+    place, apart = -np.inf, APART * (end - experiment[0].start_time)
     for number, record in enumerate(experiment, 1):
         at = thinned(record.displacement, POINTS)
         time, u, y = record.time[at], record.voltage[at], 1e6 * record.displacement[at]
         drive.plot(time, u, **MEASURED)
         motion.plot(time, y, **MEASURED)
         loop.plot(u, y, **MEASURED)
-        drive.annotate(record.phase, (time[0], 1.02), xycoords=("data", "axes fraction"), fontsize=7, rotation=30)
+        place = max(float(time[0]), place + apart)
+        if place <= end:
+            drive.annotate(record.phase, (place, 1.02), xycoords=("data", "axes fraction"), fontsize=7, rotation=90)
         data |= {f"time_s_{number}": time, f"voltage_V_{number}": u, f"displacement_um_{number}": y}
     drive.set_ylabel("drive voltage [V]")
     motion.set_ylabel("displacement [µm]")
@@ -58,7 +64,7 @@ def preview(experiment: Experiment) -> Drawing:
         "What was understood",
         "Drive voltage and displacement against time, named by phase, and the displacement against the drive voltage. "
         "A displacement that does not follow the voltage points to a wrong column.",
-        f"{len(experiment)} phases over {experiment[-1].start_time + experiment[-1].duration:.3g} s.",
+        f"{len(experiment)} phases over {end:.3g} s.",
         figure,
         data,
     )
