@@ -47,13 +47,16 @@ waveform.fields = [
 waveform.data = array.array("B", voltage.tobytes())
 waveform.header.stamp = node.get_clock().now().to_msg()  # an old command is refused; without a stamp it never is
 
+stamp = f"{waveform.header.stamp.sec}.{waveform.header.stamp.nanosec:09d}"  # statuses of other commands arrive, too
+
 finished = Future()
 
 
 def on_status(status: DiagnosticStatus) -> None:
     """Print the status of the driver about our waveform."""
-    state = {value.key: value.value for value in status.values}["state"]
-    if status.name == "my_sine":
+    values = {value.key: value.value for value in status.values}
+    if (status.name, values["stamp"]) == ("my_sine", stamp):
+        state = values["state"]
         print(f"{status.name}: {state}" + (f", {status.message}" if state == "refused" else ""))
         if state in ("refused", "done", "stopped"):
             finished.set_result(state)

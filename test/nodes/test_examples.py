@@ -20,7 +20,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from std_msgs.msg import String
 
 from piezo_hysteresis.nodes.messages.conversions import values_of
 from piezo_hysteresis.nodes.runtime.qos import LATCHED
@@ -67,6 +68,18 @@ def test_a_refused_waveform_is_reported(lab):
     assert done.returncode == 1
     assert "my_sine: refused, " in done.stdout
     assert "expected 0 to 4 V" in done.stdout
+
+
+def test_the_outcome_of_an_earlier_waveform_is_not_taken(lab):
+    lab.driver(namespace=NAMESPACE, real_time_factor=5.0, claim_timeout=120.0)
+    lab.streaming(f"{NAMESPACE}/samples")
+    assert run(lab, "send_waveform.py").returncode == 0
+    holders = lab.listen(String, f"{NAMESPACE}/claimed_by", LATCHED)
+    lab.publisher(KeyValue, f"{NAMESPACE}/claim").publish(KeyValue(key="another_lab", value="claim"))
+    lab.wait(lambda: holders and holders[-1].data == "another_lab", "the claim")
+    done = run(lab, "send_waveform.py")
+    assert done.returncode == 1
+    assert "my_sine: refused, " in done.stdout and "done" not in done.stdout
 
 
 def test_a_scan_is_sent(lab):

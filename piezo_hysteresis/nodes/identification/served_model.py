@@ -55,7 +55,7 @@ class ServedModel:
         self._is_ours = False
         self._models = advertise(node, "model")
         self.model: Model | None = None
-        self._set(start)
+        self._set(start, valid=False)
         node.add_on_set_parameters_callback(self._refuse)
         subscribe(node, "recalibrated_model", self._on_recalibrated)
 
@@ -84,8 +84,8 @@ class ServedModel:
         ModelError
             If a parameter is refused. The model is then unchanged.
         """
+        self._set(model, valid=True)
         self.model = model
-        self._set(model)
         send(self._models, String(data=dumps(model)))
 
     def _on_recalibrated(self, message: String) -> None:
@@ -94,8 +94,8 @@ class ServedModel:
         except PiezoError as error:
             self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
 
-    def _set(self, model: Model) -> None:
-        named = to_parameters(model, valid=self.model is not None)
+    def _set(self, model: Model, valid: bool) -> None:
+        named = to_parameters(model, valid=valid)
         # a parameter without a type is removed
         gone = [name for name in self._node.get_parameters_by_prefix(PREFIX[:-1]) if PREFIX + name not in named]
         changes = [Parameter(PREFIX + name) for name in gone]

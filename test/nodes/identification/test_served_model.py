@@ -15,7 +15,7 @@
 """A model as parameters of a node: whole, typed, described, and written by nobody else."""
 
 import pytest
-from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -66,6 +66,16 @@ def test_served_parameters_are_read_only(node):
         result = node.set_parameters_atomically([Parameter(name, value=value)])
         assert not result.successful
         assert name in result.reason
+    assert dumps(from_parameters(values(node))) == dumps(MODEL)
+
+
+def test_a_model_that_is_refused_changes_nothing(node):
+    served = ServedModel(node, START)
+    served.serve(MODEL)
+    node.add_on_set_parameters_callback(lambda _: SetParametersResult(successful=False, reason="on request"))
+    with pytest.raises(ModelError, match="on request"):
+        served.serve(MODEL.with_effect(Creep(gamma=0.015)))
+    assert served.model is MODEL
     assert dumps(from_parameters(values(node))) == dumps(MODEL)
 
 
