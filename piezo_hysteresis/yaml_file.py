@@ -69,19 +69,15 @@ def read_yaml(path: Path) -> Any:
     Parameters
     ----------
     path : Path
-        The file. The caller handles `FileNotFoundError`, because the file may be optional.
+        The file.
 
     Raises
     ------
-    FileNotFoundError, NotADirectoryError
-        If there is no such file.
     RecordingError
-        If it cannot be read, is longer than `LONGEST`, or is not plain YAML.
+        If there is no such file, it cannot be read, is longer than `LONGEST`, or is not plain YAML.
     """
     try:
         raw = read_regular_file(path, LONGEST + 1)
-    except (FileNotFoundError, NotADirectoryError):
-        raise
     except RecordingError:
         raise
     except OSError as error:

@@ -139,6 +139,9 @@ def files(tmp_path_factory, folder):
         ("simulate -o {place}/s --plant {broken}", "broken YAML"),
         ("simulate -o {place}/s --noise -1", "sensor.noise"),
         ("simulate -o {place}/s --sample-period 1", "sample period"),
+        ("record {place}/none.yaml short -o {place}/r", "none.yaml: No such file or directory, expected a YAML file"),
+        ("history {place}/none.csv", "none.csv: cannot be read (No such file or directory), expected"),
+        ("view {experiment} --no-browser --port -1", "port: got -1, expected 0 to 65535"),
         ("effects creeep", "unknown effect 'creeep'"),
     ],
 )
@@ -158,7 +161,19 @@ def test_data_that_do_not_determine_a_model_exit_with_1(piezo, files, tmp_path):
     assert not (tmp_path / "m.yaml").exists()
 
 
-@pytest.mark.parametrize("line", ["", "teleport", "validate", "identify --orders 8", "simulate --protocol long -o x"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "",
+        "teleport",
+        "validate",
+        "identify --orders 8",
+        "simulate --protocol long -o x",
+        "simulate -o x --seed -1",
+        "simulate -o x --hidden -5",
+        "emulate gcs2 --seed -3",
+    ],
+)
 def test_a_command_line_that_makes_no_sense_exits_with_2(piezo, line):
     done = piezo(*line.split())
     assert done.status == 2

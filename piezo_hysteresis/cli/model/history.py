@@ -50,7 +50,9 @@ def run(args: argparse.Namespace) -> int:
     try:
         numbers = read_numbers(path.read_text(encoding="utf-8"), str(path))
     except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(f"{path}: cannot be read ({error}), expected {FILE} of a model node") from None
+        raise RecordingError(
+            f"{path}: cannot be read ({getattr(error, 'strerror', None) or error}), expected {FILE} of a model node"
+        ) from None
     table = Table("time", "group", "parameter", "old", "new", "95 % interval", "unit", "residual, nm")
     for n in numbers:
         table.add_row(

@@ -20,10 +20,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ...errors import ParameterError, RecordingError
+from ...errors import ParameterError
 from ...stage.hidden import hidden_effect
 from ...stage.plant import PlantParameters
 from ...yaml_file import read_yaml
+from .whole_number import whole_number
 
 
 def add_plant_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,9 +32,11 @@ def add_plant_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plant", metavar="FILE", help="YAML file with parameters of the stage, e.g. creep.gamma: 0.015"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the noise and of random waveforms (default: 0)")
+    parser.add_argument(
+        "--seed", type=whole_number, default=0, help="seed of the noise and of random waveforms (default: 0)"
+    )
     parser.add_argument("--noise", metavar="SHARE", type=float, help="RMS sensor noise over full stroke, e.g. 0.0005")
-    parser.add_argument("--hidden", metavar="SEED", type=int, help="hide an effect that this seed selects")
+    parser.add_argument("--hidden", metavar="SEED", type=whole_number, help="hide an effect that this seed selects")
 
 
 def plant(args: argparse.Namespace) -> tuple[PlantParameters, dict[str, Any]]:
@@ -56,10 +59,7 @@ def plant(args: argparse.Namespace) -> tuple[PlantParameters, dict[str, Any]]:
 def _read(path: str | None) -> PlantParameters:
     if path is None:
         return PlantParameters()
-    try:
-        mapping = read_yaml(Path(path).expanduser())
-    except (FileNotFoundError, NotADirectoryError) as error:
-        raise RecordingError(f"{path}: {error.strerror}, expected a YAML file") from None
+    mapping = read_yaml(Path(path).expanduser())
     if not isinstance(mapping, dict):
         raise ParameterError(f"{path}: got a {type(mapping).__name__}, expected part.quantity: value")
     return PlantParameters.from_mapping(mapping)

@@ -38,6 +38,7 @@ from ..stage.record import checked_settings, drive_limits, read_stage
 from ..stage.safe_session import safe_session
 from ..terminal import console, progress, show
 from .destination import require_new_experiment
+from .whole_number import whole_number
 
 FASTEST = 1000.0
 """Speed of a stage given only by a file of plant parameters; 1 is real time."""
@@ -65,7 +66,7 @@ def add_stage_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help=f"longest time for which the stage is driven [s] (default: {LONGEST:g})",
     )
-    group.add_argument("--seed", type=int, default=0, help="seed of the random waveforms (default: 0)")
+    group.add_argument("--seed", type=whole_number, default=0, help="seed of the random waveforms (default: 0)")
 
 
 def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:

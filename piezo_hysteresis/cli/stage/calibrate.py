@@ -24,11 +24,13 @@ import argparse
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ...errors import RecordingError
+from ...acquisition.stage_lock import StageLock
+from ...errors import ParameterError, RecordingError, StageError
 from ...model.parameter_file import number
 from ...stage.daqmx.loop_back import loop_back_delay
 from ...stage.daqmx.setup import DaqmxSetup
 from ...stage.daqmx.stage import DaqmxStage
+from ..options.destination import add_force, require_new_results
 from ..terminal import console
 
 
@@ -56,6 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--amplitude", metavar="V", type=float, default=1.0, help="peak of the noise (default: 1)")
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="parameter file to write")
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -64,11 +67,16 @@ def run(args: argparse.Namespace) -> int:
 
     Raises
     ------
+    ParameterError
+        If the sample period is not positive.
     StageError
-        If the card is not there, or output and input are not wired together.
+        If the card is not there or has a driver, or output and input are not wired together.
     RecordingError
-        If the file cannot be written.
+        If the file exists or cannot be written.
     """
+    require_new_results(args)
+    if not args.sample_period > 0.0:
+        raise ParameterError(f"--sample-period: got {args.sample_period:g} s, expected a positive time")
     setup = DaqmxSetup(
         args.device,
         output=args.wired_output,
@@ -80,9 +88,15 @@ def run(args: argparse.Namespace) -> int:
     )
     stage = DaqmxStage(setup)
     try:
+        lock = StageLock([f"device {stage.description.name}"])
+    except StageError:
+        stage.leave()
+        raise
+    try:
         delay = loop_back_delay(stage, args.amplitude)
     finally:
         stage.close()
+        lock.release()
     wired = f"{args.device}, {args.wired_output} to {args.wired_input}"
     text = (
         f"# Delay of {wired}, at {args.sample_period:g} s per sample, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC\n"

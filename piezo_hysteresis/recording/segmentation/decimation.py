@@ -45,10 +45,10 @@ def load_decimation(folder: Path) -> dict[str, int]:
     RecordingError
         If the file is there but does not map names to whole numbers.
     """
+    if not (folder / FILE).exists():
+        return {}
     try:
         factors = read_yaml(folder / FILE)
-    except (FileNotFoundError, NotADirectoryError):
-        return {}
     except RecordingError as error:
         raise RecordingError(f"{error}; expected phase names and whole numbers") from None
     whole = isinstance(factors, dict) and all(type(n) is int and n >= 1 for n in factors.values())

@@ -52,7 +52,7 @@ class PageServer:
     Raises
     ------
     ParameterError
-        If other machines reach the address and there is no token, or the address is not available.
+        If other machines reach the address and there is no token, or address or port are not available.
     """
 
     def __init__(
@@ -67,6 +67,8 @@ class PageServer:
             raise ParameterError(
                 f"address: got {address}, which other machines reach, without a token; give token_file, or 127.0.0.1"
             )
+        if not 0 <= port <= 65535:
+            raise ParameterError(f"port: got {port}, expected 0 to 65535")
         self._application = Application(FunctionHandler(fill))
         self._address, self._port, self._access = address, port, TokenAccess(token) if token else None
         self._origins = tuple(origins)

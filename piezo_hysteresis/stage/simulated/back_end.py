@@ -75,8 +75,6 @@ def _read_mapping(path: Path) -> Mapping[str, Any]:
         mapping = read_yaml(path)
     except RecordingError as error:
         raise StageError(f"simulated.plant_file: {error}") from None
-    except OSError as error:
-        raise StageError(f"simulated.plant_file: cannot read {path} ({error.strerror})") from None
     if not isinstance(mapping, Mapping):
         raise StageError(f"simulated.plant_file: {path} holds no mapping, expected plant parameters by name")
     return mapping

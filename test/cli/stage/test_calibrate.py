@@ -20,6 +20,7 @@ import pytest
 pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
 pytest.importorskip("grpc")
 
+from piezo_hysteresis.acquisition.stage_lock import StageLock
 from piezo_hysteresis.emulators.daqmx.card import Card
 from piezo_hysteresis.emulators.daqmx.server import DaqmxServer
 from piezo_hysteresis.model.parameter_file import parameters
@@ -52,12 +53,40 @@ def test_the_delay_that_was_written_is_taken_off(piezo, address, tmp_path):
     stage.close()
 
 
+def test_an_existing_file_is_replaced_on_request_only(piezo, address, tmp_path):
+    file = tmp_path / "card.yaml"
+    file.write_text("mine")
+    words = ("calibrate", "Dev1", "--server", address, "--wired-input", "ai2", "-o", str(file))
+    refused = piezo(*words)
+    assert refused.status == 2 and "--force" in refused.err
+    assert file.read_text() == "mine"
+    assert piezo(*words, "--force").status == 0
+    assert "io_delay" in file.read_text()
+
+
+def test_a_card_that_a_driver_holds_is_left_alone(piezo, address, tmp_path):
+    setup = DaqmxSetup("Dev1", server=address, max_slew_rate=1e6)
+    stage = DaqmxStage(setup)
+    stage.set_voltage(3.0)
+    lock = StageLock([f"device {stage.description.name}"])
+    file = tmp_path / "card.yaml"
+    done = piezo("calibrate", "Dev1", "--server", address, "--wired-input", "ai2", "-o", str(file))
+    assert done.status == 2 and "is held by process" in done.err
+    assert not file.exists()
+    stage.leave()
+    lock.release()
+    again = DaqmxStage(setup)
+    assert again.voltage == pytest.approx(3.0, abs=1e-3)
+    again.close()
+
+
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
         (("--wired-input", "ai0"), "wire the output"),
         (("--wired-input", "ai9"), "does not exist"),
-        (("-o", "/"), "write"),
+        (("-o", "/"), "exists already"),
+        (("--sample-period", "0"), "expected a positive time"),
     ],
 )
 def test_a_failed_calibration_gives_one_line(piezo, address, tmp_path, words, reason):
