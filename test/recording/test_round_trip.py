@@ -34,12 +34,12 @@ names = st.sampled_from(["rest", "step", "sine_50hz", "my phase", 'a "b", c', "Â
 
 
 @st.composite
-def experiments(draw, periods=periods, names=names):
+def experiments(draw, periods=periods, names=names, shortest=1):
     """Records that begin anew, follow without a gap, or follow after a hold or lost samples."""
     records = []
     end = 0.0
     for k in range(draw(st.integers(1, 3))):
-        n, period = draw(st.integers(1, 30)), draw(periods)
+        n, period = draw(st.integers(shortest, 30)), draw(periods)
         follows = bool(records) and draw(st.booleans())
         silent = draw(st.integers(0, 1000)) * period if follows else draw(st.floats(0.0, 100.0))
         records.append(
@@ -80,7 +80,9 @@ def test_files_come_back_exactly(name, experiment):
 @settings(max_examples=25)
 @given(
     experiment=experiments(
-        periods=st.sampled_from([2e-6, 2e-5, 1e-4, 5e-3]), names=st.sampled_from(["rest", "step", "sine_50hz"])
+        periods=st.sampled_from([2e-6, 2e-5, 1e-4, 5e-3, 0.1]),
+        names=st.sampled_from(["rest", "step", "sine_50hz"]),
+        shortest=2,  # a single sample has no period
     )
 )
 def test_a_written_bag_reads_back_exactly(experiment):
@@ -90,7 +92,9 @@ def test_a_written_bag_reads_back_exactly(experiment):
         got = read(path)
     assert_same(got, experiment, but=("initial_voltage", "start_time", "sample_period"))
     for a, b in zip(got, experiment, strict=True):
-        assert a.start_time == pytest.approx(b.start_time, abs=2.01 * max(r.sample_period for r in experiment))
+        assert a.sample_period == pytest.approx(b.sample_period, rel=1e-9)
+        slowest = max(r.sample_period for r in experiment)
+        assert a.start_time == pytest.approx(b.start_time, abs=2.01 * len(experiment) * slowest)
         assert b.continues or a.initial_voltage == b.settled_voltage
 
 
@@ -187,6 +191,16 @@ def test_what_cannot_be_written_completely_leaves_no_file(tmp_path, name):
     assert "RecordingError" in failed.stderr
     assert "expected a f" in failed.stderr
     assert not [path for path in place.parent.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize(("first", "second"), [(1e-4, 1e-2), (1e-2, 1e-4)])
+def test_a_bag_keeps_an_unknown_state_at_another_sample_period(tmp_path, first, second):
+    u = np.linspace(0.0, 5.0, 200)
+    records = (Record(u, u, first, "a"), Record(u, u, second, "b", 200 * first, truncated=True))
+    write(Experiment(records), tmp_path / "bag.mcap")
+    got = read(tmp_path / "bag")
+    assert_same(got, records, but=("initial_voltage", "start_time"))
+    assert got[1].start_time == pytest.approx(200 * first, abs=first)
 
 
 def test_phases_are_averaged_on_reading_on_request(tmp_path):

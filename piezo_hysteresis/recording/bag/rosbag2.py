@@ -183,7 +183,7 @@ def _write_blocks(
     bag: BagWriter, record: Record, number: int, clock_ns: int, index: int, *, follows_pause: bool = False
 ) -> tuple[int, int]:
     """Write one record; return the time and the index after it."""
-    longest = max(1, round(_BLOCK_DURATION / record.sample_period))
+    longest = max(2, round(_BLOCK_DURATION / record.sample_period))  # a single sample has no period
     channels = {"voltage": record.voltage, "displacement": record.displacement, **record.channels}
     for a in range(0, record.size, longest):
         part = slice(a, a + longest)

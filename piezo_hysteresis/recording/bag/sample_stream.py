@@ -170,7 +170,7 @@ class SampleStream:
         for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             period = float(periods[self._block_of(a)])
             run, step = (runs[-1], _signed(int(index[a]) - runs[-1].expected)) if runs else (None, 0)
-            if run is None or self._restarted(a, step, period):
+            if run is None or self._restarted(a, step, period, run.period):
                 run, step = _Run(True, period, int(index[a]), int(index[a])), 0
                 runs.append(run)
             elif abs(period / run.period - 1) > PERIOD_TOLERANCE:
@@ -184,8 +184,8 @@ class SampleStream:
             run.period = round_period(float(np.median(same)))
         return runs
 
-    def _restarted(self, arrival: int, step: int, period: float) -> bool:
-        elapsed = (self._time_ns(arrival, period) - self._time_ns(arrival - 1, period)) * 1e-9
+    def _restarted(self, arrival: int, step: int, period: float, before: float) -> bool:
+        elapsed = (self._time_ns(arrival, period) - self._time_ns(arrival - 1, before)) * 1e-9
         return elapsed > 0 if step < 0 else step * period > 10 * max(elapsed, 0.0) + LONGEST_SILENCE
 
     def _cut(self, run: _Run, begin: float, split_phases: bool, notices: list[Notice]) -> Iterator[Segment]:
