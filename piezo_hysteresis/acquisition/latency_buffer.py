@@ -38,11 +38,20 @@ class LatencyBuffer:
         self._latency = latency
         self._phase = np.full(latency, phase, dtype=np.uint32)
         self._events: list[Event] = []
+        self._rested = 0
 
-    @property
-    def is_empty(self) -> bool:
-        """True when all events have been returned."""
-        return not self._events
+    def has_settled(self, at_rest: bool, count: int) -> bool:
+        """Whether all that came before the drive was at rest has been returned.
+
+        Parameters
+        ----------
+        at_rest : bool
+            Whether the drive was at rest for the whole of the last block.
+        count : int
+            Samples of that block.
+        """
+        self._rested = self._rested + count if at_rest else 0
+        return self._rested >= self._latency and not self._events
 
     def follow(self, drive: Drive) -> Drive:
         """Take the drive that is applied now, and return the labels of the samples that are measured now.

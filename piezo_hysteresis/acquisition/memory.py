@@ -71,7 +71,8 @@ class MemoryAcquisition(StreamingAcquisition):
         super()._run()
 
     def _is_interrupted(self) -> bool:
-        return self.playback.is_stopping or (self._keeper is not None and self._keeper.is_lost)
+        self._keeper.begin_step()
+        return self.playback.is_stopping or self._keeper.is_lost
 
     def _step(self) -> None:
         playback = cast(Playback, self.playback)
@@ -144,9 +145,8 @@ class MemoryAcquisition(StreamingAcquisition):
 
     def _break_off(self, playback: Playback) -> None:
         """Let the device go to its safe voltage by itself; the samples on the way are not read."""
-        self.stage.safe()
-        if self._keeper is not None:
-            self._keeper.require()
+        self._go_safe()
+        self._keeper.require()
         with self._access:
             playback.jump(self.stage.description.safe_voltage)
             self._next_target, self._given = None, False

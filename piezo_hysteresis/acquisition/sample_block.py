@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`SampleBlock`: consecutive samples of a stage, and the phase of each. `Delivery`: a block with its events."""
+"""`SampleBlock`: samples of a stage and their phases. `Delivery`: a block and its events. `Tally`: counters."""
 
 from __future__ import annotations
 
@@ -105,3 +105,21 @@ class Delivery:
     block: SampleBlock
     first: int
     events: tuple[Event, ...]
+
+
+@dataclass(slots=True)
+class Tally:
+    """Counters and times [s] of an acquisition since its start."""
+
+    samples: int = 0
+    blocks: int = 0
+    never_measured: int = 0
+    latest: float = 0.0
+    postponed: float = 0.0
+    clock_jumps: float = 0.0
+    clock_drift: float = 0.0
+
+    def count(self, samples: int, never_measured: int) -> None:
+        """Count a block of samples, and those that were not measured before it."""
+        self.samples, self.blocks = self.samples + samples, self.blocks + 1
+        self.never_measured += never_measured

@@ -160,8 +160,19 @@ class DriverSession:
             return None
         period = self.stage.sample_period
         return KeeperLink(
-            settings.stage, self._values, period, self.limits, settings.ramp_rate, settings.keeper_timeout
+            settings.stage,
+            self._values,
+            period,
+            self.limits,
+            settings.ramp_rate,
+            settings.keeper_timeout,
+            self._longest_step(),
         )
+
+    def _longest_step(self) -> float:
+        """Time in which a stage that works goes to its safe voltage and answers every call [s]."""
+        once = self.settings.longest_ramp(self.limits) + self.limits.latency + self._values.get("timeout", 0.0)
+        return 2.0 + 2.0 * (once + self.settings.block_size(self.stage.sample_period) * self.stage.sample_period)
 
     def _source(self, stage: Stage) -> Source:
         if isinstance(stage, ReplayStage):
@@ -178,15 +189,24 @@ class DriverSession:
         Raises
         ------
         StageError
-            If the ramp was not finished in time. The stage was then asked to go there by itself.
+            If the ramp was not finished in time. The stage was then asked to go there by itself. A call of the stage
+            that does not return leaves it to the keeper.
         """
         if self._acquisition is None:
             return
-        timeout = 2.0 + 2.0 * self.settings.longest_ramp(self.limits)
+        timeout = self._longest_step()
         reached = self._acquisition.make_safe(timeout)
+        if self._acquisition.is_running:
+            if self._keeper is not None:
+                self._keeper.abandon()
+            raise StageError(
+                f"{self.limits.name}: a call of the stage does not return; its voltage is unknown, "
+                f"{'its keeper was told to make it safe' if self._keeper else 'and it has no keeper'}; end this "
+                "program, and switch the amplifier off by hand"
+            )
         self._acquisition = None
+        self.stage.safe()  # ends the stream of a device
         if not reached:
-            self.stage.safe()
             raise StageError(
                 f"{self.limits.name}: not at the safe voltage within {timeout:g} s; the stage went there by itself"
             )
@@ -202,10 +222,11 @@ class DriverSession:
         try:
             self.make_safe()
         finally:
-            try:
-                self._close_stage()
-            finally:
-                self._lock.release()
+            if self._acquisition is None:  # otherwise its thread still uses the device
+                try:
+                    self._close_stage()
+                finally:
+                    self._lock.release()
 
     def _close_stage(self) -> None:
         keeper = self._keeper

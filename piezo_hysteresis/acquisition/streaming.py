@@ -19,7 +19,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -31,25 +30,12 @@ from .drive import Drive, Phase
 from .latency_buffer import LatencyBuffer
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
-from .safety.keeper_link import KeeperLink
+from .safety.keeper_link import KeeperLink, NoKeeper
 from .safety.stop_latch import StopLatch
-from .sample_block import Delivery, SampleBlock
+from .sample_block import Delivery, SampleBlock, Tally
 from .time_base import TimeBase, read_together
 
 Source = Playback | RecordedPlayback
-
-
-@dataclass(slots=True)
-class Tally:
-    """Counters and times [s] of an acquisition since its start."""
-
-    samples: int = 0
-    blocks: int = 0
-    never_measured: int = 0
-    latest: float = 0.0
-    postponed: float = 0.0
-    clock_jumps: float = 0.0
-    clock_drift: float = 0.0
 
 
 class StreamingAcquisition:
@@ -103,7 +89,7 @@ class StreamingAcquisition:
         self._late = LatencyBuffer(round(stage.description.latency / time_base.sample_period), playback.phase.number)
         self._device_clock = DeviceClock(time_base) if stage.description.latency else None
         self._latch = StopLatch() if latch is None else latch
-        self._keeper = keeper
+        self._keeper = NoKeeper() if keeper is None else keeper
         self._access = threading.Lock()
         self._halting = threading.Event()
         self._safe = threading.Event()
@@ -163,14 +149,21 @@ class StreamingAcquisition:
             False where the stage was not at the safe voltage within `timeout` [s]. True also where the thread had
             failed before, because it has then made the stage safe or reported that it could not.
         """
-        if not self._thread.is_alive():
+        if not self.is_running:
             return True
-        self._safe.clear()
-        self.cancel()
-        reached = self._safe.wait(timeout)
+        if not self._halting.is_set():
+            self._safe.clear()
+            self.cancel()
+            self._safe.wait(timeout)
+        reached = self._safe.is_set()
         self._halting.set()
         self._thread.join(timeout)
         return reached
+
+    @property
+    def is_running(self) -> bool:
+        """True while the thread uses the stage."""
+        return self._thread.is_alive()
 
     def _run(self) -> None:
         try:
@@ -179,29 +172,39 @@ class StreamingAcquisition:
                     return
             self._time_base.anchor(0, *read_together(self._node_clock))
             while not self._halting.is_set():
-                if self._keeper is not None:
-                    self._keeper.require()
+                self._keeper.require()
+                self._keeper.begin_step()
+                was_safe, begin = self.playback.is_safe, self.index
                 self._step()
-                if self.playback.is_safe and self._late.is_empty:
+                is_safe = self.playback.is_safe
+                if self._late.has_settled(was_safe and is_safe, self.index - begin) and is_safe:
                     self._safe.set()
+            if not self._safe.is_set():  # nobody waits any longer, because a call of the stage took too long
+                self._go_safe()
         except Exception as error:  # after any exception the stage must not keep its voltage
             self._fail(self._abandon(error))
             self._safe.set()
+        finally:
+            self._keeper.end_step()
+
+    def _go_safe(self) -> None:
+        """Send the stage to its safe voltage, unless it was left to its keeper."""
+        if not self._keeper.has_stage:
+            self.stage.safe()
 
     def _abandon(self, error: Exception) -> PiezoError:
         try:
-            self.stage.safe()
+            self._go_safe()
         except Exception as unsafe:
             return StageError(f"{error}; the stage could not be brought to its safe voltage: {unsafe}")
         return error if isinstance(error, PiezoError) else StageError(f"fault of the driver: {error!r}")
 
     def _step(self) -> None:
-        stage = cast(StreamingStage, self.stage)
         if self._device_clock is None and not self._keep_pace():
             return
         with self._access:
             drive = self.playback.take(self.block_size)
-        acquired = stage.exchange(drive.voltage)
+        acquired = cast(StreamingStage, self.stage).exchange(drive.voltage)
         if self._device_clock is not None:
             self._follow(self._device_clock)
         self._pass_on(self.index, self._late.follow(drive), acquired)
@@ -227,6 +230,7 @@ class StreamingAcquisition:
 
     def _wait_until(self, steady: float) -> bool:
         """Wait until a time; returns False where the thread has to end before."""
+        self._keeper.begin_step()
         return not self._halting.wait(max(steady - time.monotonic(), 0.0))
 
     def _pass_on(self, first: int, drive: Drive, acquired: Acquired) -> None:
@@ -242,8 +246,6 @@ class StreamingAcquisition:
             phase=drive.phase,
             follows_gap=first > self.index,
         )
-        self.tally.never_measured += first - self.index
-        self.tally.samples += count
-        self.tally.blocks += 1
+        self.tally.count(count, first - self.index)
         self.index = first + count
         self._deliver(Delivery(block, first, drive.events))

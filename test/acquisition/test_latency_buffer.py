@@ -42,4 +42,5 @@ def test_phases_and_events_are_those_of_the_stream_so_much_later(latency, sizes,
         first += size
     np.testing.assert_array_equal(np.concatenate(got_phase), np.r_[np.full(latency, 7, np.uint32), phase][:total])
     assert got_events == [(m + latency, m) for m, _ in events if m + latency < total]
-    assert late.is_empty == (len(got_events) == len(events))
+    assert late.has_settled(False, 50) == (latency == 0)
+    assert late.has_settled(True, latency) == (len(got_events) == len(events))

@@ -14,12 +14,14 @@
 
 """A session that is interrupted or fails leaves no stage energised; one that is refused moves no stage."""
 
+import threading
 import time
 
 import numpy as np
 import pytest
 
 from benchmarks.wire import LSB, SAFE_WITHIN, WiredSession, check_wire, device
+from piezo_hysteresis.acquisition.session import DriverSession
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.stage.daqmx.tasks import DaqmxError
 from piezo_hysteresis.stage.gcs2.connection import Gcs2Error
@@ -89,3 +91,66 @@ def test_a_refused_second_driver_touches_nothing(word, changes):
         s.acquisition.ramp_to(1.0)
         s.wait(lambda: abs(s.output - 1.0) <= SAFE_WITHIN, "the next set-point")
         s.end()
+
+
+def test_a_device_with_a_buffer_is_reported_safe_when_its_output_is_and_starts_again():
+    with device("nidaqmx") as (name, parameters, amplifier, _):
+        s = WiredSession(name, parameters, amplifier)
+        for _ in range(2):
+            s.deliveries.clear()
+            held(s)
+            s.session.make_safe()
+            assert abs(s.output) <= SAFE_WITHIN
+            assert abs(s.deliveries[-1].block.voltage[-1]) <= 0.01, "it was measured"
+            time.sleep(1.0)  # longer than the buffer
+        assert not s.failures
+        s.end()
+        check_wire(s.wire)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_call_that_does_not_return_is_left_to_the_keeper(kept, monkeypatch):
+    """The stage is not used from two threads; without a keeper the late thread makes it safe."""
+    with device("gcs2") as (name, parameters, amplifier, _):
+        s = WiredSession(name, parameters, amplifier, keeper_timeout=20.0 if kept else 0.0)
+        held(s)
+        released, hangs, callers = threading.Event(), threading.Event(), []
+        read, safe = s.session.stage.read_voltage, s.session.stage.safe
+
+        def hanging():
+            hangs.set()
+            released.wait(60.0)
+            return read()
+
+        monkeypatch.setattr(s.session.stage, "read_voltage", hanging)
+        monkeypatch.setattr(s.session.stage, "safe", lambda: (callers.append(threading.current_thread().name), safe()))
+        monkeypatch.setattr(s.session, "_longest_step", lambda: 1.0)
+        s.wait(hangs.is_set, "the call")
+        expected = "its keeper was told" if kept else "no keeper"
+        with pytest.raises(StageError, match=f"does not return; its voltage is unknown, .*{expected}"):
+            s.session.close()
+        assert callers == []
+        if kept:
+            s.wait(lambda: abs(s.output) <= SAFE_WITHIN, "the keeper")
+        released.set()
+        s.acquisition._thread.join(30.0)
+        assert callers == ([] if kept else ["acquisition"])
+        s.wait(lambda: abs(s.output) <= SAFE_WITHIN, "the safe voltage")
+        s.session.close()
+        check_wire(s.wire)
+
+
+def test_a_thread_that_hangs_ends_the_heartbeats(monkeypatch):
+    with device("gcs2") as (name, parameters, amplifier, _):
+        monkeypatch.setattr(DriverSession, "_longest_step", lambda session: 2.0)
+        s = WiredSession(name, parameters, amplifier, keeper_timeout=1.0)
+        held(s)
+        time.sleep(4.0)
+        assert s.output == pytest.approx(4.0, abs=SAFE_WITHIN), "a thread that works keeps its stage"
+        released = threading.Event()
+        monkeypatch.setattr(s.session.stage, "read_voltage", lambda: released.wait(60.0))
+        s.wait(lambda: abs(s.output) <= SAFE_WITHIN, "the keeper")
+        released.set()
+        s.wait(lambda: s.failures, "the end of the driver")
+        s.end()
+        check_wire(s.wire)

@@ -17,12 +17,15 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import select
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 from ...errors import StageError
@@ -34,6 +37,17 @@ _START = 30.0
 """Longest time that a keeper takes to start and to open the stage [s]."""
 _PER_TIMEOUT = 10
 """Number of heartbeats within the time-out of the keeper."""
+
+
+class NoKeeper:
+    """In place of a `KeeperLink` where a stage has no keeper."""
+
+    is_lost = has_stage = False
+
+    def begin_step(self) -> None:
+        """Do nothing."""
+
+    end_step = require = begin_step
 
 
 class KeeperLink:
@@ -53,6 +67,8 @@ class KeeperLink:
         Rate of the ramp to the safe voltage [V/s].
     timeout : float
         Silence of this process after which the keeper acts [s].
+    patience : float
+        Longest time that a step of the acquisition takes [s]; after it the heartbeats end.
 
     Raises
     ------
@@ -68,6 +84,7 @@ class KeeperLink:
         limits: Description,
         ramp_rate: float,
         timeout: float,
+        patience: float,
     ) -> None:
         order = {
             "stage": word,
@@ -80,6 +97,8 @@ class KeeperLink:
             "driver": os.getpid(),
         }
         self._interval, self._ended, self._is_lost = timeout / _PER_TIMEOUT, threading.Event(), False
+        self._patience, self._until = patience, math.inf
+        self.has_stage = False
         self._process = subprocess.Popen(
             [sys.executable, "-m", "piezo_hysteresis.acquisition.safety.keeper"],
             stdin=subprocess.PIPE,
@@ -105,6 +124,14 @@ class KeeperLink:
         """True where the keeper has acted or died, so that this driver may no longer drive the stage."""
         return self._is_lost or (not self._ended.is_set() and self._process.poll() is not None)
 
+    def begin_step(self) -> None:
+        """The acquisition goes on: send heartbeats for `patience` from now on, and no longer."""
+        self._until = time.monotonic() + self._patience
+
+    def end_step(self) -> None:
+        """The acquisition has ended: send heartbeats without limit."""
+        self._until = math.inf
+
     def require(self) -> None:
         """Raise StageError where the keeper has acted or died."""
         if self.is_lost:
@@ -116,6 +143,8 @@ class KeeperLink:
     def close(self) -> None:
         """End the keeper, because the stage is safe; may be repeated."""
         if self._ended.is_set():
+            with suppress(subprocess.TimeoutExpired):  # one that was given the stage goes on
+                self._process.wait(1.0)
             return
         self._end(GOODBYE)
         try:
@@ -149,6 +178,13 @@ class KeeperLink:
             self._close_pipes()
         return f"its keeper {'then brought it' if is_safe else 'could not bring it'} to its safe voltage"
 
+    def abandon(self) -> None:
+        """Let the keeper act as if this driver had died, because its thread hangs in a call of the stage."""
+        if not self._ended.is_set():
+            self.has_stage = self._is_lost = True
+            self._end(b"")
+            self._close_pipes()
+
     def _end(self, last: bytes) -> None:
         self._ended.set()
         self._beats.join()
@@ -168,7 +204,8 @@ class KeeperLink:
 
     def _beat(self) -> None:
         while not self._ended.wait(self._interval):
-            self._send(b".")
+            if time.monotonic() < self._until:
+                self._send(b".")
 
     def _send(self, text: bytes) -> None:
         try:
