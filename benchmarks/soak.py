@@ -241,7 +241,7 @@ def main() -> int:
     out = console()
     out.print(", ".join(f"{key} {value}" for key, value in machine().items()), highlight=False)
     with tempfile.TemporaryDirectory() as folder:
-        os.environ.update(XDG_RUNTIME_DIR=folder, ROS_LOG_DIR=folder)
+        os.environ.update(ROS_LOG_DIR=folder)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         soak = Soak(options, Path(folder))
         soak.run(out)

@@ -85,7 +85,7 @@ class StopBench:
         file = folder / f"{word}.yaml"
         given = {key: value for key, value in values.items() if value not in ("", ())}
         file.write_text(yaml.safe_dump({"/**": {"ros__parameters": ours | limits | {name: given}}}))
-        self._environment = os.environ | {"XDG_RUNTIME_DIR": str(folder), "ROS_LOG_DIR": str(folder)}
+        self._environment = os.environ | {"ROS_LOG_DIR": str(folder)}
         self._namespace = f"/stop_{word}"
         command = [*self._log.driver, *self._ros, "--params-file", str(file)]
         self._messages = folder / f"{word}.log"

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -182,9 +181,8 @@ def driver_process(folder: Path, word: str, parameters: dict, timeout: float) ->
     given = ours | {"keeper_timeout": timeout, word: parameters}
     file.write_text(yaml.safe_dump({"/**": {"ros__parameters": given}}))
     command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "record", str(file), "short", "-o", str(folder / "e")]
-    environment = os.environ | {"XDG_RUNTIME_DIR": str(folder)}
     with (folder / "log").open("wb") as log:
-        return subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+        return subprocess.Popen(command, stdout=log, stderr=log)
 
 
 def check_wire(wire: np.ndarray, *, begins: float = 0.0) -> None:

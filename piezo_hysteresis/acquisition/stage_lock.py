@@ -19,12 +19,16 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
-import tempfile
+import stat
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
 
 from ..errors import StageError
+
+FOLDERS = (Path("/run/lock"), Path("/tmp"))
+"""Folders for locks; the first one in which every user may write is that of the machine."""
 
 
 class StageLock:
@@ -61,11 +65,31 @@ class StageLock:
         self._files.clear()
 
 
-def _lock(what: str) -> TextIO:
-    folder = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir())
-    path = folder / f"piezo_hysteresis_{hashlib.sha256(what.encode()).hexdigest()[:16]}.lock"
+def _folder() -> Path:
+    """The same folder for every user and every environment: two drivers of one device must meet there."""
+    for folder in FOLDERS:
+        if folder.is_dir() and folder.stat().st_mode & stat.S_IWOTH:
+            return folder
+    return FOLDERS[-1]
+
+
+def _opened(path: Path) -> int:
+    """Descriptor of a file that every user may open. Linux lets nobody create it where it is another user's."""
+    flags = os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW
+    with suppress(FileNotFoundError):
+        return os.open(path, flags)
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        descriptor = os.open(path, flags | os.O_CREAT | os.O_EXCL, 0o666)
+    except FileExistsError:  # made by another driver at the same time
+        return os.open(path, flags)
+    os.fchmod(descriptor, 0o666)  # whatever the umask is
+    return descriptor
+
+
+def _lock(what: str) -> TextIO:
+    path = _folder() / f"piezo_hysteresis_{hashlib.sha256(what.encode()).hexdigest()[:16]}.lock"
+    try:
+        descriptor = _opened(path)
     except OSError as error:
         raise StageError(
             f"{what}: cannot make the lock {path} ({error.strerror}); expected a writable folder"

@@ -14,17 +14,22 @@
 
 """One driver per stage; a lock ends with its process."""
 
+import os
 import subprocess
 import sys
 
 import pytest
 
+from piezo_hysteresis.acquisition import stage_lock
 from piezo_hysteresis.acquisition.stage_lock import StageLock
 from piezo_hysteresis.errors import StageError
 
 HOLDER = """
 import sys
+from pathlib import Path
+from piezo_hysteresis.acquisition import stage_lock
 from piezo_hysteresis.acquisition.stage_lock import StageLock
+stage_lock.FOLDERS = (Path(sys.argv[1]),)
 lock = StageLock(["device A"])
 print("held", flush=True)
 sys.stdin.read()
@@ -33,7 +38,8 @@ sys.stdin.read()
 
 @pytest.fixture(autouse=True)
 def _own_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    tmp_path.chmod(0o777)
+    monkeypatch.setattr(stage_lock, "FOLDERS", (tmp_path,))
 
 
 def test_the_second_is_refused_until_the_first_releases():
@@ -46,8 +52,10 @@ def test_the_second_is_refused_until_the_first_releases():
     StageLock(["device A", "namespace /x"]).release()
 
 
-def test_a_killed_process_releases_its_lock():
-    holder = subprocess.Popen([sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+def test_a_killed_process_releases_its_lock(tmp_path):
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLDER, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
     with holder:
         assert holder.stdout.readline() == b"held\n"
         with pytest.raises(StageError, match=f"process {holder.pid}"):
@@ -55,3 +63,30 @@ def test_a_killed_process_releases_its_lock():
         holder.kill()
         holder.wait()
         StageLock(["device A"]).release()
+
+
+def test_the_folder_does_not_depend_on_the_environment(tmp_path, monkeypatch):
+    monkeypatch.undo()
+    device = f"device {tmp_path}"
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    first = StageLock([device])
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    with pytest.raises(StageError, match="is held by process"):
+        StageLock([device])
+    first.release()
+
+
+def test_a_folder_in_which_not_everybody_may_write_is_passed_over(tmp_path, monkeypatch):
+    narrow, wide = tmp_path / "narrow", tmp_path / "wide"
+    for folder, mode in ((narrow, 0o755), (wide, 0o1777)):
+        folder.mkdir()
+        folder.chmod(mode)
+    monkeypatch.setattr(stage_lock, "FOLDERS", (tmp_path / "missing", narrow, wide))
+    mask = os.umask(0o077)
+    try:
+        StageLock(["device A"]).release()
+    finally:
+        os.umask(mask)
+    assert not list(narrow.iterdir())
+    assert [file.stat().st_mode & 0o777 for file in wide.iterdir()] == [0o666]

@@ -217,7 +217,6 @@ class Lab:
             **os.environ,
             "ROS_DOMAIN_ID": str(self.domain),
             "ROS_LOG_DIR": str(self.folder),
-            "XDG_RUNTIME_DIR": str(self.folder),
             **(environment or {}),
         }
         command = [*(program or _command(executable)), *ros, *arguments]

@@ -16,6 +16,7 @@
 
 import re
 import signal
+import time
 from contextlib import contextmanager
 
 import numpy as np
@@ -38,6 +39,8 @@ pytestmark = pytest.mark.nodes
 PERIOD = 1e-4
 RAMP_RATE = 20.0
 GAIN = 20.0
+SERIAL = f"{time.monotonic_ns()}"
+"""Of a controller that no other program on this machine drives."""
 LSB = 1e-3
 """Converters round the drive to less than this [V]."""
 
@@ -113,7 +116,9 @@ def hill(top, size):
 
 def test_a_controller_with_memory(lab):
     faults = [FAULTS.parse("link_lost@DRR?:4")]
-    controller = Controller(SimulatedStage(seed=3, sample_period=PERIOD), recorder_points=8 * 4000, faults=faults)
+    controller = Controller(
+        SimulatedStage(seed=3, sample_period=PERIOD), serial=SERIAL, recorder_points=8 * 4000, faults=faults
+    )
 
     def voltage_now():
         return float(controller.carry_out("VOL? 1").lines[0].partition("=")[2]) / GAIN
@@ -181,7 +186,7 @@ def test_a_card_that_streams(lab):
 
 @contextmanager
 def emulated_controller():
-    controller = Controller(SimulatedStage(seed=3, sample_period=PERIOD))
+    controller = Controller(SimulatedStage(seed=3, sample_period=PERIOD), serial=SERIAL)
     with Gcs2Server(controller) as server:
         address = {"gcs2__host": server.host, "gcs2__port": server.port, "gcs2__max_slew_rate": 1e6}
         yield {

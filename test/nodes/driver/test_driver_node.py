@@ -18,6 +18,7 @@ No sample is lost unreported, nothing leaves the limits, and its end leaves the 
 """
 
 import signal
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -99,8 +100,13 @@ def test_a_second_driver_refuses_until_the_first_is_gone(lab, same_machine, tmp_
     samples, reported = lab.streaming(), lab.diagnostics()
     other = tmp_path / "other_machine"
     other.mkdir()
-    environment = {} if same_machine else {"XDG_RUNTIME_DIR": str(other)}
-    second = lab.driver("-r", "__node:=second", environment=environment, discovery_time=10.0, **IDEAL)
+    code = (
+        f"import sys, pathlib; from piezo_hysteresis.acquisition import stage_lock; "
+        f"stage_lock.FOLDERS = (pathlib.Path({str(other)!r}),); "
+        "from piezo_hysteresis.nodes.driver.driver_node import main; sys.exit(main())"
+    )
+    program = None if same_machine else [sys.executable, "-c", code]
+    second = lab.driver("-r", "__node:=second", program=program, fresh=not same_machine, discovery_time=10.0, **IDEAL)
     lab.wait(
         lambda: any(s.name == "second: stage" and s.level == b"\x02" for a in reported for s in a.status), "an error"
     )
