@@ -38,6 +38,7 @@ def record_phases(
     session: DriverSession,
     phases: Iterable[tuple[str, Samples, int]],
     progress: Callable[[str], None] = lambda name: None,
+    keep: Callable[[list[Record]], None] = lambda records: None,
 ) -> tuple[Record, ...]:
     """Play phases and record them. Afterwards the stage is at its safe voltage.
 
@@ -49,6 +50,8 @@ def record_phases(
         Name, drive voltage at the sample period of the session [V], and number of samples that are averaged into one.
     progress : callable
         Called with the name of each phase before it is played.
+    keep : callable
+        Called with the records of each phase when it is complete, also where a later phase fails.
 
     Returns
     -------
@@ -70,7 +73,9 @@ def record_phases(
         for name, voltage, average in phases:
             progress(name)
             blocks = _played(session, acquisition, delivered, name, voltage)
-            records += _records(blocks, name, session.sample_period, average, bool(records))
+            complete = _records(blocks, name, session.sample_period, average, bool(records))
+            keep(complete)
+            records += complete
     finally:
         session.make_safe()
     return tuple(records)

@@ -20,6 +20,7 @@ Existing files are refused before the work starts, unless the user allows to rep
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from ...errors import RecordingError
@@ -103,13 +104,16 @@ def require_new_experiment(option: str, path: str) -> None:
     Raises
     ------
     RecordingError
-        If it exists and is not an empty folder.
+        If it exists and is not an empty folder, or cannot be made.
     """
     place = Path(path).expanduser()
     place = place.with_suffix("") if place.suffix == ".mcap" else place
     empty = place.is_dir() and place.suffix not in (".csv", ".mat") and not any(place.iterdir())
     if (place.exists() or place.is_symlink()) and not empty:
         raise RecordingError(f"{option}: {place} exists already, expected a new name; choose another one or remove it")
+    parent = next(folder for folder in place.absolute().parents if folder.exists())
+    if not (parent.is_dir() and os.access(parent, os.W_OK | os.X_OK)):
+        raise RecordingError(f"{option}: {place} cannot be made in {parent}, expected a folder that can be written")
 
 
 def require_new_folder(option: str, path: str | None, force: bool) -> None:

@@ -103,7 +103,7 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
                 while live.due:
                     report_progress(f"playing {live.due_name}", live.time / live.longest)
                     before = _clock(session, records, started)
-                    records += _played(session, live, records, before)
+                    _play(session, live, records, before)
                     live = live.advanced(Experiment(tuple(records)), report_progress)
                     console().print(f"{live.updates[-1].time:6.1f} s: {live.updates[-1].sentence()}", highlight=False)
     finally:
@@ -138,10 +138,14 @@ def _show_plan(session: DriverSession, live: LiveDiagnosis) -> None:
     )
 
 
-def _played(session: DriverSession, live: LiveDiagnosis, before: list[Record], start: float) -> list[Record]:
-    """Records of the phases that are due, on the clock of the experiment."""
-    played = record_phases(session, ((p.name, p.voltage, p.stored_every) for p in live.due))
-    return [replace(r, start_time=r.start_time + start, continues=r.continues or bool(before)) for r in played]
+def _play(session: DriverSession, live: LiveDiagnosis, records: list[Record], start: float) -> None:
+    """Play the phases that are due, and append the complete ones to `records`, on the clock of the experiment."""
+
+    def keep(phase: list[Record]) -> None:
+        before = bool(records)
+        records.extend(replace(r, start_time=r.start_time + start, continues=r.continues or before) for r in phase)
+
+    record_phases(session, ((p.name, p.voltage, p.stored_every) for p in live.due), keep=keep)
 
 
 def _clock(session: DriverSession, records: list[Record], started: float) -> float:

@@ -15,7 +15,8 @@
 """Play a protocol to a stage and record it, without ROS.
 
 STAGE.yaml is a parameter file of the driver (config/driver.yaml): back end, its parameters, and limits. Checks, limits
-and locks are those of the driver node. Ctrl-C brings the stage to its safe voltage.
+and locks are those of the driver node. Ctrl-C brings the stage to its safe voltage. The phases that are complete
+by then are written, also after an error.
 """
 
 from __future__ import annotations
@@ -31,10 +32,11 @@ from ...acquisition.session import DriverSession
 from ...acquisition.settings import DRIVER, DriverSettings
 from ...errors import ParameterError
 from ...identification.protocol.drive_limits import DriveLimits
-from ...record import Experiment
+from ...record import Experiment, Record
 from ...stage.back_ends import BACK_ENDS
 from ...stage.description import Description
 from ...yaml_file import read_yaml
+from ..options.destination import require_new_experiment
 from ..terminal import console, progress
 from .safe_session import safe_session
 from .simulate import PROTOCOLS
@@ -58,7 +60,9 @@ def run(args: argparse.Namespace) -> int:
     PiezoError
         If a file, a stage, limits or a folder is not acceptable. The stage is then at its safe voltage.
     """
+    require_new_experiment("-o", args.output)
     settings, values = read_stage(args.stage)
+    phases: list[list[Record]] = []
     limits: Description | None = None
     try:
         with safe_session(settings, values, f"a recording with {args.stage.resolve()}") as session:
@@ -74,13 +78,25 @@ def run(args: argparse.Namespace) -> int:
                     show(name, played / protocol.summary.duration)
                     played += next(durations)
 
-                records = record_phases(session, ((p.name, p.voltage, p.stored_every) for p in protocol), phase_begins)
+                planned = ((p.name, p.voltage, p.stored_every) for p in protocol)
+                record_phases(session, planned, phase_begins, phases.append)
     except KeyboardInterrupt:
         safe = f"{limits.name} is at its safe voltage, {limits.safe_voltage:g} V; " if limits else ""
-        raise KeyboardInterrupt(f"{safe}nothing was written") from None
-    recording.write(Experiment(records), args.output)
-    console().print(f"wrote {len(records)} records of {len(protocol)} phases to {args.output}")
+        raise KeyboardInterrupt(f"{safe}{_write(phases, args.output)}") from None
+    except BaseException:
+        console().print(_write(phases, args.output))
+        raise
+    console().print(_write(phases, args.output))
     return 0
+
+
+def _write(phases: list[list[Record]], output: str) -> str:
+    """Write the phases that are complete; returns what was written."""
+    records = [record for phase in phases for record in phase]
+    if not records:
+        return "nothing was written"
+    recording.write(Experiment(tuple(records)), output)
+    return f"wrote {len(records)} records of {len(phases)} complete phases to {output}"
 
 
 def read_stage(path: Path) -> tuple[DriverSettings, dict[str, Any]]:

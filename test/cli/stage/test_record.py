@@ -22,7 +22,8 @@ import pytest
 from piezo_hysteresis import recording
 from piezo_hysteresis.acquisition.phase_recorder import record_phases
 from piezo_hysteresis.acquisition.session import DriverSession
-from piezo_hysteresis.cli.stage import record
+from piezo_hysteresis.cli.stage import record, safe_session
+from piezo_hysteresis.errors import StageError
 
 pytestmark = pytest.mark.device
 
@@ -75,14 +76,49 @@ def test_a_file_that_makes_no_sense_is_refused_in_one_line(piezo, tmp_path, text
     assert done.err.count("\n") == 1
 
 
-def test_ctrl_c_brings_the_stage_to_safety_with_a_message_and_writes_nothing(piezo, tmp_path, monkeypatch):
+@pytest.mark.parametrize("error", [KeyboardInterrupt, StageError("the link was lost")])
+def test_what_is_complete_is_written_when_a_later_phase_ends_early(piezo, tmp_path, monkeypatch, error):
+    file, folder = tmp_path / "stage.yaml", tmp_path / "experiment"
+    file.write_text(STAGE.format(memory="false"))
+    begun = []
+
+    def interrupted(session, phases, progress, keep):
+        def begins(name):
+            begun.append(name)
+            if len(begun) == 3:
+                raise error
+
+        return record_phases(session, phases, begins, keep)
+
+    monkeypatch.setattr(record, "record_phases", interrupted)
+    done = piezo("record", file, "short", "-o", folder)
+    assert done.status == (130 if error is KeyboardInterrupt else 2)
+    got = recording.read(folder).records
+    assert [r.phase for r in got] == begun[:2]
+    assert "wrote 2 records of 2 complete phases" in done.out + done.err
+
+
+@pytest.mark.parametrize("place", ["full", "file/experiment"])
+def test_a_place_that_cannot_be_written_is_refused_before_anything_moves(piezo, tmp_path, monkeypatch, place):
+    file = tmp_path / "stage.yaml"
+    file.write_text(STAGE.format(memory="false"))
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "old").touch()
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(safe_session, "DriverSession", lambda *_: pytest.fail("the stage was opened"))
+    done = piezo("record", file, "short", "-o", tmp_path / place)
+    assert done.status == 2
+    assert place.split("/")[0] in done.err
+
+
+def test_ctrl_c_brings_the_stage_to_safety_with_a_message(piezo, tmp_path, monkeypatch):
     file, folder = tmp_path / "stage.yaml", tmp_path / "experiment"
     file.write_text(STAGE.format(memory="false"))
     sessions = []
 
-    def interrupted(session, phases, progress):
+    def interrupted(session, phases, progress, keep):
         sessions.append(session)
-        return record_phases(session, phases, lambda name: name == "noise" and signal.raise_signal(signal.SIGINT))
+        return record_phases(session, phases, lambda name: signal.raise_signal(signal.SIGINT), keep)
 
     monkeypatch.setattr(record, "record_phases", interrupted)
     done = piezo("record", file, "short", "-o", folder)
@@ -103,8 +139,8 @@ def test_more_signals_on_the_way_to_safety_are_ignored(piezo, tmp_path, monkeypa
         signal.raise_signal(number)
         make_safe(session)
 
-    def interrupted(session, phases, progress):
-        return record_phases(session, phases, lambda name: name == "noise" and signal.raise_signal(number))
+    def interrupted(session, phases, progress, keep):
+        return record_phases(session, phases, lambda name: name == "noise" and signal.raise_signal(number), keep)
 
     before = signal.getsignal(number)
     monkeypatch.setattr(DriverSession, "make_safe", signalled)
