@@ -107,6 +107,7 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         # with eight workers is 15 % of a core, whether there is work or not
         "distributed.admin.tick.interval": "10s",
         "distributed.admin.tick.cycle": "10s",
+        "distributed.admin.tick.limit": "20s",  # otherwise every look reports an event loop that does not respond
         "distributed.admin.system-monitor.interval": "5s",
         "distributed.worker.memory.monitor-interval": "2s",
         "distributed.scheduler.active-memory-manager.start": False,  # every result is one row
