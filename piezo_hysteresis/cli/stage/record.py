@@ -37,6 +37,7 @@ from ...stage.back_ends import BACK_ENDS
 from ...stage.description import Description
 from ...yaml_file import read_yaml
 from ..options.destination import require_new_experiment
+from ..options.whole_number import whole_number
 from ..terminal import console, progress
 from .safe_session import safe_session
 from .simulate import PROTOCOLS
@@ -48,7 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("stage", metavar="STAGE.yaml", type=Path, help="parameter file of the driver")
     parser.add_argument("protocol", choices=tuple(PROTOCOLS), help="protocol to play")
     parser.add_argument("-o", "--output", metavar="FOLDER", required=True, help="experiment to write")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the random waveforms (default: 0)")
+    parser.add_argument("--seed", type=whole_number, default=0, help="seed of the random waveforms (default: 0)")
     parser.set_defaults(run=run)
 
 
