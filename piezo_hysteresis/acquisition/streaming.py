@@ -188,7 +188,8 @@ class StreamingAcquisition:
             self._keeper.end_step()
 
     def _go_safe(self) -> None:
-        """Send the stage to its safe voltage, unless it was left to its keeper."""
+        """Send the stage to its safe voltage, unless it was left to its keeper; one that acts finishes first."""
+        self._keeper.let_finish()
         if not self._keeper.has_stage:
             self.stage.safe()
 

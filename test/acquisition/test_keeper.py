@@ -66,6 +66,23 @@ def test_a_driver_that_is_killed_or_stopped_in_motion(tmp_path, word, number):
             process.wait()
 
 
+def test_a_driver_that_goes_on_while_its_keeper_acts_leaves_the_stage_alone(tmp_path):
+    with device("gcs2") as (name, parameters, amplifier, _):
+        process = driver_process(tmp_path, name, parameters, TIMEOUT)
+        try:
+            wait(lambda: amplifier.output > 3.0, "motion", tmp_path)
+            process.send_signal(signal.SIGSTOP)
+            wait(lambda: "bringing" in (tmp_path / "log").read_text(), "the keeper", tmp_path)
+            process.send_signal(signal.SIGCONT)
+            assert process.wait(30.0) != 0
+            assert "the keeper of the stage has ended" in (tmp_path / "log").read_text()
+            assert abs(amplifier.output) <= SAFE_WITHIN
+            check_wire(amplifier.wire)
+        finally:
+            process.kill()
+            process.wait()
+
+
 def test_a_driver_that_is_interrupted_again_and_again_ends_safe(tmp_path):
     with device("gcs2") as (name, parameters, amplifier, _):
         process = driver_process(tmp_path, name, parameters, TIMEOUT)

@@ -39,6 +39,8 @@ from ...stage.stage import Stage
 
 READY = "ready"
 """Answer of the keeper when it has opened the stage."""
+ACTING = "acting"
+"""Word of the keeper to a driver that may no longer use the stage."""
 GOODBYE = b"q"
 """Sent by a driver that has made its stage safe itself."""
 HANDOVER = b"h"
@@ -70,6 +72,8 @@ def main() -> int:
     reason = _listen(order["timeout"])
     if not reason:
         os._exit(0)  # closing the stage would move it
+    with suppress(BrokenPipeError):
+        print(ACTING, flush=True)  # noqa: T201  # a driver that goes on after a silence leaves the stage alone
     sys.stderr.write(f"keeper: {reason}; bringing {stage.description.name} to its safe voltage\n")
     if order["ends_driver"] and reason != _HANDED_OVER:
         with suppress(ProcessLookupError):

@@ -47,7 +47,7 @@ class NoKeeper:
     def begin_step(self) -> None:
         """Do nothing."""
 
-    end_step = require = begin_step
+    end_step = require = let_finish = begin_step
 
 
 class KeeperLink:
@@ -121,8 +121,13 @@ class KeeperLink:
 
     @property
     def is_lost(self) -> bool:
-        """True where the keeper has acted or died, so that this driver may no longer drive the stage."""
-        return self._is_lost or (not self._ended.is_set() and self._process.poll() is not None)
+        """True where the keeper acts or has ended, so that this driver may no longer drive the stage."""
+        return self._is_lost or (not self._ended.is_set() and self._has_spoken())
+
+    def _has_spoken(self) -> bool:
+        """Whether the keeper has said that it acts, or has ended."""
+        assert self._process.stdout is not None
+        return bool(select.select([self._process.stdout], [], [], 0.0)[0])
 
     def begin_step(self) -> None:
         """The acquisition goes on: send heartbeats for `patience` from now on, and no longer."""
@@ -133,12 +138,18 @@ class KeeperLink:
         self._until = math.inf
 
     def require(self) -> None:
-        """Raise StageError where the keeper has acted or died."""
+        """Raise StageError where the keeper acts or has ended."""
         if self.is_lost:
             raise StageError(
                 "the keeper of the stage has ended: this driver was silent for too long, or the keeper was killed; "
                 "configure again"
             )
+
+    def let_finish(self) -> None:
+        """Wait for the end of a keeper that acts: both would send commands otherwise."""
+        if self.is_lost and not self.has_stage:
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(self._patience)
 
     def close(self) -> None:
         """End the keeper, because the stage is safe; may be repeated."""
