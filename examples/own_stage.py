@@ -69,8 +69,7 @@ class OwnStage:
         )
         self._limiter = Limiter(self._description)
         self._put, self._get = put, get
-        self._sample_period, self._voltage, self._closed = 1e-3, 0.0, False
-        self._due = 0.0
+        self._sample_period, self._voltage, self._due, self._closed = 1e-3, 0.0, 0.0, False
 
     @property
     def description(self) -> Description:
