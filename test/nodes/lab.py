@@ -63,6 +63,7 @@ class NodeProcess:
 
     def __init__(self, command: list[str], environment: dict[str, str], log: Path, forked: bool) -> None:
         self._log = log
+        log.touch()  # a forked node opens it only when the server has started
         self._process: ForkedNode | subprocess.Popen[bytes]
         if forked:
             self._process = ForkedNode(command, environment, log)
