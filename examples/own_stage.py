@@ -138,7 +138,7 @@ class OwnStage:
         self.leave()
 
     def leave(self) -> None:
-        """Release the device without moving it: another program drives it."""
+        """Release the device without moving it, because another program drives it."""
         self._closed = True
 
     def _go(self, voltage: float) -> None:
@@ -162,5 +162,5 @@ if __name__ == "__main__":
     record = stage.exchange(np.linspace(0.0, 5.0, 50))
     stage.close()
     print(
-        f"{record.voltage.size} samples, {1e6 * np.ptp(record.displacement):.1f} µm; {device.voltage:.0f} V at the end"
+        f"{record.voltage.size} samples, {1e6 * np.ptp(record.displacement):.1f} µm, {device.voltage:.0f} V at the end"
     )
