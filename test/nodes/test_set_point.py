@@ -82,10 +82,10 @@ def test_the_integral_waits_until_the_stage_has_arrived() -> None:
     point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
     for _ in range(50):
         point.measured(0.0, 100)
-        assert not point.has_left("the stage is at 0 V"), "it is on its way"
+        assert not point.has_left(53.0, TICK), "it is on its way"
         point.tick(TICK)
     assert driver.voltages == [0.0, 5.3]
-    assert not point.has_left("")
+    assert not point.has_left(0.0, TICK)
     driver.hold(point, 1)
     assert len(driver.voltages) == 3 and abs(driver.voltages[-1] - 5.3) < 0.2
 
@@ -93,8 +93,16 @@ def test_the_integral_waits_until_the_stage_has_arrived() -> None:
 def test_a_stage_that_has_arrived_and_is_elsewhere_was_moved_by_something_else() -> None:
     point = SetPoint(Driver(1e-6, 0.0), 0.5)
     point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
-    assert not point.has_left("")
-    assert point.has_left("the stage is at 0 V") == "the stage is at 0 V"
+    assert not point.has_left(0.5, TICK)
+    assert point.has_left(53.0, TICK)
+
+
+def test_a_stage_that_moves_away_before_it_has_arrived_is_moved_by_something_else() -> None:
+    """It may move on for a moment, if it was on its way elsewhere."""
+    point = SetPoint(Driver(1e-6, 0.0), 0.5)
+    point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
+    assert not any(point.has_left(distance, TICK) for distance in (20.0, 30.0, 40.0, 30.0, 20.0, 5.0, 3.0))
+    assert [point.has_left(distance, TICK) for distance in (10.0, 53.0, 53.0, 53.0, 53.0, 53.0, 53.0)][-1]
 
 
 @pytest.mark.parametrize("reason", ["missing", "blocked"])
@@ -102,7 +110,7 @@ def test_a_hold_ends_with_the_driver(reason) -> None:
     driver = Driver(1e-6, 0.0)
     point = SetPoint(driver, 0.5)
     point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
-    client = SimpleNamespace(missing="", blocked="", misplaced=lambda voltage: "")
+    client = SimpleNamespace(missing="", blocked="", distance=lambda voltage: 0.0)
     lost: list[str] = []
     point.hold(TICK, client, lost.append)
     assert not lost

@@ -29,6 +29,8 @@ from ..runtime.sending import send
 
 _INTERVAL = 0.1
 """Time between two corrections [s]; the driver ramps to each of them."""
+_TURNS_WITHIN = 0.5
+"""Time in which a stage that moves away from a new voltage turns [s]."""
 
 
 def volts_per_metre(model: Model, limits: Limits) -> float:
@@ -43,7 +45,7 @@ class SetPoint:
 
     The integral is slow, because a fast feedback loop belongs in the controller of the stage. It stops where the
     voltage is at a limit, and until the stage has reached the last voltage that was sent. A stage that leaves that
-    voltage afterwards is moved by something else, and the hold ends.
+    voltage afterwards, or moves away from it before, is moved by something else, and the hold ends.
 
     Parameters
     ----------
@@ -60,6 +62,7 @@ class SetPoint:
         self._limits = Limits()
         self._sum, self._count = 0.0, 0
         self._has_arrived = False
+        self._nearest, self._away = np.inf, 0.0
 
     def go(self, target: float, voltage: float, slope: float, limits: Limits) -> None:
         """Hold a displacement [m] by a voltage [V]; `slope` is that of voltage against displacement [V/m]."""
@@ -75,20 +78,25 @@ class SetPoint:
         if self._target is None:
             return
         why = driver.missing and f"no driver: waiting for {driver.missing}"
-        why = why or driver.blocked or self.has_left(driver.misplaced(self._voltage))
+        why = why or driver.blocked
+        if not why and self.has_left(driver.distance(self._voltage), elapsed):
+            why = driver.misplaced(self._voltage)
         if why:
             self.leave()
             lost(why)
         else:
             self.tick(elapsed)
 
-    def has_left(self, misplaced: str) -> str:
-        """Reason why the hold has to end, from the reason why the stage is at another voltage; empty for both: none."""
-        if misplaced and not self._has_arrived:
+    def has_left(self, distance: float, elapsed: float) -> bool:
+        """Whether something else moves the stage; `distance` is that from the voltage that was sent, in tolerances."""
+        if distance <= 1.0:
+            self._has_arrived = True
+        elif not self._has_arrived:
             self._waited, self._sum, self._count = 0.0, 0.0, 0  # still on the way
-            return ""
-        self._has_arrived = True
-        return misplaced
+            self._away = self._away + elapsed if distance > self._nearest + 1.0 else 0.0
+            self._nearest = min(self._nearest, distance)
+            return self._away > _TURNS_WITHIN
+        return distance > 1.0
 
     def measured(self, mean: float, count: int) -> None:
         """Add the mean displacement [m] of a number of samples."""
@@ -109,4 +117,5 @@ class SetPoint:
     def _send(self) -> None:
         self._waited, self._sum, self._count = 0.0, 0.0, 0
         self._has_arrived = False
+        self._nearest, self._away = np.inf, 0.0
         send(self._publisher, Float64(data=self._voltage))

@@ -152,12 +152,15 @@ class DriverClient:
 
     def misplaced(self, voltage: float) -> str:
         """Where the stage is, if it is not at `voltage` [V]; empty where it is there, or its voltage is unknown."""
+        is_near = self.distance(voltage) <= 1.0
+        return "" if is_near else f"the stage is at {self._newest:.3g} V instead of {voltage:.3g} V"
+
+    def distance(self, voltage: float) -> float:
+        """Distance of the stage from `voltage` [V] in units of the tolerance; 0 where its voltage is unknown."""
         if self.limits is None or self._newest is None:
-            return ""
+            return 0.0
         near = max(_SAFE_WITHIN, _PLACE_TOLERANCE * (self.limits.voltage_max - self.limits.voltage_min))
-        if abs(self._newest - voltage) <= near:
-            return ""
-        return f"the stage is at {self._newest:.3g} V instead of {voltage:.3g} V"
+        return abs(self._newest - voltage) / near
 
     def claim(self) -> None:
         """Claim the stage. A granted claim is renewed until it is released; a claim that has ended is not renewed."""
