@@ -201,7 +201,8 @@ class SumBlock(Block):
             y += part
             mapped += dpart[: len(dx)]
             mine.append(dpart[len(dx) :])
-            states, tangents = [*states, s], [*tangents, t]
+            states.append(s)
+            tangents.append(t)
         return y, np.vstack((mapped, *mine)), tuple(states), tuple(tangents)
 
     def c_form(self) -> CForm | str:
@@ -260,5 +261,6 @@ class SeriesBlock(Block):
         states, tangents = list[State](), list[State]()
         for member, s, t in zip(self.members, state, tangent, strict=True):
             x, dx, s, t = member.linearise(x, dx, s, t)
-            states, tangents = [*states, s], [*tangents, t]
+            states.append(s)
+            tangents.append(t)
         return x, dx, tuple(states), tuple(tangents)

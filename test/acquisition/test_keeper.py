@@ -20,6 +20,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -40,80 +41,69 @@ def wait(condition, what, folder, timeout=60.0):
         time.sleep(2e-3)
 
 
+@contextmanager
+def driver_in_motion(folder, word, moved_to=3.0):
+    """The process of a driver whose stage has passed a voltage [V], and the amplifier; killed at the end."""
+    with device(word) as (name, parameters, amplifier, _):
+        process = driver_process(folder, name, parameters, TIMEOUT)
+        try:
+            wait(lambda: amplifier.output > moved_to, "motion", folder)
+            yield process, amplifier
+        finally:
+            process.kill()
+            process.wait()
+
+
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 @pytest.mark.parametrize("word", ["gcs2", "nidaqmx"])
 def test_a_driver_that_is_killed_or_stopped_in_motion(tmp_path, word, number):
     if word == "nidaqmx":
         pytest.importorskip("nidaqmx")
-    with device(word) as (name, parameters, amplifier, _):
-        process = driver_process(tmp_path, name, parameters, TIMEOUT)
-        try:
-            wait(lambda: amplifier.output > 3.0, "motion", tmp_path)
-            process.send_signal(number)
-            begin = amplifier.wire.size
-            wait(lambda: "is at its safe voltage" in (tmp_path / "log").read_text(), "the keeper", tmp_path)
-            wire = amplifier.wire
-            assert abs(wire[-1]) <= SAFE_WITHIN
-            check_wire(wire)
-            moved = np.flatnonzero(np.abs(np.diff(wire[begin:])) > 0)
-            assert moved.size * PERIOD < 3 * 6.0 / RAMP + 2.0
-            if number == signal.SIGSTOP:
-                process.send_signal(signal.SIGCONT)
-                assert process.wait(30.0) != 0
-                assert abs(amplifier.output) <= SAFE_WITHIN, "what was stopped moves nothing when it goes on"
-        finally:
-            process.kill()
-            process.wait()
+    with driver_in_motion(tmp_path, word) as (process, amplifier):
+        process.send_signal(number)
+        begin = amplifier.wire.size
+        wait(lambda: "is at its safe voltage" in (tmp_path / "log").read_text(), "the keeper", tmp_path)
+        wire = amplifier.wire
+        assert abs(wire[-1]) <= SAFE_WITHIN
+        check_wire(wire)
+        moved = np.flatnonzero(np.abs(np.diff(wire[begin:])) > 0)
+        assert moved.size * PERIOD < 3 * 6.0 / RAMP + 2.0
+        if number == signal.SIGSTOP:
+            process.send_signal(signal.SIGCONT)
+            assert process.wait(30.0) != 0
+            assert abs(amplifier.output) <= SAFE_WITHIN, "what was stopped moves nothing when it goes on"
 
 
 def test_a_driver_that_goes_on_while_its_keeper_acts_leaves_the_stage_alone(tmp_path):
-    with device("gcs2") as (name, parameters, amplifier, _):
-        process = driver_process(tmp_path, name, parameters, TIMEOUT)
-        try:
-            wait(lambda: amplifier.output > 3.0, "motion", tmp_path)
-            process.send_signal(signal.SIGSTOP)
-            wait(lambda: "bringing" in (tmp_path / "log").read_text(), "the keeper", tmp_path)
-            process.send_signal(signal.SIGCONT)
-            assert process.wait(30.0) != 0
-            assert "the keeper of the stage has ended" in (tmp_path / "log").read_text()
-            assert abs(amplifier.output) <= SAFE_WITHIN
-            check_wire(amplifier.wire)
-        finally:
-            process.kill()
-            process.wait()
+    with driver_in_motion(tmp_path, "gcs2") as (process, amplifier):
+        process.send_signal(signal.SIGSTOP)
+        wait(lambda: "bringing" in (tmp_path / "log").read_text(), "the keeper", tmp_path)
+        process.send_signal(signal.SIGCONT)
+        assert process.wait(30.0) != 0
+        assert "the keeper of the stage has ended" in (tmp_path / "log").read_text()
+        assert abs(amplifier.output) <= SAFE_WITHIN
+        check_wire(amplifier.wire)
 
 
 def test_a_driver_that_is_interrupted_again_and_again_ends_safe(tmp_path):
-    with device("gcs2") as (name, parameters, amplifier, _):
-        process = driver_process(tmp_path, name, parameters, TIMEOUT)
-        try:
-            wait(lambda: amplifier.output > 3.0, "motion", tmp_path)
-            while process.poll() is None:
-                process.send_signal(signal.SIGTERM)
-                time.sleep(0.02)
-            assert process.wait(30.0) in (130, -signal.SIGTERM), (tmp_path / "log").read_text()
-            assert "is at its safe voltage" in (tmp_path / "log").read_text()
-            assert abs(amplifier.output) <= SAFE_WITHIN
-            check_wire(amplifier.wire)
-        finally:
-            process.kill()
-            process.wait()
+    with driver_in_motion(tmp_path, "gcs2") as (process, amplifier):
+        while process.poll() is None:
+            process.send_signal(signal.SIGTERM)
+            time.sleep(0.02)
+        assert process.wait(30.0) in (130, -signal.SIGTERM), (tmp_path / "log").read_text()
+        assert "is at its safe voltage" in (tmp_path / "log").read_text()
+        assert abs(amplifier.output) <= SAFE_WITHIN
+        check_wire(amplifier.wire)
 
 
 def test_a_driver_whose_keeper_is_killed_ends_safe(tmp_path):
-    with device("gcs2") as (name, parameters, amplifier, _):
-        process = driver_process(tmp_path, name, parameters, TIMEOUT)
-        try:
-            wait(lambda: amplifier.output > 1.0, "motion", tmp_path)
-            children = subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True, check=True)
-            os.kill(int(children.stdout.split()[0]), signal.SIGKILL)
-            assert process.wait(30.0) == 2
-            assert "the keeper of the stage has ended" in (tmp_path / "log").read_text()
-            assert abs(amplifier.output) <= SAFE_WITHIN
-            check_wire(amplifier.wire)
-        finally:
-            process.kill()
-            process.wait()
+    with driver_in_motion(tmp_path, "gcs2", moved_to=1.0) as (process, amplifier):
+        children = subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True, check=True)
+        os.kill(int(children.stdout.split()[0]), signal.SIGKILL)
+        assert process.wait(30.0) == 2
+        assert "the keeper of the stage has ended" in (tmp_path / "log").read_text()
+        assert abs(amplifier.output) <= SAFE_WITHIN
+        check_wire(amplifier.wire)
 
 
 @pytest.mark.parametrize("sent", [b"", b"order"])
