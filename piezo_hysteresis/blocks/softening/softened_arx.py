@@ -26,13 +26,14 @@ import numpy as np
 
 from ...c_form import CForm
 from ..arx import ArxBlock
-from ..block import Array, Block, MemorylessBlock, SeriesBlock, State
+from ..block import Array, Block, MemorylessBlock, State
 from ..group_delay import GroupDelayBlock
 from ..inverses.inverted_block import InvertedBlock
 from ..inverses.linear_inverse import LinearInverse
 from ..kernel import kernel
 from .inverted_softening import InvertedSoftening
 from .mode_path import Path, WholePath
+from .series import SeriesBlock
 from .softened_arx_c import FORCE, REST, SETTLE, STEP
 from .stiffness import StaticSoftening, force, force_slope
 
