@@ -24,7 +24,7 @@ from ...record import Experiment, Notice, Record, Samples
 from ..segmentation.waveform import phase_name
 from .channel_defects import channel_defects
 from .initial_condition_check import not_at_rest, origins
-from .lag import lag_notices, lag_of
+from .lag import lag_notices
 from .swapped import swapped
 
 DISPLACEMENT_RANGE = (1e-9, 2e-3)
@@ -45,8 +45,6 @@ _FREQUENCY_MISMATCH = 0.1
 """Relative difference of the frequency from the one in the phase name."""
 _MOVING = 0.05
 """Share of the largest range of the drive from which a record counts as driven."""
-_LEADS = 4.0
-"""Angle by which the displacement must lead the drive [degree]."""
 _SINE = re.compile(r"sine_(\d+(?:\.\d+)?(?:e[+-]?\d+)?)hz")
 """Phase name of a sine, with its frequency [Hz]."""
 
@@ -70,9 +68,9 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
         notices += channel_defects(record)
     late = lag_notices(moving)
     leading = {notice.phase for notice in late if notice.kind == "leads"}
-    late += [found for record in moving if record.phase not in leading and (found := swapped(record))]
     notices += late
-    notices += [n for n in _polarity_and_lead(moving) if n.kind not in {notice.kind for notice in late}]
+    notices += [found for record in moving if record.phase not in leading and (found := swapped(record))]
+    notices += _polarity(moving)
     for record in experiment:
         notices += not_at_rest(record)
     return (*notices, *origins(experiment))
@@ -177,8 +175,8 @@ def _fundamental(record: Record) -> tuple[float, float]:
     return float(spectrum[1:].argmax() + 1) * resolution if spectrum.size > 1 else 0.0, resolution
 
 
-def _polarity_and_lead(moving: list[Record]) -> list[Notice]:
-    """Notices about polarity, and about a displacement that leads its drive, which shifted columns cause."""
+def _polarity(moving: list[Record]) -> list[Notice]:
+    """Notice where the displacement falls when the voltage rises, in the record with the slowest drive."""
     slowest = min(moving, key=lambda r: _fundamental(r)[0], default=None)
     if slowest is None or slowest.size < 64:
         return []
@@ -188,14 +186,6 @@ def _polarity_and_lead(moving: list[Record]) -> list[Notice]:
     at = int(np.abs(u[1:]).argmax()) + 1
     if at < 4 or np.abs(u[at]) ** 2 < 0.2 * float(np.sum(np.abs(u[1:]) ** 2)):
         return []  # too short for an estimate of the period
-    angle = float(np.degrees(np.angle(y[at] / u[at]))) if u[at] != 0 else 0.0
-    falls = abs(angle) > 90.0
-    notices = []
-    if falls:
-        angle = (angle + 180.0 + 180.0) % 360.0 - 180.0
-        notices.append(Notice("polarity", "the displacement falls when the voltage rises", slowest.phase))
-    if angle > _LEADS and lag_of(slowest) is None:
-        lead = angle / 360.0 * (1.0 / _fundamental(slowest)[0])
-        text = f"the displacement leads the voltage by {angle:.1f}° ({lead:.3g} s); one channel is shifted in time"
-        notices.append(Notice("leads", text, slowest.phase, severe=True))
-    return notices
+    if float(np.real(y[at] * np.conj(u[at]))) >= 0.0:
+        return []
+    return [Notice("polarity", "the displacement falls when the voltage rises", slowest.phase)]

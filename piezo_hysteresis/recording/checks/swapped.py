@@ -35,15 +35,18 @@ _POINTS = 24
 """Points of every swing."""
 _MOST_SWINGS = 200
 """Largest number of swings that are used."""
-_OPENINGS = (-0.5, -0.03)
-"""Openings of a loop that is passed the wrong way. A wider one is a lag of more than a quarter of a period, and charge
-amplifiers leave a narrower one."""
+_OPENING = -0.03
+"""Opening from which a loop is passed the wrong way; charge amplifiers leave a narrower one."""
 _ONE_LOOP = 0.97
 """Share of the variance that a loop must explain."""
 _SURE = 6.0
 """Standard errors by which a result must differ from zero."""
-_SLOW = 20e-3
-"""Shortest swing [s] of a loop; a faster drive may pass a resonance, behind which a lag looks like a lead."""
+_HALF_LAG, _WHOLE_LAG = 16e-3, 4e-3
+"""Lags [s] that no stage has.
+
+A lead cannot be told from a lag that is longer by one period, which occurs behind two resonances. If the displacement
+falls when the drive rises, half a period is enough, which occurs behind one resonance.
+"""
 _SEGMENTS, _LONGEST, _LEAST = 6, 4096, 128
 """Segments of a record for its frequency response at least, and largest and smallest number of samples of one."""
 _MOST_SEGMENTS = 128
@@ -70,7 +73,7 @@ def swapped(record: Record) -> Notice | None:
     record : Record
     """
     opening = loop_opening(record)
-    if opening is not None and _OPENINGS[0] < opening < _OPENINGS[1]:
+    if opening is not None and opening < _OPENING:
         text = (
             f"the loop is passed clockwise, {-100.0 * opening:.2g} % wide: the displacement leads the voltage; "
             "both channels are swapped, or one is shifted"
@@ -90,7 +93,7 @@ def loop_opening(record: Record) -> float | None:
     """Width of the loops as a share of the swings; negative where they are passed clockwise.
 
     Between two turns of the drive, the displacement is a function of the drive, and a parabola for every direction that
-    vanishes at the turns. None where the drive is too fast, or no such loop describes the record.
+    vanishes at the turns. None where no such loop describes the record, or where a long lag has the same loop.
     """
     u, y = record.voltage, record.displacement
     span = float(np.ptp(u))
@@ -101,7 +104,7 @@ def loop_opening(record: Record) -> float | None:
     if start.size < _FEWEST_SWINGS:
         return None
     length = float(np.median(end - start))
-    if length < _SHORTEST or length * record.sample_period < _SLOW:
+    if length < _SHORTEST:
         return None
     chosen = slice(None, None, -(-start.size // _MOST_SWINGS))
     start, end = start[chosen], end[chosen]
@@ -119,7 +122,12 @@ def loop_opening(record: Record) -> float | None:
         return None
     # the points of a swing deviate together
     error = np.sqrt(left * _POINTS * np.linalg.pinv(basis.T @ basis)[5, 5])
-    return -float(found[5] / found[2]) if abs(found[5]) > _SURE * error else None
+    if abs(found[5]) <= _SURE * error:
+        return None
+    opening = -float(found[5] / found[2])
+    swings, longest = (2.0, _WHOLE_LAG) if found[2] > 0.0 else (1.0, _HALF_LAG)
+    lag = (swings + np.arctan(opening) / np.pi) * length * record.sample_period
+    return opening if lag > longest else None
 
 
 def lead_in_band(record: Record) -> float | None:

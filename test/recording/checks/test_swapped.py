@@ -57,7 +57,19 @@ def sine(rng):
     return 3.5 + 2.5 * np.sin(2.0 * np.pi * 3.0 * SLOW * np.arange(8000))
 
 
-DRIVES = [(white, FAST), (low_noise, FAST), (chirp, FAST), (triangle, SLOW), (growing, SLOW), (sine, SLOW)]
+def fast_sine(rng):
+    return 3.5 + 2.5 * np.sin(2.0 * np.pi * 150.0 * FAST * np.arange(16000))
+
+
+DRIVES = [
+    (fast_sine, FAST),
+    (white, FAST),
+    (low_noise, FAST),
+    (chirp, FAST),
+    (triangle, SLOW),
+    (growing, SLOW),
+    (sine, SLOW),
+]
 STAGES = [{}, {"creep.gamma": 0.02}, {"sensor.noise": 3e-3}]
 
 
@@ -116,3 +128,15 @@ def test_a_zero_of_the_response_is_no_lead():
     voltage = low_noise(np.random.default_rng(2))
     displacement = 1e-6 * lfilter(zeros / zeros.sum() * poles.sum(), poles, voltage)
     assert not leads(Record(voltage[200:], displacement[200:], FAST))
+
+
+@pytest.mark.parametrize("frequency", [60.0, 120.0, 190.0])
+@pytest.mark.parametrize("mode", [20.0, 50.0, 100.0, 150.0])
+@pytest.mark.parametrize("damping", [0.01, 0.1])
+def test_a_sine_behind_a_resonance_is_no_lead(frequency, mode, damping):
+    pole = np.exp(2.0 * np.pi * mode * FAST * (-damping + 1j * np.sqrt(1.0 - damping**2)))
+    poles = np.real(np.poly([pole, np.conj(pole)]))
+    voltage = 3.5 + 2.5 * np.sin(2.0 * np.pi * frequency * FAST * np.arange(40000))
+    voltage = lfilter([0.01], [1.0, -0.99], voltage)  # an amplifier
+    displacement = 1e-6 * lfilter([poles.sum()], poles, voltage)
+    assert not leads(Record(voltage[20000:], displacement[20000:], FAST))
