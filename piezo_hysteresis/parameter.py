@@ -64,6 +64,8 @@ class Parameter:
         True for a quantity that is free in every record (the phase of mains hum).
     fixed : bool
         True for a quantity that is chosen and never fitted (the time range of a creep bank); it has no sensitivity.
+    powers : (int, int)
+        Powers of the scales U [V] and Y [m] of a model by which its value is multiplied to be a physical quantity.
 
     Raises
     ------
@@ -83,6 +85,7 @@ class Parameter:
     scale: float = 1.0
     per_record: bool = False
     fixed: bool = False
+    powers: tuple[int, int] = (0, 0)
 
     def __post_init__(self) -> None:
         if not self.lower <= self.upper:
@@ -93,6 +96,25 @@ class Parameter:
     def is_array(self) -> bool:
         """True if the value is a tuple."""
         return isinstance(self.value, tuple)
+
+    @property
+    def physical_unit(self) -> str:
+        """Unit of the physical quantity.
+
+        >>> Parameter("p1", "p1", "1", 0.0, -1.0, 1.0, "cubic term", "paper, Eq. (3)", powers=(-3, 1)).physical_unit
+        'm/V^3'
+        """
+        if self.powers == (0, 0):
+            return self.unit
+        above, below = (
+            "·".join(
+                unit if abs(power) == 1 else f"{unit}^{abs(power)}"
+                for unit, power in zip(("V", "m"), self.powers, strict=True)
+                if sign * power > 0
+            )
+            for sign in (1, -1)
+        )
+        return f"{above or '1'}/{below}" if below else above
 
     def check(self, value: object, prefix: str = "") -> Value:
         """Return `value` as float or tuple of floats inside the bounds.

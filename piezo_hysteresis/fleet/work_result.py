@@ -42,7 +42,7 @@ class WorkResult:
     error_percent, before_percent, floor_percent : float or None
         Free-run error, the error before effects were added, and the noise floor [% of range].
     parameters : tuple of mapping
-        ``name``, ``value``, ``lower`` and ``upper`` (95 %, may be None), ``unit``, ``at_bound``.
+        ``name``, ``value``, ``lower`` and ``upper`` (95 %, may be None), ``unit``, ``at_bound``; in SI units.
     notices : tuple of Notice
         Notices about the data.
     model : str or None
@@ -80,7 +80,9 @@ class WorkResult:
 
 
 def fitted_parameters(fit: Fit | None) -> tuple[Mapping[str, Any], ...]:
-    """The fitted parameters with their 95 % intervals, limited to their bounds.
+    """The fitted parameters in SI units, with their 95 % intervals, limited to their bounds.
+
+    Every recording has scales of its own, so the dimensionless numbers of two recordings cannot be compared.
 
     Parameters
     ----------
@@ -94,12 +96,14 @@ def _parameters(fit: Fit) -> Iterable[Mapping[str, Any]]:
     for name, value in fit.values.items():
         row = fit.model.row(name)
         lower, upper = fit.interval(name)
+        volts, metres = row.powers
+        factor = fit.model.voltage_scale**volts * fit.model.displacement_scale**metres
         yield {
             "name": name,
-            "value": _finite(value),
-            "lower": _finite(max(lower, row.lower)),
-            "upper": _finite(min(upper, row.upper)),
-            "unit": row.unit,
+            "value": _finite(factor * value),
+            "lower": _finite(factor * max(lower, row.lower)),
+            "upper": _finite(factor * min(upper, row.upper)),
+            "unit": row.physical_unit,
             "at_bound": name in fit.at_bounds,
         }
 

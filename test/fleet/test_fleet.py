@@ -23,6 +23,7 @@ import signal
 import threading
 from collections import Counter
 
+import numpy as np
 import pytest
 
 pytest.importorskip("distributed")
@@ -37,6 +38,8 @@ from piezo_hysteresis.fleet.finding import find_recordings
 from piezo_hysteresis.fleet.fleet import open_orders, run_fleet
 from piezo_hysteresis.fleet.table.results import Results, read_results
 from piezo_hysteresis.fleet.work import Identify, Validate
+from piezo_hysteresis.record import Experiment
+from piezo_hysteresis.stage.simulated import SimulatedStage
 
 from .conftest import play
 
@@ -79,11 +82,27 @@ def test_identified_parameters_have_intervals_and_the_model_loads(recordings, ru
 
     assert run(recordings / "stage_b" / "2026-10-03", Identify()) == {"done": 1}
     for row in rows():
-        values = model_file.loads(row["model"]).values()
+        model = model_file.loads(row["model"])
         assert row["parameters"]
         for parameter in row["parameters"]:
             assert parameter["lower"] <= parameter["value"] <= parameter["upper"]
-            assert parameter["value"] == pytest.approx(values[parameter["name"]])
+            volts, metres = model.row(parameter["name"]).powers
+            scale = model.voltage_scale**volts * model.displacement_scale**metres
+            assert parameter["value"] == pytest.approx(scale * model.values()[parameter["name"]])
+
+
+def test_parameters_of_one_stage_do_not_depend_on_the_amplitude_of_its_recordings():
+    time = 1e-3 * np.arange(4000)
+    triangle = (1.0 - np.abs(2.0 * (time % 1.0) - 1.0)) * np.repeat([1.0, 0.7], 2000)
+    stage = SimulatedStage(seed=3, sample_period=1e-3)
+    large, small = (
+        {p["name"]: p for p in Identify()(Experiment((stage.play(volts * triangle, "triangle"),))).parameters}
+        for volts in (8.0, 5.0)
+    )
+    assert (large["bouc_wen.beta"]["unit"], large["bouc_wen.p2"]["unit"]) == ("1/V", "m/V")
+    for name in ("bouc_wen.A", "bouc_wen.beta", "bouc_wen.p2"):
+        assert large[name]["value"] == pytest.approx(small[name]["value"], rel=0.03)
+        assert small[name]["lower"] < large[name]["value"] < small[name]["upper"]
 
 
 def test_only_what_changed_is_computed_again(recordings, model_text, run, rows, monkeypatch):

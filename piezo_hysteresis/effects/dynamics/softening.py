@@ -59,8 +59,10 @@ class Softening(Term):
     )
     source = "Duffing oscillator on the modal coordinate"
     parameters = (
-        Parameter("k2", "k2", "1", 0.0, -0.5, 0.5, "change of stiffness with |x|", "Duffing", 0.0, 0.02),
-        Parameter("k3", "k3", "1", 0.0, -1.0, 1.0, "change of stiffness with x²", "Duffing", 0.0, 0.02),
+        Parameter(
+            "k2", "k2", "1", 0.0, -0.5, 0.5, "change of stiffness with |x|", "Duffing", 0.0, 0.02, powers=(0, -1)
+        ),
+        Parameter("k3", "k3", "1", 0.0, -1.0, 1.0, "change of stiffness with x²", "Duffing", 0.0, 0.02, powers=(0, -2)),
     )
 
     @classmethod

@@ -46,9 +46,29 @@ class AsymmetricHysteresis(Term):
     source = "Zhu & Rui 2014, asymmetric Bouc-Wen"
     parameters = (
         Parameter(
-            "phi1", "φ1", "1", 0.0, -5.0, 5.0, "loss that changes sign with direction", "Zhu & Rui 2014", 0.0, 0.5
+            "phi1",
+            "φ1",
+            "1",
+            0.0,
+            -5.0,
+            5.0,
+            "loss that changes sign with direction",
+            "Zhu & Rui 2014",
+            0.0,
+            0.5,
+            powers=(-1, 0),
         ),
         Parameter(
-            "phi2", "φ2", "1", 0.0, -5.0, 5.0, "loss that changes sign with the state", "Zhu & Rui 2014", 0.0, 0.5
+            "phi2",
+            "φ2",
+            "1",
+            0.0,
+            -5.0,
+            5.0,
+            "loss that changes sign with the state",
+            "Zhu & Rui 2014",
+            0.0,
+            0.5,
+            powers=(-1, 0),
         ),
     )

@@ -33,11 +33,47 @@ from ..invertibility import Invertibility
 from .operator import HysteresisOperator, Loop
 
 MODIFIED_BOUC_WEN = (
-    Parameter("A", "A", "1", -0.7691, -1e3, 1e3, "slope of the hysteresis state at a turning point", "paper, Eq. (2)"),
-    Parameter("beta", "β", "1", 4.6075, 0.0, 1e4, "loss rate of the hysteresis state", "paper, Eq. (2)", scale=5.0),
-    Parameter("gamma", "γ", "1", -0.8725, -1e4, 1e4, "asymmetry of the loss rate; |γ| ≤ β", "paper, Eq. (2)"),
-    Parameter("p1", "p1", "1", -0.1085, -1e3, 1e3, "cubic term; 0 gives CBW", "paper, Eq. (3)", scale=0.1),
-    Parameter("p2", "p2", "1", 2.1925, -1e3, 1e3, "proportional term of the output", "paper, Eq. (3)", scale=2.0),
+    Parameter(
+        "A",
+        "A",
+        "1",
+        -0.7691,
+        -1e3,
+        1e3,
+        "slope of the hysteresis state at a turning point",
+        "paper, Eq. (2)",
+        powers=(-1, 1),
+    ),
+    Parameter(
+        "beta",
+        "β",
+        "1",
+        4.6075,
+        0.0,
+        1e4,
+        "loss rate of the hysteresis state",
+        "paper, Eq. (2)",
+        scale=5.0,
+        powers=(-1, 0),
+    ),
+    Parameter(
+        "gamma", "γ", "1", -0.8725, -1e4, 1e4, "asymmetry of the loss rate; |γ| ≤ β", "paper, Eq. (2)", powers=(-1, 0)
+    ),
+    Parameter(
+        "p1", "p1", "1", -0.1085, -1e3, 1e3, "cubic term; 0 gives CBW", "paper, Eq. (3)", scale=0.1, powers=(-3, 1)
+    ),
+    Parameter(
+        "p2",
+        "p2",
+        "1",
+        2.1925,
+        -1e3,
+        1e3,
+        "proportional term of the output",
+        "paper, Eq. (3)",
+        scale=2.0,
+        powers=(-1, 1),
+    ),
 )
 """Numbers of the modified Bouc-Wen operator."""
 

@@ -45,8 +45,8 @@ class EvenInputPolynomial(Effect):
     signature = "The loops differ between the two signs of a bipolar drive. The effect is invisible on a unipolar drive"
     source = "completes the odd polynomial of paper, Eq. (3), as its text requires for symmetric drives"
     parameters = (
-        Parameter("p_e", "p_e", "1", 0.0, -1e2, 1e2, "square term", "paper, Sec. 2", 0.0, 0.05),
-        Parameter("p_4", "p_4", "1", 0.0, -1e2, 1e2, "fourth-power term", "paper, Sec. 2", 0.0, 0.05),
+        Parameter("p_e", "p_e", "1", 0.0, -1e2, 1e2, "square term", "paper, Sec. 2", 0.0, 0.05, powers=(-2, 1)),
+        Parameter("p_4", "p_4", "1", 0.0, -1e2, 1e2, "fourth-power term", "paper, Sec. 2", 0.0, 0.05, powers=(-4, 1)),
     )
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:

@@ -69,8 +69,21 @@ class HysteresisMemory(Effect):
     level_term: ClassVar[type[Term]] = LevelDependentMemory
     """Term that makes the weights of the plays depend on the level."""
     parameters = (
-        Parameter("c", "c_j", "1", (0.0,) * 8, 0.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05),
-        Parameter("reach", "r_max", "1", 0.5, 1e-3, 10.0, "half width of the widest play", "Gu 2016", fixed=True),
+        Parameter(
+            "c", "c_j", "1", (0.0,) * 8, 0.0, 10.0, "weights of the plays", "Gu et al. 2016", 0.0, 0.05, powers=(-1, 1)
+        ),
+        Parameter(
+            "reach",
+            "r_max",
+            "1",
+            0.5,
+            1e-3,
+            10.0,
+            "half width of the widest play",
+            "Gu 2016",
+            fixed=True,
+            powers=(1, 0),
+        ),
         Parameter(
             "virgin", "f_0", "1", 0.0, 0.0, 1.0, "state at rest: 0 relaxed, 1 reached from 0 V", "Gu 2016", fixed=True
         ),

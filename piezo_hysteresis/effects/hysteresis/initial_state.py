@@ -42,4 +42,8 @@ class InitialState(Term):
         "Demagnetise the stage before a record"
     )
     source = "initial condition of paper, Eq. (2)"
-    parameters = (Parameter("h0", "h0", "1", 0.0, -1.0, 1.0, "remanent hysteresis state", "paper, Eq. (2)", 0.0, 0.05),)
+    parameters = (
+        Parameter(
+            "h0", "h0", "1", 0.0, -1.0, 1.0, "remanent hysteresis state", "paper, Eq. (2)", 0.0, 0.05, powers=(0, 1)
+        ),
+    )

@@ -51,8 +51,12 @@ class LevelDependentMemory(Term):
     signature = "Loops of one amplitude are wider at one end of the range than at the other"
     source = "quadratic term of a Preisach operator, written with one function for each play"
     parameters = (
-        Parameter("k_narrow", "k_1", "1", 0.0, -0.5, 0.5, "growth of the narrowest play", "Preisach", 0.0, 0.1),
-        Parameter("k_wide", "k_n", "1", 0.0, -0.5, 0.5, "growth of the widest play", "Preisach", 0.0, 0.1),
+        Parameter(
+            "k_narrow", "k_1", "1", 0.0, -0.5, 0.5, "growth of the narrowest play", "Preisach", 0.0, 0.1, powers=(-1, 0)
+        ),
+        Parameter(
+            "k_wide", "k_n", "1", 0.0, -0.5, 0.5, "growth of the widest play", "Preisach", 0.0, 0.1, powers=(-1, 0)
+        ),
     )
 
 

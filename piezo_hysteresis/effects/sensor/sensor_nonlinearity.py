@@ -54,8 +54,8 @@ class SensorNonlinearity(Effect):
     )
     source = "capacitive sensors 0.02–0.1 %, strain gauges 0.1–1 %"
     parameters = (
-        Parameter("s2", "s2", "1", 0.0, -1.0, 1.0, "square term", "sensor data sheets", 0.0, 0.01),
-        Parameter("s3", "s3", "1", 0.0, -1.0, 1.0, "cubic term", "sensor data sheets", 0.0, 0.01),
+        Parameter("s2", "s2", "1", 0.0, -1.0, 1.0, "square term", "sensor data sheets", 0.0, 0.01, powers=(0, -1)),
+        Parameter("s3", "s3", "1", 0.0, -1.0, 1.0, "cubic term", "sensor data sheets", 0.0, 0.01, powers=(0, -2)),
     )
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:

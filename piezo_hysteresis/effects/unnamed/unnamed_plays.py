@@ -54,7 +54,18 @@ class UnnamedPlays(UnnamedCorrection):
     depends_on = "distance from the last turning points"
     parameters = (
         Parameter("c", "c_j", "1", (0.0,) * 7, 0.0, 0.2, "weights of the plays", "fit", 0.0, 0.01),
-        Parameter("reach", "r_max", "1", 0.5, 1e-6, 10.0, "half width of the widest play", "records", fixed=True),
+        Parameter(
+            "reach",
+            "r_max",
+            "1",
+            0.5,
+            1e-6,
+            10.0,
+            "half width of the widest play",
+            "records",
+            fixed=True,
+            powers=(0, 1),
+        ),
     )
 
     @property

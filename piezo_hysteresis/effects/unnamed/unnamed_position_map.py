@@ -51,9 +51,15 @@ class UnnamedPositionMap(UnnamedCorrection):
     source = "monotone map, piecewise linear"
     depends_on = "position"
     parameters = (
-        Parameter("m", "m_k", "1", (0.0,) * 8, -0.05, 0.05, "deviation at the k-th position", "fit", 0.0, 0.002),
-        Parameter("low", "x_low", "1", 0.0, -10.0, 10.0, "lowest position recorded", "records", fixed=True),
-        Parameter("high", "x_high", "1", 1.0, -10.0, 10.0, "highest position recorded", "records", fixed=True),
+        Parameter(
+            "m", "m_k", "1", (0.0,) * 8, -0.05, 0.05, "deviation at the k-th position", "fit", 0.0, 0.002, powers=(0, 1)
+        ),
+        Parameter(
+            "low", "x_low", "1", 0.0, -10.0, 10.0, "lowest position recorded", "records", fixed=True, powers=(0, 1)
+        ),
+        Parameter(
+            "high", "x_high", "1", 1.0, -10.0, 10.0, "highest position recorded", "records", fixed=True, powers=(0, 1)
+        ),
     )
 
     def check(self) -> None:
