@@ -85,8 +85,8 @@ class Outcome:
 
     @property
     def is_right(self) -> bool:
-        """True if exactly the hidden effects were named."""
-        return set(self.names) == set(self.truth)
+        """True if exactly the hidden effects were named; none where the catalogue does not hold them."""
+        return set(self.names) == (set(self.truth) if self.right_families else set())
 
 
 def play(plant: Plant, phases: tuple[ProtocolPhase, ...], rng: np.random.Generator, clock: float) -> list[Record]:
