@@ -84,7 +84,7 @@ def diagnose(
         raise ParameterError(f"diagnose: got a time limit of {time_limit:g} s, expected more than 0 s")
     end = time.monotonic() + time_limit
     state = DiagnosisState(experiment_of(experiment), model, effects, progress or (lambda word, fraction: None), end)
-    with np.errstate(over="ignore", invalid="ignore"):  # diverging trials have a large cost
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # diverging trials have a large cost
         for run in (p for p in PASSES if explicit_step or p is not subtract_explicit_steps):
             found = run(state)
             if isinstance(found, Diagnosis):

@@ -135,12 +135,13 @@ def search_effects(state: DiagnosisState) -> DiagnosisState:
 
 
 def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
-    """Searches once more if the model that was found corrects averaged samples differently."""
+    """Searches once more, if time is left and the model that was found corrects averaged samples differently."""
     selection = state.searched
-    leaves_a_gap = bool(selection.accepted) and selection.score.excess > ADEQUATE
-    if selection.in_time and leaves_a_gap and state.sharpens and state.fitted.is_coarse(selection.model):
-        return search_effects(fit_baseline(state))
-    return state
+    extends = selection.in_time and bool(selection.accepted)
+    if not (extends and state.sharpens and state.fitted.is_coarse(selection.model)):
+        return state
+    again = search_effects(fit_baseline(state))
+    return again if again.searched.in_time else state
 
 
 def subtract_explicit_steps(state: DiagnosisState) -> DiagnosisState:

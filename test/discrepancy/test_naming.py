@@ -21,6 +21,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.coverage import truth_of
 from benchmarks.naming_cases import UNKNOWN, Case
 from benchmarks.naming_experiments import ProtocolVariant
 from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
@@ -50,6 +51,16 @@ def test_nothing_is_missing_where_nothing_is_hidden(plant):
     assert found.verdict is Verdict.NOTHING_MISSING
     assert found.names == () and found.effects() == []
     assert found.gap.after <= 1.2 * found.gap.floor
+
+
+def test_averages_do_not_change_the_law_of_speed():
+    """An average over the end of a ramp moves less than the ramp; the staircase holds 16 of them."""
+    case = Case("effects", ("rate_dependent_hysteresis",), 7, 5e-4)
+    found = diagnose(case.experiment())
+    truth = truth_of(case.player()[0], found.model)
+    for name, row in found.effects()[0]["parameters"].items():
+        low, high = row["interval_95"]
+        assert low <= truth[f"rate_dependent_hysteresis.{name}"] <= high
 
 
 @pytest.mark.parametrize("name", ["creep", "thermal_drift"])

@@ -38,7 +38,7 @@ SMOOTHER = 0.97
 KINKED = 3.0
 """Ratio of a second difference of the drive to those three samples before and after from which it is a kink."""
 TINY = 1e-12
-"""Share of the drive range below which the drive counts as constant."""
+"""Share of the drive range below which the drive counts as constant, and shortest ramp as a share of a sample."""
 ITS_SIZE = (0.7, 1.3)
 """Range of the fitted factor of a correction that explains the residual (ideal: 1)."""
 
@@ -81,8 +81,8 @@ def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
 
 
 def _better(residual: Array, gradual: Array, abrupt: Array) -> Array:
-    """The correction that leaves the smoother residual; zero if neither improves it much."""
-    change = gradual if _unevenness(residual - gradual) <= _unevenness(residual - abrupt) else abrupt
+    """The correction that leaves the smoother and smaller residual; zero if neither improves it much."""
+    change = min((gradual, abrupt), key=lambda c: _unevenness(residual - c) * np.var(residual - c))
     smoother = _unevenness(residual - change) < SMOOTHER * _unevenness(residual)
     return change if smoother or _holds(residual, change) else np.zeros_like(change)
 
@@ -135,14 +135,17 @@ def sharp_drive(averages: Array, before: float, parts: int, *, abrupt: bool = Fa
     Returns
     -------
     (n parts,) ndarray
-        The drive [V]: in each sample from its start through its middle to its end; a jump where it would overshoot.
+        The drive [V], averaged over every part. In each sample it goes from its start through its middle to its end;
+        where it would overshoot, it is constant before or after a straight ramp.
 
     Examples
     --------
     >>> sharp_drive(np.array([0.0, 0.0, 0.0, 2.0, 4.0, 4.0, 4.0]), 0.0, 4)[12:16].tolist()  # a ramp
     [0.5, 1.5, 2.5, 3.5]
-    >>> sharp_drive(np.array([0.0, 0.0, 0.0, 3.5, 4.0, 4.0, 4.0]), 0.0, 4)[12:16].tolist()  # a jump
+    >>> sharp_drive(np.array([0.0, 0.0, 0.0, 3.5, 4.0, 4.0, 4.0]), 0.0, 4)[12:16].tolist()  # the end of a ramp
     [2.0, 4.0, 4.0, 4.0]
+    >>> sharp_drive(np.array([0.0, 0.0, 0.0, 3.0, 4.0, 4.0, 4.0]), 0.0, 4, abrupt=True)[12:16].round(6)  # a jump
+    array([0., 4., 4., 4.])
     >>> sharp_drive(np.array([0.0, 1.0, 2.0, 2.75, 2.0, 1.0, 0.0]), 0.0, 4)[12:16].tolist()  # a turn at 3 V
     [2.625, 2.875, 2.875, 2.625]
     """
@@ -150,16 +153,18 @@ def sharp_drive(averages: Array, before: float, parts: int, *, abrupt: bool = Fa
     start, end = borders[:-1, None], borders[1:, None]
     middle = averages[:, None]
     peak = 2.0 * middle - 0.5 * (start + end)
-    part = np.arange(parts)
-    at = (part + 0.5) / parts
+    at = (np.arange(parts) + 0.5) / parts
     bent = np.where(at < 0.5, start + 2.0 * at * (peak - start), peak + (2.0 * at - 1.0) * (end - peak))
     height = end - start
     rises = np.abs(height) > TINY * np.abs(averages).max(initial=0.0)
     early = np.divide(end - middle, height, out=np.full_like(height, 0.5), where=rises)
-    jumping = end - height * np.clip(early * parts - part, 0.0, 1.0)
+    share = np.maximum(0.0 if abrupt else 2.0 * np.minimum(early, 1.0 - early), TINY)
+    since = np.arange(parts + 1) / parts - (early - 0.5 * share)
+    covered = 0.5 * share * np.clip(since / share, 0.0, 1.0) ** 2 + np.maximum(since - share, 0.0)
+    straight = start + height * parts * np.diff(covered, axis=1)
     overshoots = abrupt | ((peak - start) * (end - peak) < 0.0)
     goes_on = (middle - start) * (end - middle) >= 0.0
-    return np.ravel(np.where(overshoots & goes_on, jumping, bent))
+    return np.ravel(np.where(overshoots & goes_on, straight, bent))
 
 
 def _borders(v: Array) -> Array:

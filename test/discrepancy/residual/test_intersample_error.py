@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from piezo_hysteresis.discrepancy.residual.intersample_error import intersample_error, sharp_drive
-from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.effects import Arx, BoucWen, RateDependentHysteresis
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -56,6 +56,19 @@ def test_most_of_the_inter_sample_error_is_corrected(drive, factor):
     missed = np.std(slow.displacement - point)
     assert missed > 2e-4 * np.ptp(slow.displacement)
     assert np.std(slow.displacement - point - change) < 0.4 * missed
+
+
+RATE_DEPENDENT = STAGE.with_effect(RateDependentHysteresis(k=0.05, a=0.3, jumps=0.0))
+
+
+@pytest.mark.parametrize(("drive", "factor"), [(triangle(0.0061), 10), (staircase(0.05), 100), (staircase(0.1), 100)])
+def test_ramps_keep_their_speed_where_the_loop_depends_on_it(drive, factor):
+    """The average over the end of a ramp moves less than the ramp in the same time, and would seem slower."""
+    (displacement,) = RATE_DEPENDENT.simulate([Record(drive, np.zeros(drive.size), PERIOD)])
+    slow = Record(drive, displacement, PERIOD).decimate(factor)
+    (change,), (point,) = intersample_error(RATE_DEPENDENT, [slow]), RATE_DEPENDENT.simulate([slow])
+    missed = slow.displacement - point
+    assert np.std(missed - change) < 0.4 * np.std(missed)
 
 
 def test_a_smooth_drive_needs_no_correction_even_with_slow_dynamics():
