@@ -103,7 +103,7 @@ HYSTERESIS: type[HysteresisOperator] = BoucWen
 """The hysteresis that is identified by default."""
 
 MEMORY: type[HysteresisMemory] = HysteresisMemory
-"""The effect that replaces the state of an operator if the stage has a memory of turning points."""
+"""The effect that is used for a stage whose hysteresis remembers turning points, which one Bouc-Wen state cannot."""
 
 OPERATORS: dict[str, type[HysteresisOperator]] = {e.name: e for e in CHAIN if issubclass(e, HysteresisOperator)}
 """Every operator that can be the hysteresis of a model, by its identifier."""
@@ -112,7 +112,7 @@ BASELINE: tuple[type[Effect], ...] = (*OPERATORS.values(), Arx, Offset)
 """The published model, to which the other effects are added."""
 
 FINER_FORMS: tuple[type[Effect], ...] = (LevelDependentMemory, CreepTwoRates, SecondOrderLowPass)
-"""Forms of effects with more parameters for identified models; a search names the effect and not its form."""
+"""Forms of effects with more parameters, for identified models. The gap finder names the effect and not the form."""
 
 UNNAMED: tuple[type[UnnamedCorrection], ...] = (UnnamedPositionMap, UnnamedPlays, UnnamedRelaxation)
 """Corrections without a physical name, for a residual that no effect explains; a search for effects excludes them."""
@@ -125,7 +125,7 @@ BY_NAME: dict[str, type[Effect]] = {e.name: e for e in CHAIN}
 
 
 def effect_named(name: str) -> type[Effect]:
-    """The class of an effect identifier.
+    """The class of the effect with an identifier.
 
     Raises
     ------

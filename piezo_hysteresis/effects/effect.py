@@ -95,8 +95,11 @@ class Effect(ABC):
     """
 
     name: ClassVar[str]
+    """Identifier in model files, in ROS parameters and in the output of `piezo`."""
     family: ClassVar[str]
+    """Name of the group of related effects to which this one belongs."""
     place: ClassVar[ChainPosition]
+    """Position in the chain."""
     entry: ClassVar[str] = ""
     """Effect of the catalogue of which this is another law (`creep_exponential` of ``creep``); empty if it is none."""
     host: ClassVar[str | None] = None
@@ -112,9 +115,13 @@ class Effect(ABC):
     invertibility: ClassVar[Invertibility]
     """Whether `piezo_hysteresis.compensation` can invert the effect."""
     equation: ClassVar[str]
+    """The law as text; x is the input of the effect and y its output, if the effect has no other symbols for them."""
     signature: ClassVar[str]
+    """How the effect shows in measured data."""
     source: ClassVar[str]
+    """Publication or experience from which the law or its size is taken."""
     parameters: ClassVar[tuple[Parameter, ...]]
+    """Table of the parameters with units, bounds and default values."""
 
     def __init__(self, **values: Value) -> None:
         table = {p.name: p for p in self.parameters}
@@ -133,7 +140,7 @@ class Effect(ABC):
         return value
 
     def array(self, name: str) -> np.ndarray:
-        """An array parameter, shape (any,)."""
+        """The values of an array parameter, shape (k,); shape () for a scalar one."""
         return np.array(self._values[name], dtype=np.float64)
 
     @property
@@ -193,15 +200,19 @@ class Effect(ABC):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        """Start values of a search for the effect.
+        """Effects from which a search for the effect starts.
 
-        Switched off, if the sensitivity at the off value is useful; a finite size, if it is zero there (a limit that is
-        not reached); several sizes, if the cost has several minima.
+        The effect is switched off if the sensitivity at its off value is useful. It has a finite size if the
+        sensitivity is zero there (a limit that is not reached). There are several sizes if the cost has several minima.
 
         Parameters
         ----------
         extent : Extent
             Ranges that the experiment covers.
+
+        Returns
+        -------
+        tuple of Effect
         """
         return (cls(),)
 

@@ -37,7 +37,7 @@ class Extent:
     voltage_min, voltage_max : float
         Range of the drive voltage [V].
     max_slew : float
-        Steepest drive between two samples [V/s].
+        Largest rate of change of the drive between two samples [V/s].
     voltage_scale : float
         v = u / voltage_scale [V].
     displacement_scale : float
@@ -49,12 +49,12 @@ class Extent:
     longest_record : float
         Duration of the longest record [s].
     longest_run : float
-        From the beginning of a record that starts at rest to the end of the last record that continues it, the longest
+        Longest time from the beginning of a record that starts at rest to the end of the last record that continues it
         [s].
     peaks : tuple of float
         Frequencies of peaks in the ratio of residual to displacement [Hz], highest peak first.
     temperature : float
-        Mean over the records with a temperature [K].
+        Mean over the records with a temperature [K]; `ROOM` without such a record.
     """
 
     voltage_min: float
@@ -76,12 +76,12 @@ class Extent:
 
     @classmethod
     def of(cls, records: Sequence[Record], voltage_scale: float, displacement_scale: float) -> Self:
-        """Ranges that records in order cover.
+        """Ranges that records cover.
 
         Parameters
         ----------
         records : sequence of Record
-            Records in order.
+            Records in experiment order, at least one.
         voltage_scale, displacement_scale : float
             Scales of the model [V], [m].
         """
@@ -101,7 +101,7 @@ class Extent:
 
 
 def longest_run(records: Sequence[Record]) -> float:
-    """Time from rest to the end of the last record that continues the one before, the longest [s].
+    """Longest time from the start at rest to the end of the last record that continues the one before [s].
 
     Examples
     --------

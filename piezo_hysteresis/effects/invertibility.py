@@ -25,7 +25,7 @@ class Invertibility(StrEnum):
     EXACT = "exact"
     """Exact up to rounding, if the wanted output is reachable."""
     APPROXIMATE = "approximate"
-    """With an error that `Inverse` states."""
+    """With an error, which `compensation.Inverse` reports."""
     NOT_NEEDED = "not needed"
     """The effect does not depend on the drive and cannot be predicted."""
     IMPOSSIBLE = "impossible"

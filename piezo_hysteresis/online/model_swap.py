@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ModelSwap`: new models of a stream, until they replace the present one."""
+"""`ModelSwap`: runs a new model over the voltage history until it can replace the present model."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ PIECE = 50_000
 """Fewest samples of the history that a new model processes per block of the stream; it takes a few milliseconds."""
 
 PACE = 8
-"""Fewest samples of the history that a new model processes per sample of the stream, so that it overtakes it."""
+"""Fewest samples of the history that a new model processes per sample of the stream, so that it reaches the end."""
 
 
 class ModelSwap:
-    """One model that is being run over the history, and the newest of the models that arrived meanwhile."""
+    """One model that is being run over the history, and the newest of the models that were requested meanwhile."""
 
     def __init__(self) -> None:
         self._running: Warmup | None = None
@@ -48,20 +48,33 @@ class ModelSwap:
         return None if self._running is None else self._running.model
 
     def request(self, model: Model, offset: float | None) -> None:
-        """Use a model, with its offset [m] if known, after the one that is running; it replaces one that waits."""
+        """Run a model over the history after the one that is running; it replaces a model that waits.
+
+        Parameters
+        ----------
+        model : Model
+            Model to change to.
+        offset : float or None
+            Its sensor offset [m]; None if it is unknown.
+        """
         self._waiting = model, offset
 
     def advance(self, received: int, history: VoltageHistory, zero: SensorOffset) -> Warmup | None:
-        """Run over the next piece of the history. Returns the run that has reached the end, if any.
+        """Run the new model over the next piece of the history.
 
         Parameters
         ----------
         received : int
             Samples of the stream that came with the newest block.
         history : VoltageHistory
-            Of the stream.
+            Voltages of the stream.
         zero : SensorOffset
-            For a model that begins now.
+            Present offset of the stream; a model whose run begins now averages its prediction over the same window.
+
+        Returns
+        -------
+        Warmup or None
+            The run, if it has reached the end of the history.
 
         Raises
         ------

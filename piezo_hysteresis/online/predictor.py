@@ -35,7 +35,7 @@ from .voltage_history import FULL_SAMPLES, REST_TOLERANCE, DriveHistory, Voltage
 Array = NDArray[np.float64]
 
 FORGETTING = 2.0
-"""Travel of the drive, in voltage scales, after which the initial state of a loop has decayed."""
+"""Travel of the drive [voltage scales] after which the initial state of a hysteresis loop counts as forgotten."""
 
 
 class Predictor:
@@ -48,7 +48,7 @@ class Predictor:
     model : Model, optional
         First model. Without a model the predictor only keeps the history.
     rms_time : float
-        Time over which `residual_rms` is taken [s].
+        Time over which `residual_rms` is computed [s].
 
     Attributes
     ----------
@@ -63,8 +63,8 @@ class Predictor:
     -----
     Without lost samples the prediction equals ``model.run`` from rest at the first voltage, plus `offset`, bit for bit.
     Effects that depend on time count it from the first sample. A new model replaces the old one between two blocks,
-    after it has been run over the history. Without a model, a drive below 5 mV counts as noise of a stage at rest; with
-    one, the limit is 1/2000 of its voltage scale.
+    after it has been run over the history. The stage counts as at rest while the drive stays within 5 mV of one level
+    (without a model), or within 1/2000 of the voltage scale of the model.
 
     Raises
     ------
@@ -94,7 +94,7 @@ class Predictor:
 
     @property
     def offset(self) -> float:
-        """Mean of sensor minus model over the window in which the offset was measured [m]."""
+        """Sensor minus model [m]: the mean over the window in which it was measured, or the value given to `swap`."""
         return self._zero.offset
 
     @property
@@ -121,7 +121,7 @@ class Predictor:
     def swap(self, model: Model, offset: float | None = None) -> None:
         """Change to another model after it has been run over the history; `offset` [m] is its sensor offset, if known.
 
-        Models may arrive faster than they can be run over the history: only the newest of them waits.
+        If models arrive faster than they can be run over the history, only the newest of them waits.
 
         Raises
         ------
@@ -140,7 +140,7 @@ class Predictor:
             self._advance_swap(0)
 
     def zero(self) -> None:
-        """Measure the offset again, over the next 0.1 s."""
+        """Measure the offset again, over the next 0.1 s and at least 20 samples."""
         self._zero_from(self._history.count)
 
     def predict(
@@ -159,7 +159,7 @@ class Predictor:
         index : int
             Running index of the first sample, modulo 2³².
         stamp : int
-            Its time [ns]; distinguishes a restart of the driver from a late block.
+            Its time [ns]; it distinguishes a restart of the driver from a late block.
         voltage : (n,) array_like
             Drive voltage [V].
         displacement : (n,) array_like
@@ -167,7 +167,7 @@ class Predictor:
         follows_gap : bool
             True where the samples missing before the block were never measured: the drive was held meanwhile.
         settled : bool
-            False where the stage has been driven before: its hysteresis begins a stream in an unknown state.
+            False where the stage had been driven before the stream: the state of its hysteresis is then unknown.
 
         Returns
         -------

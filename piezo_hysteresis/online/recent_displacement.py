@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`RecentDisplacement`: keeps the measured displacement of the last minute, to which a model can be fitted."""
+"""`RecentDisplacement`: keeps the measured displacement of the last minute, so that a model can be fitted to it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .voltage_history import FULL_SAMPLES
 Array = NDArray[np.float64]
 
 DURATION = 60.0
-"""Time that is kept [s]; it is shorter where this time would exceed `FULL_SAMPLES`."""
+"""Time that is kept [s]; less where it would hold more than `FULL_SAMPLES` samples."""
 
 
 class RecentDisplacement:
@@ -43,7 +43,15 @@ class RecentDisplacement:
         self._end = self._filled = 0
 
     def add(self, index: int, displacement: Array) -> None:
-        """Add a block of samples [m]; `index` counts its first sample modulo 2^32. A gap empties the buffer first."""
+        """Add a block of samples. If samples are missing before it, the older samples are removed.
+
+        Parameters
+        ----------
+        index : int
+            Running index of the first sample, modulo 2³².
+        displacement : (n,) ndarray
+            Measured displacement [m].
+        """
         if index != self._next:
             self.clear()
         self._next = (index + displacement.size) % 2**32
@@ -59,7 +67,7 @@ class RecentDisplacement:
         self._next, self._end, self._filled = None, 0, 0
 
     def copy(self) -> Array:
-        """A copy of the samples [m], the oldest first."""
+        """A copy of the samples [m], the oldest first, shape (n,)."""
         start = self._end - self._filled
         if start < 0:
             return np.concatenate((self._ring[start:], self._ring[: self._end]))

@@ -25,12 +25,12 @@ Array = NDArray[np.float64]
 
 
 class RunningRms:
-    """Rms over the newest blocks that together hold `count` samples, or over all samples while there are fewer.
+    """Rms over the newest blocks that together hold at least `count` samples, or over all samples if there are fewer.
 
     Parameters
     ----------
     count : int
-        Samples, at least 1.
+        Number of samples, at least 1.
 
     Examples
     --------
@@ -49,7 +49,7 @@ class RunningRms:
         return float(np.sqrt(sum(s for _, s in self._squares) / self._held)) if self._held else None
 
     def add(self, values: Array) -> None:
-        """Take the next samples, shape (n,)."""
+        """Add the next samples, shape (n,)."""
         self._squares.append((values.size, float(values @ values)))
         self._held += values.size
         while self._held - self._squares[0][0] >= self._count:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 TIME = 0.1
-"""Time over which the offset is averaged [s]; a moving stage is averaged over a loop."""
+"""Time over which the offset is averaged [s]."""
 
 FEWEST = 20
 """Fewest samples over which the offset is averaged."""
@@ -36,14 +36,15 @@ class SensorOffset:
     start : int
         First sample of the window.
     wanted : int
-        Number of samples to average. The offset is used from the first sample on and improves with each further one.
+        Number of samples to average. The offset can be used after the first sample; each further one improves it.
     at_rest : bool
-        True where the window ends early with the rest of the stage.
+        True if the owner closes the window as soon as the stage leaves rest.
 
     Attributes
     ----------
     until : float
-        The window stays open until the drive has travelled this far [V], so that it covers a whole loop.
+        The window stays open at least until the travel of the drive reaches this value [V], so that it covers a whole
+        loop; 0 if the number of samples alone closes it.
     """
 
     def __init__(self, start: int, wanted: int, at_rest: bool = False) -> None:
@@ -61,7 +62,7 @@ class SensorOffset:
 
     @property
     def offset(self) -> float:
-        """Sensor minus model [m]; 0 before the first sample."""
+        """Sensor minus model [m]; before the first sample it is the known offset, or 0."""
         return (self._measured - self._modelled) / (self.stop - self.start) if self.stop > self.start else self._known
 
     def add(self, measured: Array, modelled: Array | None, travel: float) -> None:
@@ -89,10 +90,10 @@ class SensorOffset:
         self._end = self.stop
 
     def remodel(self, mean: float) -> None:
-        """Change to another model, whose mean displacement over the window is `mean` [m]."""
+        """Replace the modelled displacement by that of another model, whose mean over the window is `mean` [m]."""
         self._modelled = mean * (self.stop - self.start)
 
 
 def samples_to_average(sample_period: float) -> int:
-    """Number of samples over which the offset is averaged, for samples of a period [s]."""
+    """Number of samples over which the offset is averaged, at a given sample period [s]."""
     return max(FEWEST, round(TIME / sample_period))

@@ -21,14 +21,15 @@ from dataclasses import dataclass
 from ..errors import RecordError
 
 LONGEST_SILENCE = 60.0
-"""Longest time [s] that a jump of the index may stand for if it counts as lost samples; a longer one counts as a
-restart."""
+"""Limit for a jump of the index [s]. From the time of the missing samples, ten times the time between the stamps is
+subtracted. Above this limit the jump counts as a restart, below it as lost samples."""
 
 SHORTEST_PERIOD, LONGEST_PERIOD = 1e-7, 1e3
-"""Limits of the sample period of a stream [s]; the memory needed is inversely proportional to it."""
+"""Limits of the sample period of a stream [s]."""
 
 LONGEST_DELAY = 1.0
-"""A block that repeats samples older than this [s] counts as a restart, not as a late message."""
+"""Limit for an index that goes back [s]. A block that goes back further, or whose stamp is newer than the end of the
+block before, counts as a restart; any other as late or repeated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,7 @@ class Arrival:
     repeated : int
         Number of leading samples that had been received already; all samples where the block is late or repeated.
     restarted : bool
-        True for the first block of a stream.
+        True for the first block of a stream, and for the first block after a restart of the driver.
     """
 
     missing: int = 0
@@ -92,6 +93,10 @@ class SequenceCheck:
             Number of samples.
         follows_gap : bool
             True where the samples missing before it were never measured; they are not counted as lost.
+
+        Returns
+        -------
+        Arrival
         """
         if self._expected is None:
             arrival = Arrival(restarted=True)
@@ -119,5 +124,5 @@ class SequenceCheck:
 
 
 def _signed(step: int) -> int:
-    """A difference modulo 2³² as the nearest signed one."""
+    """The difference closest to zero that equals `step` modulo 2³²."""
     return (step + 2**31) % 2**32 - 2**31

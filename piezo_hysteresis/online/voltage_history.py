@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`VoltageHistory`: keeps the drive voltage since the stage was at rest, so that a new model can be run over it."""
+"""`VoltageHistory`: keeps the past drive voltage, so that a new model can be run over it."""
 
 from __future__ import annotations
 
@@ -25,31 +25,32 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FULL_SAMPLES = 3_000_000
-"""Largest number of samples at the full rate: a minute at 50 kHz, 36 MB."""
+"""Largest number of samples kept at the full rate: a minute at 50 kHz. With the further half that may be kept before
+samples are averaged, this is 36 MB."""
 
 REST_TOLERANCE = 5e-4
 """Voltages within this distance count as held [voltage scales]; it allows for the noise of a measured drive."""
 
 USUAL_SCALE = 10.0
-"""Voltage scale [V] before a model is known."""
+"""Voltage scale [V] that is assumed while there is no model."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DriveHistory:
-    """A frozen copy of the drive voltage since the stage was at rest.
+    """A frozen copy of the past drive voltage.
 
     Parameters
     ----------
     rest_voltage : float
-        Voltage [V] at which the stage rested before.
+        Voltage [V] before the first value: that of the stage at rest, or that of the newest average removed.
     start_time : float
         Time of the first value since the beginning of the stream [s].
     slow_period, sample_period : float
-        Time that a value of `slow`, and of `full`, covers [s].
+        Times [s] that one value of `slow` and one value of `full` cover.
     slow : (m,) ndarray
-        Averages [V].
+        Averages over `slow_period` [V], the oldest first.
     full : (n,) ndarray
-        Every sample after them [V].
+        All samples after the averages [V].
     """
 
     rest_voltage: float
@@ -61,9 +62,9 @@ class DriveHistory:
 
 
 class VoltageHistory:
-    """Every sample of the last `duration`, and averages over `slow_period` of the time before.
+    """Keeps all samples of the last `duration`, and averages over `slow_period` of the time before.
 
-    The history begins where the drive leaves `rest_voltage`; samples of a stage that is still at rest are not kept.
+    The history begins where the drive leaves `rest_voltage`. Samples before the first motion are not kept.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ class VoltageHistory:
     slow_period : float
         Averaging time of older samples [s].
     slow_duration : float
-        Time kept as averages [s]; older averages are removed.
+        Time kept as averages [s]; it grows by up to half before the oldest averages are removed.
     """
 
     def __init__(
@@ -95,12 +96,13 @@ class VoltageHistory:
         self.count = 0
         """Number of samples of the stream so far."""
         self.travel = 0.0
-        """Lower bound of the travel of the drive since the beginning of the stream [V]. It adds the distances between
-        the ends of all blocks that are not held, so that the noise of a measured drive does not count."""
+        """Travel of the drive since the beginning of the stream [V], a lower bound. Each block adds its voltage range,
+        including the last voltage that was counted. A range below twice `tolerance` is not counted, because it may be
+        the noise of a measured drive."""
         self._unknown_at: float | None = None
-        self._counted = 0.0
+        self._last_counted = 0.0
         self.has_rested = False
-        """True once a block of the drive stood still."""
+        """True once a block of the drive was held."""
         self._has_moved = False
         full = min(duration / sample_period, FULL_SAMPLES)
         self._limit = self.factor * max(1, round(full / self.factor))
@@ -111,16 +113,16 @@ class VoltageHistory:
 
     @property
     def start(self) -> int:
-        """Number of the first sample that is kept, averaged or in full."""
+        """Position in the stream of the first sample that is kept, averaged or in full."""
         return self._full_start - self.factor * self._slow.size
 
     @property
     def known_travel(self) -> float:
-        """Travel since the drive was last unknown [V]; infinite where it was always known."""
+        """Travel of the drive since its voltage was last unknown [V]; infinite if the voltage was always known."""
         return math.inf if self._unknown_at is None else self.travel - self._unknown_at
 
     def mark_unknown(self) -> None:
-        """State that the drive was unknown until now: the voltages of lost samples, or of the time before the first."""
+        """Record that earlier voltages are unknown: those of lost samples, or those before the first sample."""
         self._unknown_at = self.travel
 
     @property
@@ -134,13 +136,13 @@ class VoltageHistory:
         held = high - low <= 2 * self.tolerance
         if self.count == 0:
             self.rest_voltage = float(voltage[0])
-            self._counted = self.rest_voltage
+            self._last_counted = self.rest_voltage
         self.count += voltage.size
         self.has_rested |= held
         if not self._has_moved and held and max(high - self.rest_voltage, self.rest_voltage - low) <= self.tolerance:
             return
         self._has_moved = True
-        self._travel(low, high, float(voltage[-1]))
+        self._add_travel(low, high, float(voltage[-1]))
         if self._kept + voltage.size > self._full.size:
             grown = np.empty(2 * (self._kept + voltage.size))
             grown[: self._kept] = self._full[: self._kept]
@@ -151,19 +153,19 @@ class VoltageHistory:
             self._average()
 
     def read(self, position: int, values: int) -> tuple[int, Array]:
-        """Voltages from sample `position` of the stream on.
+        """The voltages of the stream from sample `position` on.
 
         Parameters
         ----------
         position : int
             Where the last `read` ended, or `start`.
         values : int
-            Number of values. At the full rate it is rounded up to whole averages; at the end there are fewer.
+            Number of values. At the full rate it is rounded up to a multiple of `factor`; at the end there are fewer.
 
         Returns
         -------
         factor : int
-            Samples of the stream that one value stands for: 1, or `factor` in the averaged part.
+            Number of samples of the stream that one value covers: 1, or `factor` in the averaged part.
         voltage : (m,) ndarray
             Averaged or full values [V], never both; empty at the end of the stream.
         """
@@ -186,11 +188,11 @@ class VoltageHistory:
     def _full_start(self) -> int:
         return self.count - self._kept
 
-    def _travel(self, low: float, high: float, last: float) -> None:
-        way = max(high, self._counted) - min(low, self._counted)
-        if way > 2 * self.tolerance:
-            self.travel += way
-            self._counted = last
+    def _add_travel(self, low: float, high: float, last: float) -> None:
+        span = max(high, self._last_counted) - min(low, self._last_counted)
+        if span > 2 * self.tolerance:
+            self.travel += span
+            self._last_counted = last
 
     def _average(self) -> None:
         old = (self._kept - self._limit) // self.factor * self.factor
@@ -204,5 +206,5 @@ class VoltageHistory:
 
 
 def is_held(voltage: Array, tolerance: float = REST_TOLERANCE * USUAL_SCALE) -> bool:
-    """True where a block of voltages [V] stays within `tolerance` [V] of one level."""
+    """Whether a block of voltages [V], shape (n,), stays within `tolerance` [V] of one level."""
     return float(voltage.max()) - float(voltage.min()) <= 2 * tolerance

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 
 class Warmup:
-    """Runs a model over the history in pieces, so that the stream does not have to wait.
+    """Runs a model over the history in pieces, between the blocks of the stream.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ class Warmup:
     history : VoltageHistory
         History of the stream, which may grow during the run.
     zero : SensorOffset
-        Offset whose window determines the samples for the mean prediction.
+        Offset whose window gives the samples for `mean`.
     offset : float, optional
-        Sensor minus model [m], where it is known.
+        Sensor minus model [m], if known.
 
     Attributes
     ----------
@@ -78,12 +78,17 @@ class Warmup:
         return self._sum / self._weight if self._weight else None
 
     def advance(self, values: int) -> bool:
-        """Run the model over the next piece of the history; returns True when it has reached the end.
+        """Run the model over the next piece of the history.
 
         Parameters
         ----------
         values : int
             Number of voltages, averaged or at the full rate.
+
+        Returns
+        -------
+        bool
+            True when the model has reached the end of the history.
 
         Raises
         ------
@@ -114,12 +119,12 @@ class Warmup:
 def compile_kernels(inform: Callable[[str], object] = str) -> None:
     """Run every effect once at the fast and at the slow rate, so that its kernels are compiled before a stream begins.
 
-    An effect that needs a further effect (softening needs a resonance) is compiled when it is first used.
+    An effect that cannot run in this test model (softening needs a resonance) is compiled when it is first used.
 
     Parameters
     ----------
     inform : callable
-        Called with one line as soon as a kernel is really compiled; later starts only load it.
+        Called with one line of text when a kernel is compiled. It is not called if all kernels are loaded from disk.
     """
     with on_compilation(lambda: inform("compiling kernels, once; this takes about 30 s")):
         _run_every_effect()

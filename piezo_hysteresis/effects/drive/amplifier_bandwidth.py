@@ -25,7 +25,7 @@ from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 from ..invertibility import Invertibility
 
-FOUND_BY = (1e-5, 2e-5, 5e-5, 1.5e-4)
+START_VALUES = (1e-5, 2e-5, 5e-5, 1.5e-4)
 """Start values of the time constant [s]."""
 
 
@@ -53,7 +53,7 @@ class AmplifierBandwidth(Effect):
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         """Off, and several sizes, because the system after the pole is not linear."""
-        return cls(), *(cls(tau=tau) for tau in FOUND_BY)
+        return cls(), *(cls(tau=tau) for tau in START_VALUES)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return LowPassBlock("amplifier_bandwidth.tau", linear_step(self["tau"], setting.sample_period))

@@ -24,7 +24,7 @@ from .amplifier_bandwidth import AmplifierBandwidth
 
 
 class AmplifierBandwidthHeld(AmplifierBandwidth):
-    """The pole of `AmplifierBandwidth` behind a digital-to-analogue converter, which holds each value of the drive.
+    """The pole of `AmplifierBandwidth` after a digital-to-analogue converter, which holds each value of the drive.
 
     Parameters
     ----------
@@ -33,9 +33,10 @@ class AmplifierBandwidthHeld(AmplifierBandwidth):
 
     Notes
     -----
-    The actuator reaches its turning points at the ends of the periods of the converter. The pole gives the drive at
-    these instants; the hold itself is a delay of the stage. In slow records the drive is linear between samples, and
-    the pole has the same lag T/(e^(T/τ) − 1), with the period T of the model.
+    The actuator reaches its turning points at the ends of the periods of the converter. The block computes the output
+    of the pole at these instants; the hold itself is a delay of the stage. In slow records the drive is taken as linear
+    between samples, and the pole is replaced by one with the time constant T/(e^(T/τ) − 1), which has the same lag; T
+    is the sample period of the model.
     """
 
     name = "amplifier_bandwidth_held"

@@ -48,7 +48,7 @@ class AmplifierSaturation(Effect):
     invertibility = Invertibility.EXACT
     family = "amplifier"
     place = ChainPosition.DRIVE
-    equation = "y = x − ramp(x − upper) + ramp(lower − x),  ramp(e) = (e + c)²/(4c) inside |e| < c, max(e, 0) outside"
+    equation = "y = x − ramp(x − u_max) + ramp(u_min − x),  ramp(e) = (e + c)²/(4c) if |e| < c, otherwise max(e, 0)"
     signature = "The loop is flattened at one end of the range"
     source = "output limits of high-voltage amplifiers"
     parameters = (
@@ -97,7 +97,7 @@ class AmplifierSaturationBlock(MemorylessBlock):
         self.lower, self.upper, self.corner = lower, upper, corner
 
     def _ramp(self, excess: Array) -> tuple[Array, Array, Array]:
-        """Ramp and its derivatives by the excess and by the corner."""
+        """Ramp, and its derivatives with respect to the excess and to the corner."""
         c = self.corner
         bent = np.abs(excess) < c
         e = np.where(bent, excess, 0.0)

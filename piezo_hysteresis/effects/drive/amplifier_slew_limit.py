@@ -47,8 +47,8 @@ class AmplifierSlewLimit(Effect):
     invertibility = Invertibility.EXACT
     family = "amplifier"
     place = ChainPosition.DRIVE
-    equation = "|dy/dt| ≤ S = I_max/C"
-    signature = "Fast large signals become triangles"
+    equation = "|dy/dt| ≤ S = I_max/(C·gain)"
+    signature = "Fast signals of large amplitude become triangles"
     source = "0.5 A into 20 µF: 25 V/ms after the amplifier"
     parameters = (
         Parameter("S", "S", "V/s", UNLIMITED, 1e-2, UNLIMITED, "largest slope of the drive", "I_max/C", UNLIMITED, 1e3),
@@ -65,7 +65,7 @@ class AmplifierSlewLimit(Effect):
 
 @kernel
 def run_limit(x, reach, state, y):
-    """Steps of at most `reach` per sample to y (n,); state [y] is updated."""
+    """Follow x (n,) in steps of at most `reach` per sample; writes y (n,) and updates state [y]."""
     held = state[0]
     for i in range(x.size):
         if x[i] > held + reach:
@@ -80,7 +80,7 @@ def run_limit(x, reach, state, y):
 
 @kernel
 def linearise_limit(x, dx, reach, period, state, tangent, y, dy):
-    """`run_limit` with rows dx (m, n) to dy (m + 1, n), the last by S; tangent (m + 1,) is updated."""
+    """`run_limit` and its derivatives: dx (m, n) to dy (m + 1, n), the last row by S; tangent (m + 1,) is updated."""
     m, held = dx.shape[0], state[0]
     for i in range(x.size):
         if x[i] > held + reach:

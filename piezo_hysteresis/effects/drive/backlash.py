@@ -28,7 +28,7 @@ from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 from ..invertibility import Invertibility
 
-FOUND_BY = (0.001, 0.002, 0.005, 0.01)
+START_VALUES = (0.001, 0.002, 0.005, 0.01)
 """Start values of the half width, as shares of the drive range."""
 
 
@@ -54,9 +54,9 @@ class Backlash(Effect):
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         """Off, and several widths.
 
-        The derivative at width 0 does not predict a play that is wider than the noise of the drive.
+        The derivative at width 0 does not predict the effect of a play that is wider than the noise of the drive.
         """
-        return cls(), *(cls(b=share * extent.span) for share in FOUND_BY)
+        return cls(), *(cls(b=share * extent.span) for share in START_VALUES)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return BacklashBlock(self["b"])
@@ -64,7 +64,7 @@ class Backlash(Effect):
 
 @kernel
 def run_play(x, b, state, y):
-    """Play of half width b to y (n,); state [y] is updated."""
+    """Output y (n,) of a play of half width b; state [y] is updated."""
     held = state[0]
     for i in range(x.size):
         held = max(x[i] - b, min(x[i] + b, held))
@@ -74,9 +74,9 @@ def run_play(x, b, state, y):
 
 @kernel
 def linearise_play(x, dx, b, state, tangent, y, dy):
-    """`run_play` with rows dx (m, n) to dy (m + 1, n), the last by b; tangent (m + 1,) is updated.
+    """`run_play` and its derivatives: dx (m, n) to dy (m + 1, n), the last row by b; tangent (m + 1,) is updated.
 
-    If an edge just touches, a row counts only if it pushes: the derivative for a growing parameter.
+    Where an edge just touches the output, the derivative is the one for a growing parameter.
     """
     m, held = dx.shape[0], state[0]
     for i in range(x.size):

@@ -53,8 +53,9 @@ class Arx(Effect):
 
     Notes
     -----
-    Single coefficients of a high-order ARX are not identifiable (poles and zeros nearly cancel): compare G(f).
-    In records slower than the model, G acts as its dc gain and its group delay at dc.
+    The single coefficients of an ARX model of high order are not identifiable, because poles and zeros nearly cancel.
+    Compare G(f) instead. In records slower than the model, G is replaced by its dc gain and its group delay at dc,
+    Eq. (13).
 
     Examples
     --------
@@ -84,24 +85,24 @@ class Arx(Effect):
 
     @property
     def pole_radius(self) -> float:
-        """Largest pole radius."""
+        """Largest magnitude of a pole; 0 without poles."""
         a = self.array("a")
         return float(np.abs(np.roots(np.concatenate(([1.0], a)))).max()) if a.size else 0.0
 
     @property
     def dc_gain(self) -> float:
-        """G(1)."""
+        """G(1), Eq. (11)."""
         return float(self.array("b").sum() / (1.0 + self.array("a").sum()))
 
     @property
     def group_delay(self) -> float:
-        """Group delay near dc in samples, delay included."""
+        """Group delay near dc [samples], `delay` included, Eq. (11)."""
         a, b = self.array("a"), self.array("b")
         lag_b = np.arange(b.size) @ b / b.sum() if b.sum() else 0.0
         return float(self["delay"] + lag_b - np.arange(1, a.size + 1) @ a / (1.0 + a.sum()))
 
     def response(self, frequency: Array, sample_period: float) -> NDArray[np.complex128]:
-        """G at `frequency` [Hz], shape (k,), complex."""
+        """Complex frequency response G at `frequency` [Hz], shape (k,), for a sample period [s]."""
         z = np.exp(-2j * np.pi * np.asarray(frequency) * sample_period)
         numerator = np.polyval(self.array("b")[::-1], z)
         denominator = np.polyval(np.concatenate(([1.0], self.array("a")))[::-1], z)

@@ -36,9 +36,9 @@ class ExtraDelay(Effect):
 
     Notes
     -----
-    A delay commutes with every effect that does not depend on absolute time. It follows the hysteresis, because the
-    loop must see the levels of the converter and not interpolated levels. Third-order Lagrange interpolation at the
-    sample period of the model, linear interpolation in slower records.
+    A delay commutes with every effect that does not depend on absolute time. It is computed after the hysteresis,
+    because the loop must receive the levels of the converter and not interpolated levels. The interpolation is a
+    third-order Lagrange polynomial at the sample period of the model, and linear in slower records.
     """
 
     name = "extra_delay"

@@ -33,7 +33,7 @@ from ..extent import Extent
 from ..invertibility import Invertibility
 
 RESOLVED = 0.45
-"""Highest simulated frequency of the mode [cycles per sample]; a faster mode acts as a lag."""
+"""Highest simulated frequency of the mode [cycles per sample]; a faster mode is replaced by its delay at dc."""
 
 
 class ExtraResonance(Effect):
@@ -50,9 +50,10 @@ class ExtraResonance(Effect):
 
     Notes
     -----
-    Exact for an input that is linear between samples. The start value of f0 is the peak of |E(f)|/|Y(f)|.
-    A converter holds the drive, and a delay is interpolated between samples. Both damp the fitted mode, so r is larger
-    than the share of the mode: up to 9 times at 0.45 cycles per sample.
+    The block is exact for an input that is linear between samples. The start value of f0 is the peak of |E(f)|/|Y(f)|,
+    the ratio of the spectra of residual and displacement. The fitted r is larger than the true share of the mode, by up
+    to 9 times at 0.45 cycles per sample, because the hold of the converter and the interpolation of a delay reduce the
+    response near this frequency.
     """
 
     name = "extra_resonance"
@@ -84,14 +85,23 @@ class ExtraResonance(Effect):
 
 
 def oscillator(f0: float, zeta: float, sample_period: float) -> tuple[Array, Array]:
-    """Step of position and velocity/ω0 for an input that changes linearly from u to u + du.
+    """One sample step of an oscillator, exact for an input that changes linearly from u to u + du.
+
+    Parameters
+    ----------
+    f0 : float
+        Natural frequency [Hz].
+    zeta : float
+        Damping ratio [1].
+    sample_period : float
+        Duration of the step [s].
 
     Returns
     -------
     step : (2, 4) ndarray
-        Matrix on (position, velocity/ω0, u, du).
+        Matrix that gives position and velocity/ω0 after the step from (position, velocity/ω0, u, du) before it.
     slopes : (2, 2, 4) ndarray
-        Its derivatives by f0 and by ζ.
+        Its derivatives with respect to f0 and to ζ.
     """
     angle = 2.0 * np.pi * f0 * sample_period
     rate = np.zeros((4, 4))
@@ -106,7 +116,7 @@ def oscillator(f0: float, zeta: float, sample_period: float) -> tuple[Array, Arr
 
 @kernel
 def run_mode(u, step, z, q):
-    """Rows of u (r, n) to positions q (r, n); z (r, 3) = last input, position, velocity/ω0, updated."""
+    """Positions q (r, n) for the inputs u (r, n); z (r, 3) = last input, position, velocity/ω0 is updated."""
     p0, p1, p2, p3 = step[0, 0], step[0, 1], step[0, 2], step[0, 3]
     v0, v1, v2, v3 = step[1, 0], step[1, 1], step[1, 2], step[1, 3]
     for r in range(u.shape[0]):
@@ -123,7 +133,7 @@ def run_mode(u, step, z, q):
 
 @kernel
 def mode_slopes(u, step, slopes, z, dz, dq):
-    """∂q/∂(f0, ζ) to dq (2, n) for u (n,); z (3,) as in `run_mode` and dz (2, 2) are updated."""
+    """Derivatives dq (2, n) of q by f0 and ζ for u (n,); z (3,), as in `run_mode`, and dz (2, 2) are updated."""
     for i in range(u.size):
         du = u[i] - z[0]
         for k in range(2):

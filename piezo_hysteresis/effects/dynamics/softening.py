@@ -24,8 +24,8 @@ from ..effect import ChainPosition, Term
 from ..extent import Extent
 from ..invertibility import Invertibility
 
-FOUND_BY = (0.01, 0.03, 0.1)
-"""Start values of k3; several, because a shift of a sharp resonance by its width is not linear in k3."""
+START_VALUES = (0.01, 0.03, 0.1)
+"""Start values of k3. The response is not linear in k3 if a sharp resonance shifts by more than its width."""
 
 
 class Softening(Term):
@@ -40,8 +40,8 @@ class Softening(Term):
 
     Notes
     -----
-    x is the coordinate of the dominant complex pole pair of G, in units of the static hysteresis output w. This mode
-    drives the rest of G; the delay of G is outside the feedback of the mode.
+    x is the coordinate of the mode of the dominant complex pole pair of G, scaled so that x = w for a static linear
+    mode. The output of this mode is the input of the rest of G. The delay of G acts outside the feedback of the mode.
     """
 
     name = "softening"
@@ -68,4 +68,4 @@ class Softening(Term):
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         """Switched off, and several sizes of both signs."""
-        return (cls(), *(cls(k3=sign * size) for size in FOUND_BY for sign in (-1.0, 1.0)))
+        return (cls(), *(cls(k3=sign * size) for size in START_VALUES for sign in (-1.0, 1.0)))

@@ -43,7 +43,8 @@ class MainsHum(Effect):
     Notes
     -----
     t counts from the start of the record, or of the first in a series of continuing records, so that amplitude, phase
-    and frequency of short records can be distinguished. In block-averaged records they are the values after averaging.
+    and frequency of short records can be distinguished. In block-averaged records, the amplitudes are those after
+    averaging.
     """
 
     name = "mains_hum"

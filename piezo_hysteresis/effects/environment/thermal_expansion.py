@@ -62,7 +62,7 @@ class ThermalExpansion(Effect):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        """Switched off, at the mean temperature; far from it, expansion and sensor zero cannot be distinguished."""
+        """Switched off, with T0 at the mean temperature; with another T0, expansion and sensor zero are correlated."""
         return (cls(T0=extent.temperature),)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:

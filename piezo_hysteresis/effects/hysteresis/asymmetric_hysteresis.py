@@ -27,9 +27,9 @@ class AsymmetricHysteresis(Term):
     Parameters
     ----------
     phi1 : float
-        Part that changes sign with the direction of the drive [1].
+        Part of the loss that changes sign with the direction of the drive [1].
     phi2 : float
-        Part that changes sign with the state [1].
+        Part of the loss that changes sign with the state [1].
 
     Notes
     -----

@@ -75,7 +75,7 @@ MODIFIED_BOUC_WEN = (
         powers=(-1, 1),
     ),
 )
-"""Numbers of the modified Bouc-Wen operator."""
+"""Parameters of the modified Bouc-Wen operator."""
 
 
 def check_bounded(effect: Effect) -> None:
@@ -87,7 +87,7 @@ def check_bounded(effect: Effect) -> None:
 
 
 class ModifiedBoucWen(HysteresisOperator):
-    """Base class of both forms of the modified Bouc-Wen operator, with parameters and start values."""
+    """Base class of both forms of the modified Bouc-Wen operator: checks and start values that they share."""
 
     gain_names = ("A", "p1", "p2")
     memory_names = ("A", "beta", "gamma")

@@ -14,11 +14,12 @@
 
 """Start values of the modified Bouc-Wen operator from its loops (paper, Sec. 3.4). The user gives no initial values.
 
-For given β and γ the state is proportional to A, and a negative A is the same loop with −γ: with g the state for A = 1,
+For given β and γ the state is proportional to A. A negative A gives the same loop as a positive A with −γ. Let g be the
+state for A = 1. Then
 
     w = p1 v³ + p2 v + A·g(v; β, γ·sgn A) + offset
 
-is linear in p1, p2, A and the offsets. So only (β, γ/β) are searched, on a grid and then by a local search.
+is linear in p1, p2, A and the offset of each record. Only β and γ/β are searched, on a grid and then by a local search.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ from ...blocks.bouc_wen_kernel import LOOP_OFF, run_plain
 from .operator import POINTS, Loop, range_of, thinned
 
 LOSSES = np.geomspace(0.3, 100.0, 14)
-"""Grid of β for v on its range."""
+"""Grid of β, for v divided by its range."""
 RATIOS = np.linspace(-0.9, 0.9, 7)
 """Grid of γ·sgn(A)/β; |γ| ≤ β keeps the loop bounded."""
-VALLEYS = 3
+LOCAL_SEARCHES = 3
 """Largest number of grid points from which a local search starts."""
-DEEP = 10.0
-"""Largest cost of a grid point for a local search, relative to the best one."""
+LARGEST_COST = 10.0
+"""A local search starts only from grid points whose cost is below this multiple of the smallest cost."""
 
 
 def _state(loops: Sequence[Loop], beta: float, gamma: float) -> list[Array]:
@@ -69,7 +70,7 @@ class _Search:
         self.target = self._stack([loop.w for loop in self.loops])
 
     def _stack(self, columns: Sequence[Array]) -> Array:
-        """All records in one array, each weighted and without its mean."""
+        """All records in one array, each weighted and with its mean subtracted."""
         return np.concatenate([self.roots[i] * (columns[i] - columns[i].mean(axis=0)) for i in self.used])
 
     def solve(self, beta: float, ratio: float) -> tuple[Array, Array]:
@@ -104,7 +105,7 @@ def closest_loop(loops: Sequence[Loop]) -> dict[str, float]:
             bounds=([np.log(LOSSES[0] / 10.0), -1.0], [np.log(LOSSES[-1] * 10.0), 1.0]),
             x_scale=[1.0, 0.3],
         )
-        for i, j in _valleys(costs)
+        for i, j in _local_minima(costs)
     ]
     found = min(polished, key=lambda outcome: float(outcome.cost))
     beta, ratio = float(np.exp(found.x[0])), float(found.x[1])
@@ -113,9 +114,9 @@ def closest_loop(loops: Sequence[Loop]) -> dict[str, float]:
     return {"A": a / span, "beta": beta / span, "gamma": gamma / span, "p1": p1 / span**3, "p2": p2 / span}
 
 
-def _valleys(costs: Array) -> list[tuple[int, int]]:
+def _local_minima(costs: Array) -> list[tuple[int, int]]:
     """Local minima on the grid, lowest first; for loops of one amplitude there are several."""
     lowest = scipy.ndimage.minimum_filter(costs, size=3, mode="nearest")
-    places = np.argwhere((costs == lowest) & (costs <= DEEP * costs.min()))
+    places = np.argwhere((costs == lowest) & (costs <= LARGEST_COST * costs.min()))
     order = np.argsort([costs[i, j] for i, j in places])
-    return [(int(i), int(j)) for i, j in places[order][:VALLEYS]]
+    return [(int(i), int(j)) for i, j in places[order][:LOCAL_SEARCHES]]

@@ -43,7 +43,7 @@ class EvenInputPolynomial(Effect):
     place = ChainPosition.HYSTERESIS
     equation = "w + p_e v² + p_4 v⁴"
     signature = "The loops differ between the two signs of a bipolar drive. The effect is invisible on a unipolar drive"
-    source = "completes the odd polynomial of paper, Eq. (3), as its text requires for symmetric drives"
+    source = "even terms in addition to the odd polynomial of the paper, Eq. (3); its text asks for them"
     parameters = (
         Parameter("p_e", "p_e", "1", 0.0, -1e2, 1e2, "square term", "paper, Sec. 2", 0.0, 0.05, powers=(-2, 1)),
         Parameter("p_4", "p_4", "1", 0.0, -1e2, 1e2, "fourth-power term", "paper, Sec. 2", 0.0, 0.05, powers=(-4, 1)),

@@ -24,7 +24,7 @@ from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
 
-FOUND_BY = (1.3, 1.7)
+START_VALUES = (1.3, 1.7)
 """Start values of the exponent."""
 
 
@@ -38,7 +38,8 @@ class HysteresisExponent(Term):
 
     Notes
     -----
-    With h_ref = 0.2 (normalised, dimensionless), β and γ mean the same for every n at typical sizes of the state.
+    At |h| = h_ref = 0.2 (normalised), a typical size of the state, the loss does not depend on n. Therefore β and γ are
+    comparable for all n.
     """
 
     name = "hysteresis_exponent"
@@ -55,4 +56,4 @@ class HysteresisExponent(Term):
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         """Off, and several sizes."""
-        return cls(), *(cls(n=n) for n in FOUND_BY)
+        return cls(), *(cls(n=n) for n in START_VALUES)

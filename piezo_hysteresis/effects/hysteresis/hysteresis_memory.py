@@ -45,7 +45,7 @@ class HysteresisMemory(Effect):
         Weights of the plays, from the narrowest to the widest, at least 2 [1]; they are not negative, because an
         actuator is passive.
     reach : float
-        Half width of the widest play [normalised, 1]; with half the drive range all plays move.
+        Half width of the widest play [normalised, 1]; all plays move if it is below half the drive range.
     virgin : float
         State at rest [1]: at 0 every play is centred, at 1 every play is in the state after a ramp from 0 V.
 
@@ -123,7 +123,7 @@ class HysteresisMemory(Effect):
 
 @kernel
 def run_plays(v, c, radii, plays, y):
-    """Σ c_j p_j to y (n,); plays (s,) is updated."""
+    """Output y (n,) = Σ c_j p_j; plays (s,) is updated."""
     for i in range(v.size):
         total = 0.0
         for j in range(radii.size):
@@ -134,7 +134,7 @@ def run_plays(v, c, radii, plays, y):
 
 @kernel
 def linearise_plays(v, dv, c, radii, plays, dplays, y, dy, own):
-    """`run_plays` with rows dv (m, n) to dy (m, n) and own (s, n) = p_j; plays (s,) and dplays (m, s) are updated."""
+    """`run_plays` and derivatives dy (m, n) from dv (m, n); own (s, n) = p_j; plays (s,), dplays (m, s) are updated."""
     for i in range(v.size):
         total = 0.0
         for j in range(radii.size):

@@ -27,8 +27,8 @@ class InitialState(Term):
     Parameters
     ----------
     h0 : float
-        h at the start [normalised, 1]. Motion of the drive leaves at most |A|/(β + γ sgn A); a larger value is not
-        refused, and decays as soon as the drive moves.
+        h at the start [normalised, 1]. Motion of the drive cannot produce more than |A|/(β + γ sgn A). A larger value
+        is accepted, and decays as soon as the drive moves.
     """
 
     name = "initial_state"

@@ -28,7 +28,7 @@ from ..invertibility import Invertibility
 
 
 class LevelDependentMemory(Term):
-    """Weights of the plays that grow or shrink with the position of each play.
+    """The weight of each play grows or shrinks with the position of the play.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ class LevelDependentMemory(Term):
 
     Notes
     -----
-    A Preisach operator, written with plays, has one monotone function f_j for every play; this is its quadratic term.
-    Up to |k| = 0.5 and |p| = 1 every f_j is monotone, so that the operator can be inverted.
+    A Preisach operator can be written as a sum of plays, with one monotone function f_j for every play. This effect is
+    the quadratic term of f_j. Up to |k| = 0.5 and |p| = 1 every f_j is monotone, so that the operator can be inverted.
     """
 
     name = "level_dependent_memory"
@@ -62,7 +62,7 @@ class LevelDependentMemory(Term):
 
 @kernel
 def run_level_plays(v, c, bends, radii, plays, y):
-    """Σ c_j (p_j + b_j p_j²) to y (n,); plays (s,) is updated."""
+    """Output y (n,) = Σ c_j (p_j + b_j p_j²); plays (s,) is updated."""
     for i in range(v.size):
         total = 0.0
         for j in range(radii.size):
@@ -74,7 +74,7 @@ def run_level_plays(v, c, bends, radii, plays, y):
 
 @kernel
 def linearise_level_plays(v, dv, c, bends, by_bend, radii, plays, dplays, y, dy, own):
-    """`run_level_plays` with rows dv (m, n) to dy (m, n), own (s + k, n) by c and by the k numbers of the bends."""
+    """`run_level_plays` and derivatives: dv (m, n) to dy (m, n); own (s + k, n) by c_j and by the k numbers of b_j."""
     s = radii.size
     for i in range(v.size):
         total = 0.0
@@ -124,7 +124,7 @@ return total;
 
 
 def plays_in_c(value: str, c: Array, radii: Array, virgin: float, **numbers: Array) -> CForm:
-    """Σ c_j value(p_j) as C code, from a C expression of p."""
+    """C code of Σ c_j value(p_j), from a C expression in p."""
     constants: dict[str, Number] = {"PLAYS": c.size, "c": c, "radius": radii, "virgin": virgin, **numbers}
     step, rest = (code.replace("VALUE", value) for code in (STEP, REST))
     return CForm(step, rest, constants, (f"double p[{c.size}]",))

@@ -47,9 +47,9 @@ class Loop:
     w : (n,) array
         Hysteresis output.
     continues : bool
-        True if it starts with the state of the loop before.
+        True if the loop starts with the final state of the loop before it.
     start : float
-        v at which the stage had settled before, if it does not continue.
+        v at which the stage had settled before the loop, if the loop does not continue another one.
     weight : float
         Weight in the search; 0 if the record only determines the state.
     """
@@ -82,7 +82,7 @@ class HysteresisOperator(Effect):
         return tuple(n for n in self.free_names() if n.partition("[")[0] in self.gain_names)
 
     def linear_numbers(self) -> tuple[str, ...]:
-        """Numbers to which w is proportional whether or not the operator has memory."""
+        """Names of the numbers to which w is proportional with and without the memory of the operator."""
         return tuple(n for n in self.gain_numbers() if n.partition("[")[0] not in self.memory_names)
 
     def scaled(self, factor: float) -> Self:

@@ -41,7 +41,8 @@ class PublishedBoucWen(ModifiedBoucWen):
 
     Notes
     -----
-    An explicit Euler step, so the result depends on the sample rate (4 % of the range of h for white noise at 50 kHz).
+    Eq. (7) is an explicit Euler step. Its result depends on the sample rate (by 4 % of the range of h for white noise
+    at 50 kHz).
     Use it to reproduce published figures, and `BoucWen` for identification.
     """
 
@@ -121,9 +122,9 @@ def linearise_plain(v, p, state, tangent, w, dw):
 
 @kernel
 def linearise_published(v, dv_in, p, state, tangent, last_in, w, dw):
-    """`run_published` with rows dw (m + 5, n): m incoming, then A, β, γ, p1, p2; tangent (m + 3,), last_in (m,) follow.
+    """`run_published` and derivatives dw (m + 5, n): by the m incoming rows dv_in, then by A, β, γ, p1, p2.
 
-    The exponent n is not fitted and has no row.
+    tangent (m + 3,) and last_in (m,) are updated. The exponent n is not fitted and has no row.
     """
     if dv_in.shape[0] == 0 and p[3] == 1.0:
         linearise_plain(v, p, state, tangent, w, dw)
@@ -173,7 +174,7 @@ static double published_step(double h, double dv, double a, double beta, double 
 
 
 class PublishedBlock(Block):
-    """State [h, v_last]."""
+    """The operator of Eq. (6) and (7); state [h, v_last]."""
 
     keeps_state = True
     names = tuple(f"published_bouc_wen.{n}" for n in ("A", "beta", "gamma", "p1", "p2"))

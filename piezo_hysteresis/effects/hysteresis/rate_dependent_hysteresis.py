@@ -23,7 +23,7 @@ from ..effect import ChainPosition, Term
 from ..extent import Extent
 from ..invertibility import Invertibility
 
-FOUND_BY = (-0.03, 0.03)
+START_VALUES = (-0.03, 0.03)
 """Start values of k."""
 
 
@@ -37,14 +37,14 @@ class RateDependentHysteresis(Term):
     a : float
         Exponent of the rate law [1]; 0 is the logarithm, 1 is proportional to speed.
     jumps : float
-        Duration of a jump in a slow record [1]: at 0 the sample period of the record, at 1 that of the model. There is
-        nothing between: every value but 0 acts as 1.
+        Duration that is assumed for a large change within one sample of a slow record [1]: 0 is the sample period of
+        the record, any other value is the sample period of the model.
 
     Notes
     -----
-    v̇ = Δv/Ts is the speed of the drive between two samples and v0 = 1 normalised unit per second. Speeds below
-    1e-4 per second are replaced by this value, so that the law stays finite at rest. A change of v by more than 0.05 in
-    one sample of a slow record may be a jump or part of a ramp, which the record does not show; `jumps` covers both.
+    v̇ = Δv/T_s is the speed of the drive between two samples, and v0 = 1/s. Speeds below 1e-4/s are replaced by this
+    value, so that the law is finite at rest. A change of v by more than 0.05 in one sample of a slow record may be a
+    jump or part of a ramp. The record does not show which; `jumps` selects one of them.
     """
 
     name = "rate_dependent_hysteresis"
@@ -72,5 +72,5 @@ class RateDependentHysteresis(Term):
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         """Off, and sizes of both signs, because the exponent has no influence at k = 0."""
         off = tuple(cls(a=a, jumps=jumps) for jumps in (0.0, 1.0) for a in (0.5, 0.1))
-        sizes = ((k, a) for k in FOUND_BY for a in (0.3, 0.1, -0.1))
+        sizes = ((k, a) for k in START_VALUES for a in (0.3, 0.1, -0.1))
         return off + tuple(cls(k=k, a=a, jumps=jumps) for k, a in sizes for jumps in (0.0, 1.0))

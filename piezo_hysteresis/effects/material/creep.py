@@ -33,11 +33,11 @@ REFERENCE_TIME = 0.1
 """Time after a step at which creep is defined as zero [s]."""
 
 LASTING = 100.0
-"""Slowest relaxation over the time T since the stage was at rest. A relaxation of time τ > T grows by the share T/τ:
-those slower than 100 T grow by 0.002 γ together, those slower than 10 T by 0.02 γ, and the latter can be seen."""
+"""Ratio of the slowest relaxation time to the time T since the stage was at rest. Slower relaxations are left out: in
+the time T they would add 0.002 γ together. With a ratio of 10, 0.02 γ would be missing, which is visible in data."""
 
 PER_DECADE = 2
-"""Relaxations per decade of time; two leave a ripple of 0.02 % of the creep per decade."""
+"""Relaxations per decade of time; with two, the sum deviates from the logarithm by 0.02 % of the creep per decade."""
 
 
 class Creep(Effect):
@@ -52,8 +52,8 @@ class Creep(Effect):
 
     Notes
     -----
-    For any input, the law is computed as a sum of relaxations, two per decade; it is exact for an input that is linear
-    between samples. There is no creep outside ``tau_min`` … ``tau_max``; for a stage at rest, creep is complete.
+    For any input, the law is computed as a sum of relaxations, two per decade, Eq. (15). Each is exact for an input
+    that is linear between samples. There is no creep outside ``tau_min`` … ``tau_max``. A stage at rest does not creep.
 
     Examples
     --------
@@ -115,7 +115,7 @@ class Creep(Effect):
 
     @property
     def tau(self) -> Array:
-        """Relaxation times of the bank [s]."""
+        """Relaxation times [s], shape (s,)."""
         decades = np.log10(self["tau_max"] / self["tau_min"])
         return self["tau_min"] * 10.0 ** (np.arange(int(PER_DECADE * decades + 1e-9) + 1) / PER_DECADE)
 
@@ -129,5 +129,15 @@ class Creep(Effect):
 
 
 def settled_mix(tau: Array, weights: Array) -> Array:
-    """Weights of the direct path and of the relaxations, whose sum is zero 0.1 s after a step, shape (1 + s,)."""
+    """Weights of the direct path and of the relaxations, with which creep is zero 0.1 s after a step.
+
+    Parameters
+    ----------
+    tau, weights : (s,) ndarray
+        Relaxation times [s] and weights of the relaxations.
+
+    Returns
+    -------
+    (1 + s,) ndarray
+    """
     return np.append(weights @ np.expm1(-REFERENCE_TIME / tau), weights)

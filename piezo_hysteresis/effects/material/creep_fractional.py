@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Creep by a power of time. Logarithmic creep is its limit; this law has one more parameter."""
+"""Creep with a power of time. Logarithmic creep is the limit of exponent 0."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class CreepFractional(Creep):
 
     Notes
     -----
-    The relaxations of `Creep` with weights ∝ (τ/0.1 s)^λ. Γ is the gamma function: Γ(1 − λ) is 1 for logarithmic creep,
-    0.89 for λ = −0.5 and 1.77 for λ = 0.5.
+    The relaxations are those of `Creep`, with weights proportional to (τ/0.1 s)^λ. Γ is the gamma function: Γ(1 − λ) is
+    1 for logarithmic creep, 0.89 for λ = −0.5 and 1.77 for λ = 0.5.
 
     Examples
     --------

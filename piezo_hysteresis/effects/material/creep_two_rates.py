@@ -39,8 +39,8 @@ class CreepTwoRates(Creep):
 
     Notes
     -----
-    Equal rates give logarithmic creep. The output is linear in both, so, unlike free time constants, they do not fit
-    noise.
+    Equal rates give logarithmic creep. The output is linear in both rates. Free time constants would fit noise more
+    easily.
 
     Examples
     --------

@@ -38,8 +38,9 @@ class Offset(Effect):
 
     Notes
     -----
-    The state of creep and hysteresis before a record depends on the motion during minutes or days before, which is not
-    recorded. The ratio r absorbs this, so that it is not mistaken for another effect. r is the same for all records.
+    The state of creep and hysteresis at the start of a record depends on the motion during the minutes or days before,
+    which is not recorded. The fitted ratio r absorbs its influence, which could otherwise be mistaken for another
+    effect. r is the same for all records.
 
     Examples
     --------

@@ -26,7 +26,7 @@ from ..effect import ChainPosition, Discretisation, Effect
 from ..invertibility import Invertibility
 
 BUTTERWORTH = 0.5**0.5
-"""Damping ratio of a Butterworth filter, whose gain is flat."""
+"""Damping ratio of a Butterworth filter, whose gain is maximally flat in the pass band."""
 
 
 class SecondOrderLowPass(Effect):
@@ -41,7 +41,8 @@ class SecondOrderLowPass(Effect):
 
     Notes
     -----
-    Exact for an input that is linear between samples. A filter faster than the samples acts as its lag 2 ζ τ.
+    The block is exact for an input that is linear between samples. A filter with a cut-off frequency above 0.45 cycles
+    per sample is replaced by a delay of 2 ζ τ.
     """
 
     name = "second_order_low_pass"
@@ -66,7 +67,7 @@ class SecondOrderLowPass(Effect):
 
 
 class SecondOrderBlock(ModeBlock):
-    """A mode with the whole static response, defined by its time constant."""
+    """The filter as a `ModeBlock` whose share of the static response is 1."""
 
     names = ("second_order_low_pass.tau",)
 

@@ -39,8 +39,8 @@ class SensorNonlinearity(Effect):
 
     Notes
     -----
-    They act on the normalised position: if the model's ``displacement_scale`` is the stroke, they are relative errors
-    at full scale.
+    The terms act on the normalised position. If the ``displacement_scale`` of the model is the stroke, s2 and s3 are
+    relative errors at full scale.
     """
 
     name = "sensor_nonlinearity"

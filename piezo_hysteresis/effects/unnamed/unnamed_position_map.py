@@ -66,11 +66,11 @@ class UnnamedPositionMap(UnnamedCorrection):
         low, high, m = self["low"], self["high"], self.array("m")
         if not (high > low and m.size):
             raise ParameterError(
-                f"{self.name}: got {m.size} heights from low = {low:g} to high = {high:g}, expected at least one, "
+                f"{self.name}: got {m.size} deviations m from low = {low:g} to high = {high:g}, expected at least one, "
                 "and high above low"
             )
         if np.diff(self._heights).min() <= -self._step:
-            raise ParameterError(f"{self.name}.m: the map falls, expected one that rises everywhere")
+            raise ParameterError(f"{self.name}.m: got x + deviation that falls with x, expected one that always rises")
 
     @property
     def _heights(self) -> Array:
@@ -92,7 +92,7 @@ class UnnamedPositionMap(UnnamedCorrection):
 
 @kernel
 def bend(x, heights, low, step, y):
-    """x (n,) plus the deviation of `heights` (k,) on the grid low, low + step, … to y (n,); zero outside."""
+    """Output y (n,): x (n,) plus the deviation `heights` (k,) on the grid low, low + step, …, which is zero outside."""
     for i in range(x.size):
         at = (x[i] - low) / step
         y[i] = x[i]
@@ -103,7 +103,7 @@ def bend(x, heights, low, step, y):
 
 @kernel
 def hats(x, low, step, rows):
-    """∂y/∂m_k at x (n,) to rows (k, n), which contain zeros before."""
+    """Derivatives ∂y/∂m_k at x (n,), written to rows (k, n), which must contain zeros."""
     count = rows.shape[0] + 2
     for i in range(x.size):
         at = (x[i] - low) / step

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Change watch: has the stage changed since its baseline was taken, in which group of parameters, and since when."""
+"""Change watch: reports that the stage has changed since its baseline, in which group of parameters, and since when."""

@@ -33,13 +33,13 @@ from .score import GROUPS, ChangeScore
 Array = NDArray[np.float64]
 
 FORMAT = 2
-"""Version of the file. In files without it, directions that a block does not excite count as certain."""
+"""Version of the file format. Only files of this version are read."""
 
 FEWEST_SCORES = 60
 """Fewest scores of one class from which its scatter can be estimated."""
 
 CLASS_RATIO = 4.0
-"""Drives belong to one class where their spans and their speeds differ by less than this factor."""
+"""Width of a class: the spans of the drives of one class differ by at most this factor, and so do their speeds."""
 
 DriveClass = tuple[int, int]
 
@@ -59,9 +59,9 @@ class Baseline:
     Parameters
     ----------
     scatter : mapping of (int, int) to Scatter
-        By `drive_class`.
+        Scatter by the value of `drive_class`.
     model : str
-        Hash of the model that ran.
+        Hash of the model that was running.
     """
 
     scatter: Mapping[DriveClass, Scatter]
@@ -89,7 +89,7 @@ class Baseline:
         return cls(known, model)
 
     def of_model(self, model: str) -> Baseline:
-        """The same scatter for another model, given by its hash, which differs only in a few calibrated numbers."""
+        """The same scatter with the hash of another model, which may differ only in a few recalibrated parameters."""
         return Baseline(self.scatter, model)
 
     def save(self, path: Path) -> None:
@@ -113,7 +113,7 @@ class Baseline:
 
     @classmethod
     def load(cls, path: Path) -> Baseline:
-        """Read what `save` wrote.
+        """Read a file that was written by `save`.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class Baseline:
             with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
                 held: dict[DriveClass, dict[str, Array]] = {}
                 if "format" not in file or int(file["format"]) != FORMAT:
-                    raise ValueError("another version wrote it, whose scatter means something else")
+                    raise ValueError("another version wrote it, with another file format")
                 for name in file.files:
                     if name in ("format", "model"):
                         continue

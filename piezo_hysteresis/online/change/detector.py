@@ -14,9 +14,10 @@
 
 """`ChangeDetector`: windowed generalised likelihood ratio over the groups of parameters.
 
-For scores x_i of known scatter Σ and slopes M_i, a change θ of one group since score j gives the statistic
-(Σ_i m_iᵀ Σ⁻¹ x_i)² / Σ_i m_iᵀ Σ⁻¹ m_i, summed from j to now, with m_i the column of M_i of that group
-(Basseville, Nikiforov: Detection of Abrupt Changes, 1993, Sec. 7.2).
+For independent scores x_i with the covariance Σ and the slopes M_i, a change θ of one group since score j gives the
+statistic (Σ_i m_iᵀ Σ⁻¹ x_i)² / Σ_i m_iᵀ Σ⁻¹ m_i. The sums go from score j to the newest one, and m_i is the column of
+M_i of that group (Basseville, Nikiforov: Detection of Abrupt Changes, 1993, Sec. 7.2). The denominator is increased for
+correlated scores, for the finite length of the baseline, and for misfit of the model that drifts.
 """
 
 from __future__ import annotations
@@ -34,11 +35,10 @@ from .score import BLOCK_TIME, GROUPS, ChangeScore
 Array = NDArray[np.float64]
 
 ALIKE = 0.97
-"""Cosine of two groups' directions from which the present drive cannot distinguish them."""
+"""If the cosine between the directions of two groups is larger, the present drive cannot distinguish the groups."""
 
-
-RECENTRED = 50
-"""Scores over which the offset of a new stream is estimated, because each stream has its own zero of the sensor."""
+OFFSET_SCORES = 50
+"""Number of scores from which the offset of a new stream is estimated: the zero of the sensor may be another one."""
 
 _OFFSET = GROUPS.index("offset")
 """Row of the offset."""
@@ -46,21 +46,21 @@ _OFFSET = GROUPS.index("offset")
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Result of the change watch after a score.
+    """Result of the change watch for one score.
 
     Parameters
     ----------
     statistic : float
-        Largest statistic over its threshold; above 1 the stage has changed.
+        Largest statistic of all groups and onsets, divided by its threshold; above 1 the stage has changed.
     groups : tuple of str
-        Group that explains it best, and those that the present drive cannot distinguish from it; empty where nothing
-        can be said.
+        The group with the largest statistic, then the groups that the present drive cannot distinguish from it; empty
+        if there is no statistic.
     estimate, deviation : float
-        Change of the first group and its standard deviation, in the unit of `UNITS`.
+        Change of the first group and its standard deviation, in the unit of this group in `UNITS`.
     onset : int
-        Stamp at which the change began [ns].
+        Stamp of the most probable onset of the change [ns].
     watched : bool
-        False where the baseline has no class for the present drive, or where this drive excites no group.
+        False if the baseline has no class for the present drive, or if this drive excites no group.
     """
 
     statistic: float = 0.0
@@ -77,16 +77,17 @@ class ChangeDetector:
     Parameters
     ----------
     baseline : Baseline
-        Of the running model.
+        Baseline of the running model.
     false_alarm_interval : float
         Wanted mean time between false alarms [s].
     same_offset : bool
-        True where the sensor offset is still the one that the baseline was taken with.
+        True if the sensor offset is the one with which the baseline was taken. Otherwise it is estimated from the first
+        `OFFSET_SCORES` scores.
     """
 
     def __init__(self, baseline: Baseline, false_alarm_interval: float, *, same_offset: bool) -> None:
         self._baseline = baseline
-        self._unlearnt = 0 if same_offset else RECENTRED
+        self._offset_scores_left = 0 if same_offset else OFFSET_SCORES
         self._same_offset = same_offset
         self._offset, self._offset_weight = 0.0, 0.0
         self._interval = false_alarm_interval / BLOCK_TIME
@@ -94,14 +95,14 @@ class ChangeDetector:
         self._window: list[tuple[Array, Array, int, DriveClass]] = []
 
     def add(self, score: ChangeScore) -> Change:
-        """Take the next score and return the result of the watch."""
+        """Compare the next score with the baseline, and return the result of the watch."""
         key = drive_class(score)
         scatter = self._baseline.scatter.get(key)
         if scatter is None or not scatter.excited.any():
             return Change()
         gradient, weight = scatter.gradient(score)
-        if self._unlearnt:
-            self._unlearnt -= 1
+        if self._offset_scores_left:
+            self._offset_scores_left -= 1
             self._offset += gradient[_OFFSET]
             self._offset_weight += weight[_OFFSET, _OFFSET]
             return Change(watched=True)
@@ -109,28 +110,28 @@ class ChangeDetector:
             gradient = gradient - weight[:, _OFFSET] * (self._offset / self._offset_weight)
         self._window.append((gradient, np.diag(weight), score.stamp, key))
         del self._window[:-WINDOW]
-        pulls, weights = (np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1))
-        length = np.arange(1, len(pulls) + 1)[:, None]
-        certain = 1.0 + self._of_baseline(weights)
+        gradients, weights = (np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1))
+        length = np.arange(1, len(gradients) + 1)[:, None]
+        variance = 1.0 + self._variance_of_baseline(weights)
         if not self._same_offset:
-            certain = certain + _like_offset(scatter) * length / RECENTRED
-        known = certain * scatter.inflation(len(pulls)) + scatter.wander * weights
+            variance = variance + _squared_cosine_to_offset(scatter) * length / OFFSET_SCORES
+        variance = variance * scatter.inflation(len(gradients)) + scatter.wander * weights
         seen = scatter.excited & (weights > 0.0)
-        statistic = np.where(seen, pulls**2 / np.where(seen, weights, 1.0) / known, 0.0)
+        statistic = np.where(seen, gradients**2 / np.where(seen, weights, 1.0) / variance, 0.0)
         at, group = np.unravel_index(int(statistic.argmax()), statistic.shape)
         return Change(
             float(statistic[at, group]) / self._threshold(key, scatter),
             self._alike(int(group), scatter),
-            float(pulls[at, group] / weights[at, group]),
-            float(np.sqrt(known[at, group] / weights[at, group])),
+            float(gradients[at, group] / weights[at, group]),
+            float(np.sqrt(variance[at, group] / weights[at, group])),
             self._window[-1 - int(at)][2] - round(BLOCK_TIME * 1e9),
             True,
         )
 
-    def _of_baseline(self, weights: Array) -> Array:
-        """Variance that the uncertain mean of the baseline adds to each sum of the window, over that of the sum itself.
+    def _variance_of_baseline(self, weights: Array) -> Array:
+        """Variance that the uncertain mean of the baseline adds to each sum of the window, relative to that of the sum.
 
-        The scores of one class share the mean of their class, those of several classes do not.
+        Every class of drive has its own mean, whose error is common to all scores of the class.
         """
         added = np.zeros_like(weights)
         classes = [row[3] for row in reversed(self._window)]
@@ -138,8 +139,8 @@ class ChangeDetector:
             scatter = self._baseline.scatter[key]
             inside = np.array([k == key for k in classes])[:, None]
             own = np.cumsum(np.where(inside, np.diff(weights, axis=0, prepend=0.0), 0.0), axis=0)
-            known = scatter.count * scatter.weight
-            added += own**2 / np.where(known > 0.0, known, np.inf)
+            information = scatter.count * scatter.weight
+            added += own**2 / np.where(information > 0.0, information, np.inf)
         return added / np.where(weights > 0.0, weights, 1.0)
 
     def _threshold(self, key: DriveClass, scatter: Scatter) -> float:
@@ -155,7 +156,7 @@ class ChangeDetector:
         return (GROUPS[group], *(GROUPS[k] for k in others))
 
 
-def _like_offset(scatter: Scatter) -> Array:
+def _squared_cosine_to_offset(scatter: Scatter) -> Array:
     """Squared cosine between the direction of every group and that of the offset, shape (5,)."""
     direction = directions(scatter)
     size = np.linalg.norm(direction, axis=1)
@@ -164,7 +165,7 @@ def _like_offset(scatter: Scatter) -> Array:
 
 
 def directions(scatter: Scatter) -> Array:
-    """Direction in which a whitened score moves for a change of each group, shape (5, 5)."""
+    """Direction in which a change of each group moves a whitened score, shape (5, 5), one row for each group."""
     _, weight = scatter.gradient(ChangeScore(np.zeros(len(GROUPS)), scatter.slope, 0.0, 0.0, 0, 0.0))
     size = np.sqrt(np.diag(weight))
     alike = weight / np.where(size > 0.0, size, 1.0)[:, None] / np.where(size > 0.0, size, 1.0)

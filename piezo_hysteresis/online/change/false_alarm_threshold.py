@@ -14,8 +14,8 @@
 
 """`false_alarm_threshold`: the threshold of the statistic that gives the wanted rate of false alarms.
 
-The largest of many windows is not χ²-distributed, and windows of correlated scores resemble one another more than
-windows of independent ones. The stream of an unchanged stage is simulated instead.
+The maximum over many windows does not have a χ² distribution, and its distribution depends on the correlation of the
+scores. Therefore the scores of an unchanged stage are simulated, and the threshold is read from the simulation.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ...blocks.kernel import kernel
 Array = NDArray[np.float64]
 
 WINDOW = 120
-"""Number of newest scores in which a change is searched for."""
+"""Number of newest scores in which the onset of a change is searched."""
 
 CLEARED = 0.5
 """An alarm ends where the statistic falls below this share of its threshold."""
@@ -45,10 +45,10 @@ _LEVEL_STEP = 0.25
 
 @kernel
 def largest_windows(series, inflation, largest):  # type: ignore[no-untyped-def]
-    """Largest squared sum over its variance, of windows that end at each score, over all groups.
+    """For each score, the largest squared sum divided by its variance, over all groups and all windows that end there.
 
-    series (n, g) has unit variance, inflation (longest, g) is the variance of a sum over its length; largest (n,) is
-    written.
+    `series` (n, g) has unit variance. `inflation` (longest, g) is the variance of a sum divided by the number of its
+    scores. The result is written to `largest` (n,).
     """
     total = np.zeros(series.shape[1])
     for i in range(largest.size):
@@ -62,21 +62,24 @@ def largest_windows(series, inflation, largest):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def correlate(series, decay, echo):  # type: ignore[no-untyped-def]
-    """Make columns of a white series (n, g) autoregressive, x_i = decay x_(i − 1) + e_i + echo e_(i − 1), in place."""
+def correlate(series, decay, average):  # type: ignore[no-untyped-def]
+    """Make each column of a white series (n, g) an ARMA(1, 1) series of unit variance, in place.
+
+    x_i = decay x_(i − 1) + e_i + average e_(i − 1), where e is the white series times a constant.
+    """
     for g in range(series.shape[1]):
-        size = np.sqrt((1.0 - decay[g] ** 2) / (1.0 + 2.0 * decay[g] * echo[g] + echo[g] ** 2))
+        size = np.sqrt((1.0 - decay[g] ** 2) / (1.0 + 2.0 * decay[g] * average[g] + average[g] ** 2))
         before = x = 0.0
         for i in range(series.shape[0]):
             white = size * series[i, g]
-            x = decay[g] * x + white + echo[g] * before
+            x = decay[g] * x + white + average[g] * before
             before = white
             series[i, g] = x
 
 
 @kernel
 def count_alarms(statistic, level, cleared):  # type: ignore[no-untyped-def]
-    """Times at which the statistic (n,) rises above `level` after it was below `cleared`."""
+    """Number of times that the statistic (n,) rises above `level`, counted again only after it was below `cleared`."""
     count, above = 0, False
     for value in statistic:
         if not above and value > level:
@@ -87,14 +90,18 @@ def count_alarms(statistic, level, cleared):  # type: ignore[no-untyped-def]
 
 
 def inflation(memory: Array, longest: int) -> Array:
-    """Variance of the sum of 1, 2, … `longest` scores over that of as many independent ones, shape (longest, g).
+    """Variance of the sum of 1, 2, … `longest` scores, divided by that of as many independent scores.
 
     Parameters
     ----------
     memory : (2, g) ndarray
-        As `Scatter.memory`.
+        Correlation of the scores, as in `Scatter.memory`.
     longest : int
-        Length of the longest sum.
+        Number of scores of the longest sum.
+
+    Returns
+    -------
+    (longest, g) ndarray
     """
     lag = np.arange(1, longest)[:, None]
     correlation = memory[0] * memory[1] ** (lag - 1)
@@ -104,24 +111,25 @@ def inflation(memory: Array, longest: int) -> Array:
 
 
 def false_alarm_threshold(directions: Array, interval: float, memory: Array | None = None, seed: int = 0) -> float:
-    """Value that the statistic exceeds once in `interval` scores on average, while nothing changes.
+    """Value that the statistic of an unchanged stage exceeds once in `interval` scores on average.
 
     Parameters
     ----------
     directions : (g, d) ndarray
-        Direction in which the white score moves for a change of each group; normalised here.
+        Direction in which a change of each group moves a whitened score; its length does not matter.
     interval : float
         Wanted mean number of scores between false alarms.
     memory : (2, g) ndarray, optional
-        As `Scatter.memory`; default: scores are independent of one another.
+        Correlation of the scores, as in `Scatter.memory`; default: independent scores.
     seed : int
         Seed of the simulation.
 
     Returns
     -------
     float
-        Beyond the rates that the simulation reaches, the rate is proportional to √h exp(−h/2) at a threshold h
-        (Siegmund, Venkatraman, Ann. Statist. 23 (1995) 255).
+        The threshold; infinite if all directions are zero. False alarms rarer than those of the simulation are
+        extrapolated: their rate at a threshold h is proportional to √h exp(−h/2) (Siegmund, Venkatraman, Ann. Statist.
+        23 (1995) 255).
 
     Examples
     --------
@@ -136,7 +144,7 @@ def false_alarm_threshold(directions: Array, interval: float, memory: Array | No
     held = np.zeros((2, int(there.sum()))) if memory is None else memory[:, there]
     white = np.random.default_rng(seed).standard_normal((SIMULATED, directions.shape[1]))
     series = white @ (directions[there] / norm[there, None]).T
-    correlate(series, held[1], echo(held))
+    correlate(series, held[1], moving_average(held))
     largest = np.zeros(SIMULATED)
     largest_windows(series, inflation(held, WINDOW), largest)
     level, alarms = _highest_level(largest)
@@ -147,13 +155,18 @@ def false_alarm_threshold(directions: Array, interval: float, memory: Array | No
     return float(np.interp(-wanted, -rates, levels))
 
 
-def echo(memory: Array) -> Array:
-    """Share of the white number before, with which `correlate` gives a series this memory, shape (g,).
+def moving_average(memory: Array) -> Array:
+    """Moving-average coefficient with which `correlate` makes a series of a given correlation.
 
     Parameters
     ----------
     memory : (2, g) ndarray
-        As `Scatter.memory`.
+        Correlation of the series, as in `Scatter.memory`.
+
+    Returns
+    -------
+    (g,) ndarray
+        Coefficient of each column, −1 to 1.
     """
     apart = memory[0] - memory[1]
     linear = 2.0 * memory[0] * memory[1] - 1.0 - memory[1] ** 2
@@ -162,7 +175,7 @@ def echo(memory: Array) -> Array:
 
 
 def _highest_level(statistic: Array) -> tuple[float, int]:
-    """Highest level that enough alarms exceed, and their number."""
+    """Highest level with at least `ALARMS` false alarms in the simulation, and their number."""
     level = float(statistic.max())
     while True:
         alarms = int(count_alarms(statistic, level, CLEARED * level))

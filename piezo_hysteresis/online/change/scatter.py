@@ -28,16 +28,16 @@ from .score import GROUPS, ChangeScore
 Array = NDArray[np.float64]
 
 DISTINCT = 1e-6
-"""Smallest part of a row of sensitivities, after the offset is taken out, that counts as excited."""
+"""A group counts as excited if at least this share of its sensitivity remains after its mean was subtracted."""
 
 SLOWEST_DECAY = 0.98
-"""Slowest decay of a correlation from one score to the next; this value is a correlation time of 5 s."""
+"""Largest ratio between the correlations of scores at successive lags; it is a correlation time of 5 s."""
 
 FEWEST_WINDOWS = 4
-"""Fewest windows of one class from which a drift of the misfit is estimated."""
+"""Fewest windows of `WINDOW` scores of one class from which a drift of the misfit is estimated."""
 
 SMALLEST_ROOT = 1e-5
-"""Directions of a slope are ignored where their root is smaller than this share of the largest root."""
+"""Eigenvectors of a slope are ignored if the root of their eigenvalue is below this share of the largest root."""
 
 _TINY = float(np.finfo(np.float64).tiny)
 """Smallest divisor; it prevents a division by zero."""
@@ -45,29 +45,30 @@ _TINY = float(np.finfo(np.float64).tiny)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Scatter:
-    """Scores of one class of drive.
+    """Mean, covariance and correlation of the scores of one class of drive.
 
-    The scores of a slow drive differ from block to block, because their slopes M do. Divided by the root of M, they
-    have the same scatter in every block where the residual is white, and nearly so where it is not.
+    Under a slow drive, the slope M of the scores differs from block to block, and so does their covariance. Scores
+    divided by the matrix root of M have the same covariance in every block if the residual is white noise, and nearly
+    the same if it is not.
 
     Parameters
     ----------
     count : int
         Number of scores.
     misfit : (5,) ndarray
-        Change of the groups that explains the mean score: structured misfit of the model under this drive. It does not
-        count as change.
+        Change of the groups that explains the mean score: a systematic error of the model under this drive. It does not
+        count as a change of the stage.
     precision : (5, 5) ndarray
-        Inverse of the covariance of the scores over the roots of their slopes, in units of `scale`; rows and columns
-        of groups that are not excited are zero.
+        Inverse covariance of the scores divided by the matrix roots of their slopes [1/m²]; rows and columns of groups
+        that are not excited are zero.
     slope : (5, 5) ndarray
         Mean of `ChangeScore.slope`.
     memory : (2, 5) ndarray
-        Correlation between successive gradients for each group, and the factor by which it falls with every further
-        score.
+        First row: correlation between successive gradients of each group. Second row: factor by which the correlation
+        falls with every further score.
     wander : (5,) ndarray
-        Variance of every group's change from one window of the watch to the next, beyond what the scatter explains:
-        structured misfit that drifts.
+        Variance of the apparent change of each group between windows of `WINDOW` scores, minus the variance that the
+        other numbers explain: the systematic error of the model drifts.
     power : float
         Mean square of the residual about its mean [m²].
     """
@@ -87,7 +88,7 @@ class Scatter:
 
     @property
     def scale(self) -> Array:
-        """Root of the mean slope of every group, shape (5,); 1 where it is zero."""
+        """Square root of the diagonal of `slope`, shape (5,); 1 where it is zero."""
         return _scale(self.slope)
 
     @property
@@ -98,14 +99,14 @@ class Scatter:
     def gradient(self, score: ChangeScore) -> tuple[Array, Array]:
         """Gradient of the log likelihood of a score with respect to the groups (5,), and its Fisher information (5, 5).
 
-        The gradient is zero on average while nothing changes, and information times θ after a change θ.
+        The mean of the gradient is zero while nothing changes, and the information times θ after a change θ.
         """
         root, inverse = _roots(score.slope, self.scale, np.flatnonzero(self.excited))
         weighting = root @ self.precision @ inverse
         return weighting @ (score.value - score.slope @ self.misfit), weighting @ score.slope
 
     def inflation(self, longest: int) -> Array:
-        """Variance of the sum of 1, 2, … `longest` scores over that of as many independent ones, shape (longest, 5)."""
+        """Variance of the sum of 1, 2, … `longest` scores over that of independent scores, shape (longest, 5)."""
         return inflation(self.memory, longest)
 
     @classmethod
@@ -124,8 +125,8 @@ class Scatter:
         precision[np.ix_(kept, kept)] = biased * np.linalg.pinv(covariance, rcond=1e-10, hermitian=True)
         none = np.zeros((2, len(GROUPS)))
         bare = cls(len(scores), misfit, precision, slope, none, none[0], residual_power(scores))
-        said = [bare.gradient(score) for score in scores]
-        gradients, weights = np.array([p for p, _ in said]), np.array([np.diag(w) for _, w in said])
+        pairs = [bare.gradient(score) for score in scores]
+        gradients, weights = np.array([g for g, _ in pairs]), np.array([np.diag(w) for _, w in pairs])
         known = replace(bare, memory=_memory(gradients / np.sqrt(np.maximum(weights, _TINY))))
         return replace(known, wander=_wander(gradients, weights, known.inflation(WINDOW)[-1]))
 
@@ -141,7 +142,7 @@ def _scale(slope: Array) -> Array:
 
 
 def _roots(slope: Array, scale: Array, kept: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Root of a slope, times the scale, and its inverse; both (5, 5), zero outside the rows that are kept."""
+    """Root of a slope, times the scale, and the inverse of this product; both (5, 5), zero outside the kept rows."""
     values, vectors = np.linalg.eigh((slope / scale[:, None] / scale)[np.ix_(kept, kept)])
     size = np.sqrt(np.maximum(values, 0.0))
     there = size > SMALLEST_ROOT * size.max(initial=_TINY)
@@ -153,10 +154,10 @@ def _roots(slope: Array, scale: Array, kept: NDArray[np.intp]) -> tuple[Array, A
 
 
 def _even_covariance(scores: Sequence[ChangeScore], misfit: Array, scale: Array, kept: NDArray[np.intp]) -> Array:
-    """Covariance of the scores over the roots of their slopes, shape (k, k).
+    """Covariance of the scores divided by the roots of their slopes [m²], shape (k, k).
 
-    A direction that a block does not excite counts there with the mean variance of what is excited: it would seem known
-    without any noise otherwise, and the first block that excites it would be a change.
+    In a block that does not excite a direction, this direction gets the mean variance of the excited directions.
+    Otherwise its variance would be too small, and the first block that excites it would count as a change.
     """
     even, excited = [], []
     for s in scores:
@@ -169,20 +170,21 @@ def _even_covariance(scores: Sequence[ChangeScore], misfit: Array, scale: Array,
     return np.atleast_2d(np.cov(seen, rowvar=False)) + mean * unexcited
 
 
-def _memory(said: Array) -> Array:
-    """`Scatter.memory` of a series (n, 5); a correlation within two standard errors of zero is not followed further.
+def _memory(series: Array) -> Array:
+    """`Scatter.memory` of a series (n, 5).
 
-    No series has successive values that correlate more than (1 + decay) / 2.
+    The decay is zero where the first correlation is not above two standard errors. The first correlation of an
+    ARMA(1, 1) series is at most (1 + decay) / 2.
     """
-    power = np.maximum((said**2).mean(axis=0), _TINY)
-    one, two = ((said[lag:] * said[:-lag]).mean(axis=0) / power for lag in (1, 2))
-    lasting = one > 2.0 / np.sqrt(len(said))
+    power = np.maximum((series**2).mean(axis=0), _TINY)
+    one, two = ((series[lag:] * series[:-lag]).mean(axis=0) / power for lag in (1, 2))
+    lasting = one > 2.0 / np.sqrt(len(series))
     decay = np.where(lasting, np.clip(two / np.where(lasting, one, 1.0), 0.0, SLOWEST_DECAY), 0.0)
     return np.vstack((np.clip(one, 0.0, (1.0 + decay) / 2.0), decay))
 
 
 def _wander(gradients: Array, weights: Array, inflation: Array) -> Array:
-    """`Scatter.wander` from the gradients (n, 5) and their information; 0 where the scatter explains it."""
+    """`Scatter.wander` from the gradients (n, 5) and their information (n, 5); 0 where noise explains the variance."""
     windows = len(gradients) // WINDOW
     if windows < FEWEST_WINDOWS:
         return np.zeros(len(GROUPS))

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Scores`: residual against the sensitivities of the running model, summed up block by block.
+"""`Scores`: the residual multiplied by the sensitivities of the running model, summed over blocks of the stream.
 
 A change θ of the parameters moves the residual e by Sᵀ θ, where the rows of S are the sensitivities of the predicted
 displacement. The score z = S e / √B of a block of B samples is then M θ on average, with M = S Sᵀ / √B (the local
-approach: Benveniste, Basseville, Moustakides, IEEE Trans. Autom. Control 32 (1987) 583).
+approach: Benveniste, Basseville, Moustakides, IEEE Trans. Autom. Control 32 (1987) 583). S has the shape (5, B).
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ BLOCK_TIME = 0.1
 """Time that one score covers [s]."""
 
 FEWEST_SAMPLES = 16
-"""Samples that one score covers at least."""
+"""Fewest samples that one score covers."""
 
 SLOW_TIME = 3.0
 """Time constant of the slow group [s]."""
@@ -88,7 +88,10 @@ class ChangeScore:
 
 
 def loop_heights(model: Model) -> dict[str, float]:
-    """Numbers of a model that scale the height of its hysteresis loop, with their values; none without a loop."""
+    """Values of the parameters that scale the height of the hysteresis loop, by `effect.parameter`; empty without one.
+
+    A parameter that acts on the output in proportion, without hysteresis, is left out.
+    """
     if not model.has_hysteresis:
         return {}
     loop, values = model.hysteresis, model.values()
@@ -97,23 +100,23 @@ def loop_heights(model: Model) -> dict[str, float]:
 
 
 def block_size(sample_period: float) -> int:
-    """Samples that one score covers."""
+    """Number of samples that one score covers, at a given sample period [s]."""
     return max(FEWEST_SAMPLES, round(BLOCK_TIME / sample_period))
 
 
 class Scores:
-    """Sums up the stream of a predictor into scores.
+    """Computes the scores of the stream of a predictor.
 
     Parameters
     ----------
     chain : Chain
-        Of the running model, at the period of the stream.
+        The running model at the sample period of the stream.
     state : ChainState
         Its state before the next sample.
     loop : mapping of str to float
         `loop_heights` of the model.
     tangent : ChainTangent
-        Sensitivities to them before the next sample; `Chain.rest_tangent` where they are unknown.
+        Sensitivities to these parameters before the next sample; `Chain.rest_tangent` if they are unknown.
     """
 
     def __init__(self, chain: Chain, state: ChainState, loop: Mapping[str, float], tangent: ChainTangent) -> None:
@@ -136,7 +139,11 @@ class Scores:
         residual : (n,) ndarray
             Measured minus predicted displacement [m].
         stamp : int
-            Time stamp of the last of these samples [ns].
+            Time of the last of these samples [ns].
+
+        Returns
+        -------
+        list of ChangeScore
         """
         y, names, rows, self._state, self._tangent = self._chain.linearise(
             voltage, self._state, self._tangent, self._loop
@@ -160,7 +167,7 @@ class Scores:
 
 
 def _low_pass(x: Array, decay: float, before: float) -> Array:
-    """y_i = (1 − decay) x_i + decay y_(i − 1), shape (n,), after y = `before`."""
+    """y_i = (1 − decay) x_i + decay y_(i − 1), shape (n,); `before` is y before the first sample."""
     poles, state, y = np.zeros(ORDER), np.zeros(ORDER), np.empty_like(x)
     poles[0], state[0] = -decay, before
     recur(poles, state, (1.0 - decay) * x, 0.0, y)

@@ -46,22 +46,22 @@ class ChangeWatch:
     Attributes
     ----------
     change : Change
-        Result of the detector after the newest score.
+        Result of the detector for the newest score.
     since : int
         Stamp at which the present change began [ns]; 0 while there is none.
     groups : tuple of str
-        Groups that have explained this change best since it was first detected.
+        Groups of parameters that explained the present or the last change best when its statistic was largest.
     alarms : int
         Number of changes detected so far.
 
     Raises
     ------
     ModelError
-        `add` raises it where the requested baseline cannot be computed.
+        Raised by `add` if the requested baseline cannot be computed.
 
     Notes
     -----
-    After a change of model or a gap the watch starts again without scores, and keeps the baseline.
+    After a change of model or a gap, all scores are discarded and the baseline is kept.
     """
 
     def __init__(self, false_alarm_interval: float, baseline: Baseline | None = None) -> None:
@@ -78,11 +78,11 @@ class ChangeWatch:
 
     @property
     def is_taking(self) -> bool:
-        """True while a baseline is being taken."""
+        """Whether a baseline is being taken."""
         return self._wanted > 0
 
     def take_baseline(self, duration: float) -> None:
-        """Take a baseline over the next `duration` of the stream [s]; the old one is used until it is complete."""
+        """Take a baseline over the next `duration` of the stream [s]; when complete, it replaces the old one."""
         self._wanted, self._taken = max(1, round(duration / BLOCK_TIME)), []
 
     def restart(self) -> None:
@@ -90,7 +90,7 @@ class ChangeWatch:
         self._scores = None
 
     def add(self, voltage: Array, answer: Prediction, predictor: Predictor, stamp: int) -> bool:
-        """Follow one block of the stream.
+        """Compare one block of the stream with the baseline, or add it to the baseline that is being taken.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class ChangeWatch:
         Returns
         -------
         bool
-            True where a baseline was completed by the block.
+            True if this block completed a baseline.
         """
         is_idle = self.baseline is None and not self.is_taking
         if is_idle or answer.model is None or answer.warming_up or answer.residual.size == 0:

@@ -28,10 +28,10 @@ from piezo_hysteresis.online.change.false_alarm_threshold import (
     WINDOW,
     correlate,
     count_alarms,
-    echo,
     false_alarm_threshold,
     inflation,
     largest_windows,
+    moving_average,
 )
 from piezo_hysteresis.online.change.scatter import Scatter
 from piezo_hysteresis.online.change.score import GROUPS, ChangeScore
@@ -239,6 +239,6 @@ def test_a_threshold_for_rarer_alarms_than_are_simulated_continues_the_rate():
 def test_scores_that_are_simulated_have_the_memory_of_the_baseline(first, decay):
     memory = np.array([[first], [decay]])
     series = np.random.default_rng(4).standard_normal((400_000, 1))
-    correlate(series, memory[1], echo(memory))
+    correlate(series, memory[1], moving_average(memory))
     correlation = [np.mean(series[k:] * series[: series.size - k]) for k in range(4)]
     assert correlation == pytest.approx([1.0, first, first * decay, first * decay**2], abs=0.02)
