@@ -14,8 +14,8 @@
 
 """Compensation: the inverse of a model computes the drive voltage for a wanted displacement.
 
-`Inverse` is the inverse model. `reachable` and `plan` compute, before anything moves, which part of a path
-can be reached and the expected error. `learn` corrects a drive with the measured error.
+`Inverse` is the inverse model. `reachable` and `plan` compute which part of a path can be reached, and which error is
+expected, before the stage moves. `learn` corrects a drive by the measured error.
 """
 
 from .band import Band

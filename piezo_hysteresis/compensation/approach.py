@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The way from the present position of a stage to a path."""
+"""The transition from the present position of a stage to the start of a path."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .limits import Limits
 Array = NDArray[np.float64]
 
 APPROACH = 0.05
-"""Default duration of the way [s]."""
+"""Default duration of the transition [s]."""
 
 
 def settled_start(model: Model, limits: Limits) -> ChainState:
@@ -35,6 +35,6 @@ def settled_start(model: Model, limits: Limits) -> ChainState:
     return chain.rest(float(np.clip(0.0, limits.voltage_min, limits.voltage_max)))
 
 
-def smooth_way(begin: float, end: float, count: int) -> Array:
+def smooth_transition(begin: float, end: float, count: int) -> Array:
     """Smooth transition between two levels, shape (count,); the first sample is `begin`."""
     return np.asarray(begin + (end - begin) * (0.5 - 0.5 * np.cos(np.pi * np.arange(count) / max(count, 1))))

@@ -37,14 +37,14 @@ class Band:
     Parameters
     ----------
     passed, stopped : float
-        Frequencies [Hz].
+        Upper end of the pass band, and lower end of the stop band [Hz]; 0 < `passed` < `stopped`.
     length : float
-        Duration of its impulse response [s]; the filter looks ahead by half of it.
+        Duration of the impulse response [s]; the filter needs the path half of this time ahead.
 
     Raises
     ------
     ModelError
-        If the frequencies contradict one another.
+        If `passed` is not positive or not below `stopped`.
     """
 
     passed: float = 2000.0
@@ -62,7 +62,13 @@ class Band:
         return cls(0.04 * rate, 0.1 * rate, 200.0 * sample_period)
 
     def taps(self, sample_period: float) -> Array:
-        """Symmetric impulse response with sum 1, shape (2 k + 1,)."""
+        """Symmetric impulse response with sum 1, shape (2 k + 1,), at a sample period [s].
+
+        Raises
+        ------
+        ModelError
+            If `stopped` is not below half the sample rate.
+        """
         if self.stopped >= 0.5 / sample_period:
             raise ModelError(f"band: got {self.stopped:g} Hz, expected less than half the sample rate")
         half = max(1, round(0.5 * self.length / sample_period))

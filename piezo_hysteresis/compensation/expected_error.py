@@ -30,13 +30,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ExpectedError:
-    """Expected RMS error on a path [m]; independent parts are added as squares.
+    """Expected RMS error on a path [m]; it is computed from two independent errors.
 
     Parameters
     ----------
     planned : float
-        Difference between the wanted displacement and the simulation of the plan, because of the band, the limits, and
-        effects that were left out or inverted approximately [m].
+        RMS difference between the wanted displacement and the simulation of the plan [m]. Its causes are the band, the
+        limits, and effects that were left out or inverted approximately.
     free_run : float or None
         Free-run error of the model on data that were not fitted [m]; None if the model file does not contain it.
     parameters : float or None
@@ -49,7 +49,10 @@ class ExpectedError:
 
     @property
     def total(self) -> float:
-        """Root of the sum of squares [m]. The free-run error already includes the error from the parameters."""
+        """Root of the sum of squares of `planned` and `free_run`, or without it of `planned` and `parameters` [m].
+
+        The free-run error already includes the error from the parameters.
+        """
         model = self.free_run if self.free_run is not None else self.parameters or 0.0
         return float(np.hypot(self.planned, model))
 
@@ -73,7 +76,7 @@ def free_run_error(model: Model) -> float | None:
 
 
 def parameter_error(model: Model, voltage: Array) -> float | None:
-    """RMS over the drive (n,) [V] of the standard error of the displacement, from the covariance of the model [m].
+    """Standard error of the displacement from the covariance of the parameters [m], as RMS over a drive (n,) [V].
 
     None if the model has no covariance.
     """

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Kernels that compute the v at which the hysteresis gives a wanted w, from the state before the sample.
+"""Kernels that compute the normalised drive v at which the hysteresis output w has a wanted value.
 
 w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j (p_j + b_j p_j²) with the plays p_j(v); c and b are the rows of
-one array. The loop is computed by the kernels of the model, so the root agrees with the model to rounding. If the
-derivative of the loop is known in closed form, the search is Newton's method. Otherwise, or if Newton's method leaves
-the range or does not converge, it is one Newton step followed by the secant method inside a bracket.
+one array. h is computed by the kernels of the model, so the root agrees with the model up to rounding. If ∂h/∂v is
+known in closed form, Newton's method is used. Otherwise, or if Newton's method leaves the range or does not converge,
+one Newton step is followed by the secant method inside a bracket.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from ..inverse_terms import GENERAL, NO_LOOP, PLAIN, PUBLISHED
 P1, P2, SQUARE, FOURTH = range(4)
 """Coefficients of the static polynomial in the order of `POLYNOMIAL`: of v³, v, v² and v⁴."""
 ROUNDING = 1e-15
-"""Relative difference of w, and of v, below which it is rounding."""
+"""Relative differences of w and of v below this value count as rounding."""
 NEWTON = 6
-"""Number of steps of Newton's method before the search uses a bracket."""
+"""Largest number of steps of Newton's method before the search uses a bracket."""
 MOST = 80
-"""Largest number of steps of the search; every sixth step halves the bracket."""
+"""Largest number of steps of the secant method; every sixth step halves the bracket instead."""
 
 
 @inlined
 def loop_end(kind, p, periods, h, last, v):
-    """h of the loop of `kind` after a step from `last` to v."""
+    """h after a step from `last` to v, for a loop of type `kind`."""
     if kind == NO_LOOP or v == last:
         return h
     if kind == PLAIN:
@@ -92,7 +92,7 @@ def slope_at(kind, p, poly, c, radii, h, v, plays, s):
 
 @inlined
 def solve(kind, p, periods, poly, c, radii, h, last, plays, wanted, now, orientation, low, high):
-    """v in [low, high] with w(v) = wanted; without a solution, the nearer end. `now` is w at `last`."""
+    """v in [low, high] with w(v) = wanted, or the nearer end; `now` is w at `last`, `orientation` the slope's sign."""
     gap = wanted - now
     enough = ROUNDING * (abs(wanted) + abs(now))
     if abs(gap) <= enough:
@@ -183,7 +183,7 @@ static double without_loop(const hysteresis_before *b, double v)
     return FMA(FMA(poly[0], square, poly[1]), v, FMA(poly[3], square, poly[2]) * square) + total;
 }
 
-/* dw/dv where v moves on in the direction s and the loop is at h. */
+/* dw/dv for motion in the direction s from the state h. */
 static double slope_at(const hysteresis_before *b, double h, double v, double s)
 {
     const double *poly = b->poly, square = v * v;
@@ -198,8 +198,8 @@ static double slope_at(const hysteresis_before *b, double h, double v, double s)
     return slope;
 }
 
-/* v in [low, high] at which the hysteresis gives `wanted`; the nearer end where there is none. `now` is w before. The
-   search is Newton's method where it stays inside, and a secant in a bracket else. */
+/* v in [low, high] with w(v) = wanted; without a solution, the end of the interval in this direction. `now` is w before
+   the sample. Newton's method is used while it stays inside, otherwise the secant method in a bracket. */
 static double solve(
     const hysteresis_before *b, double wanted, double now, double orientation, double low, double high)
 {

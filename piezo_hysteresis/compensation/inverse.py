@@ -41,13 +41,24 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class InverseState:
-    """State of an inverse between two blocks of samples."""
+    """State of an inverse between two blocks of samples.
+
+    Parameters
+    ----------
+    stages : tuple
+        States of the inverted blocks, the sensor first.
+    nonlinear : tuple of ndarray
+        State of the part that is nonlinear in the last sample.
+    start_time : float
+        Time of the first drive sample [s].
+    count : int
+        Number of samples since `start_time`.
+    """
 
     stages: tuple[State, ...]
     nonlinear: RecursionState
     start_time: float
     count: int
-    """Samples since `start_time`."""
 
 
 class Inverse:
@@ -60,15 +71,15 @@ class Inverse:
     limits : Limits, optional
         Limits of the drive; they act inside the recursion. Default: no limits.
     band : Band, optional
-        Low-pass filter of the wanted displacement. Default: no filter, so that fast parts of the path may need voltages
-        of any size.
+        Low-pass filter of the wanted displacement. Default: no filter; the fast parts of a path may then need very high
+        voltages.
     approximate : bool
         Leave out effects that cannot be inverted instead of refusing the model.
 
     Attributes
     ----------
     preview : int
-        Number of samples by which the wanted displacement must be known ahead.
+        Number of samples of the wanted displacement that must be known in advance.
     is_exact : bool
         False if an effect was left out or has an approximate inverse.
     left_out : tuple of str
@@ -143,7 +154,7 @@ class Inverse:
         return self.resume(self.chain.rest(voltage, time))
 
     def resume(self, state: ChainState) -> InverseState:
-        """State of the inverse for a stage whose model is in `state`, with settled dynamics."""
+        """State of the inverse for a stage whose model is in `state`; the dynamics are taken as settled."""
         started = tuple(
             stage.start(state.inputs[-1] if k is None else state.inputs[k], None if k is None else state.blocks[k])
             for k, stage in self._stages
@@ -156,16 +167,23 @@ class Inverse:
         return InverseState(started, nonlinear, state.time, 0)
 
     def run(self, wanted: ArrayLike, state: InverseState) -> tuple[Array, InverseState]:
-        """Drive voltage [V] of the next samples, and the state after them.
+        """Drive voltage of the next samples.
 
-        Bit-identical for every way of cutting the path into blocks.
+        The result does not depend on how the path is cut into blocks, bit for bit.
 
         Parameters
         ----------
         wanted : (n,) array_like
             Displacement [m]; its sample i is reached by the drive sample i + `preview` of the output.
         state : InverseState
-            From `rest`, or from the block before.
+            State from `rest`, from `resume`, or after the block before.
+
+        Returns
+        -------
+        voltage : (n,) ndarray
+            Drive [V].
+        state : InverseState
+            State after these samples.
 
         Raises
         ------
@@ -182,7 +200,7 @@ class Inverse:
         return u, InverseState(tuple(states), nonlinear, state.start_time, state.count + y.size)
 
     def command(self, wanted: ArrayLike, state: InverseState) -> tuple[Array, InverseState]:
-        """Drive voltage (n + preview,) [V] for a whole path (n,) [m], which is held at its end.
+        """Drive voltage (n + preview,) [V] for a whole path (n,) [m] whose end is held, and the state after it.
 
         The stage reaches the first sample of the path `preview` samples after the first sample of the drive.
         """
@@ -209,7 +227,7 @@ def _is_idle(effect: Effect) -> bool:
 
 
 def _terms_of_nonlinear_part(blocks: Sequence[Block], labels: Sequence[str]) -> list[InverseTerms]:
-    """Terms of drive, hysteresis and creep: of all blocks up to the first that belongs to the dynamics.
+    """Terms of drive, hysteresis and creep, which are the blocks before the first block of the dynamics.
 
     Raises
     ------

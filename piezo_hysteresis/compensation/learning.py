@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`learn`: repeats play, measure and correct until the error is noise."""
+"""`learn`: plays a path, measures the error and corrects the drive, repeatedly, until the error is noise."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .plan import Plan, plan
 Array = NDArray[np.float64]
 
 AT_NOISE = 1.1
-"""Ratio of the RMS error in the band of learning to the noise, below which the error counts as noise."""
+"""The error counts as noise if its RMS in the band of the filter is below this multiple of the noise in this band."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -59,7 +59,10 @@ class LearningRound:
 
 
 def default_filter(model: Model) -> LearningFilter:
-    """Filter up to 1.2 kHz at 50 kHz sampling, in proportion at other rates; narrower if G is too uncertain."""
+    """Filter with full gain up to 1.2 kHz at 50 kHz sampling, in proportion at other rates.
+
+    The gain is zero where the identified dynamics G are too uncertain.
+    """
     rate = 1.0 / model.sample_period
     check = ResponseCheck.of(model, np.geomspace(1e-5 * rate, 0.06 * rate, 60))
     return LearningFilter(model.sample_period, 0.024 * rate, 0.06 * rate, check=check)
@@ -68,21 +71,21 @@ def default_filter(model: Model) -> LearningFilter:
 class IterativeLearning:
     """Corrects the reference of a path by the measured error, round by round.
 
-    The inverse of the model converts the corrected reference to the drive, as it does with the path. So the inverse
-    compensates hysteresis, creep and dynamics, and a round only removes errors of the model.
+    The inverse of the model computes the drive for the corrected reference. The inverse compensates hysteresis, creep
+    and dynamics, so a round only removes errors of the model.
 
     Parameters
     ----------
     model : Model
         Model of the stage.
     first : Plan
-        First plan of the path; its band is that of all rounds.
+        First plan of the path; all rounds use its band.
     limits : Limits
         Limits of the drive.
     filter : LearningFilter, optional
         Default: `default_filter`.
     noise : float
-        RMS sensor noise [m]. Learning ends when the error has reached it.
+        RMS sensor noise [m]. Learning ends when the error is not larger.
     approximate : bool
         As for `plan`.
     """
@@ -123,6 +126,11 @@ class IterativeLearning:
             Displacement at every sample of the drive of `next` [m].
         start : ChainState, optional
             State of the model before the next round. Default: at rest, as for `plan`.
+
+        Returns
+        -------
+        Plan or None
+            Plan of the next round; None if learning has ended.
 
         Raises
         ------
@@ -166,7 +174,7 @@ class IterativeLearning:
         self.next, self.reason = None, reason
 
     def _share_of_band(self) -> float:
-        """RMS share of white noise inside the band of the filter."""
+        """RMS of white noise in the band of the filter, relative to the RMS of the whole noise."""
         frequency = np.linspace(0.0, 0.5 / self.model.sample_period, 1000)
         return float(np.sqrt(np.mean(self.filter.at(frequency) > 0.0)))
 
@@ -183,6 +191,11 @@ def learn(learning: IterativeLearning, play: Callable[[Array], Array], rounds: i
         (m,) [m].
     rounds : int
         Largest number of corrections.
+
+    Returns
+    -------
+    IterativeLearning
+        The given object, with its rounds.
     """
     for _ in range(rounds + 1):
         if learning.next is None:

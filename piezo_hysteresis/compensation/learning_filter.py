@@ -37,9 +37,9 @@ class ResponseCheck:
     frequency : (k,) ndarray
         Rising frequencies [Hz].
     ratio : (k,) complex ndarray
-        Ĝ/G.
+        Measured response divided by that of the model.
     deviation : (k,) ndarray
-        Standard deviation of the ratio, relative to it.
+        Standard deviation of the ratio, relative to the ratio.
     """
 
     frequency: Array
@@ -60,7 +60,7 @@ class ResponseCheck:
         Returns
         -------
         ResponseCheck or None
-            None if the model states no covariance of its parameters.
+            None if the model has no covariance of its parameters.
         """
         known = model.covariance
         if known is None:
@@ -81,13 +81,13 @@ class LearningFilter:
     sample_period : float
         Sample period [s].
     passed, stopped : float
-        The gain is `gain` up to `passed` and tapers to zero at `stopped`, by a raised cosine [Hz].
+        The gain is `gain` up to `passed` and falls to zero at `stopped`, as a raised cosine [Hz].
     gain : float
         Largest gain, above 0 and at most 1.
     check : ResponseCheck, optional
         Uncertainty of the identified response. Default: the response is exact.
     margin : float
-        |1 − L R| with two standard deviations must stay below 1 − margin · L.
+        |1 − L R| plus two standard deviations must be at most 1 − margin · L.
 
     Raises
     ------
@@ -134,6 +134,8 @@ class LearningFilter:
 
     def correct(self, error: Array, noise: float) -> tuple[Array, float, float]:
         """Correction for an error, and the error that is predicted after the round.
+
+        Spectral lines with less than three times the power of the noise are not corrected.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`reachable`: the parts of a path that the limits do not allow, and the nearest path that they allow."""
+"""`reachable`: the parts of a path that cannot be reached inside the limits, and the nearest path that can."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
-from .approach import APPROACH, settled_start, smooth_way
+from .approach import APPROACH, settled_start, smooth_transition
 from .band import Band
 from .inverse import Inverse
 from .limits import Limits
@@ -39,7 +39,7 @@ STEPS = 8
 """Number of bisection steps in the search for the nearest path, after the first trial that works."""
 
 FIRST_TRIALS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 0.99)
-"""First trials of the search, as shares of the largest change."""
+"""First trials of the search for the nearest path, as shares of the largest change."""
 
 
 def reachable(
@@ -52,7 +52,7 @@ def reachable(
     approximate: bool = False,
     search: bool = True,
 ) -> Reachability:
-    """Parts of a path that the limits of the drive allow, from the model alone.
+    """Compare a path with and without the limits of the drive, from the model alone.
 
     Parameters
     ----------
@@ -67,12 +67,16 @@ def reachable(
     band, approximate
         As for `Inverse`.
     search : bool
-        Also search for the nearest path that the limits allow.
+        Also search for the nearest path that can be reached.
+
+    Returns
+    -------
+    Reachability
 
     Raises
     ------
     ModelError
-        As `Inverse`.
+        If the path is empty or not finite, or the model cannot be inverted.
     """
     y = samples(wanted, "displacement")
     state = start or settled_start(model, limits)
@@ -160,19 +164,21 @@ def _nearest(
 
     at_start = float(model.run([state.inputs[0]], state)[0][0])
 
-    def led(path: Array) -> Array:
-        """The path, with an approach from the present position of the stage."""
-        way = smooth_way(at_start, float(path[0]), round(APPROACH / model.sample_period))
+    def with_approach(path: Array) -> Array:
+        """The path after an approach from the present position of the stage."""
+        way = smooth_transition(at_start, float(path[0]), round(APPROACH / model.sample_period))
         return np.concatenate((way, path))
 
     most = span or model.displacement_scale
-    shifts = [_smallest(lambda c, s=s: is_whole(led(y + s * c)), most) for s in (1, -1)]  # type: ignore[misc]
+    shifts = [_smallest(lambda c, s=s: is_whole(with_approach(y + s * c)), most) for s in (1, -1)]  # type: ignore[misc]
     offsets = [s * c for s, c in zip((1.0, -1.0), shifts, strict=True) if c is not None]
-    shrink = _smallest(lambda c: is_whole(led(middle + (1.0 - c) * (y - middle))), 1.0)
+    shrink = _smallest(lambda c: is_whole(with_approach(middle + (1.0 - c) * (y - middle))), 1.0)
     usual = Band.of(model.sample_period)
-    lower = _smallest(
-        lambda c: is_whole(led(y), Band(usual.passed * 2.0 ** (-8.0 * c), usual.stopped * 2.0 ** (-8.0 * c), 0.02)), 1.0
-    )
+
+    def slower(c: float) -> Band:
+        return Band(usual.passed * 2.0 ** (-8.0 * c), usual.stopped * 2.0 ** (-8.0 * c), 0.02)
+
+    lower = _smallest(lambda c: is_whole(with_approach(y), slower(c)), 1.0)
     return NearestPath(
         min(offsets, key=abs, default=None),
         None if shrink is None or shrink >= 1.0 else 1.0 - shrink,

@@ -34,11 +34,11 @@ class Limits:
     voltage_min, voltage_max : float
         Range of the drive before the amplifier [V].
     max_slew_rate : float
-        Steepest change between two samples [V/s].
+        Largest rate of change between two samples [V/s].
     resolution : float
         Voltage changes up to this size do not reverse a backlash [V]. A reversal needs a jump by the full width of the
-        backlash, and without a resolution the rounding errors of a constant path would cause such jumps. Default: 0 for
-        an `Inverse`, and 0.005 % of the range for a plan.
+        backlash. Without a resolution, the rounding errors of a constant path would cause such jumps. Default: 0 for an
+        `Inverse`, and 0.005 % of the range for a plan if the range is finite.
 
     Raises
     ------

@@ -37,7 +37,7 @@ from .limits import Limits
 Array = NDArray[np.float64]
 
 RecursionState = tuple[Array, Array, Array, Array]
-"""State of drive and loop, of the plays, last inputs of the relaxations, and state of the relaxations."""
+"""State of drive and loop (8,), state of the plays, last inputs of the relaxation banks, states of the relaxations."""
 
 FARTHEST = 1e3
 """Largest normalised drive in which a root is searched."""
@@ -60,7 +60,7 @@ class NonlinearPart:
     Raises
     ------
     ModelError
-        If the hysteresis has no static slope.
+        If the static curve of the hysteresis has no slope at 0 V.
     """
 
     def __init__(self, terms: Sequence[InverseTerms], limits: Limits, sample_period: float) -> None:
@@ -107,7 +107,7 @@ class NonlinearPart:
         return starts, direct, fade, lead, weights, gains
 
     def start(self, blocks: Sequence[Block], inputs: Sequence[float], states: Sequence[State]) -> RecursionState:
-        """State of the recursion from its blocks, their last inputs and their states."""
+        """State of the recursion, from its blocks, their last inputs and their states."""
         state, plays, lasts = np.zeros(8), np.zeros(self.radii.size), []
         banks: list[Array] = [np.zeros(0)]
         state[: r.PUSHED + 1] = float(inputs[0])
@@ -161,7 +161,7 @@ class NonlinearPart:
         return CForm(step, "".join((*rest, "return w;")), numbers, tuple(state), library)
 
     def run(self, targets: Array, state: RecursionState) -> tuple[Array, RecursionState]:
-        """Drive (n,) [V] for wanted outputs of the material (n,), and the state after it."""
+        """Drive (n,) [V] for wanted outputs of the creep (n,) [1], and the state after it."""
         own, plays, lasts, banks = (part.copy() for part in state)
         u = np.empty_like(targets)
         hysteresis = self.kind, self.loop, self.periods, self.poly, self.weights, self.radii

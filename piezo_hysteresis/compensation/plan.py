@@ -26,7 +26,7 @@ from ..errors import ModelError
 from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
-from .approach import APPROACH, settled_start, smooth_way
+from .approach import APPROACH, settled_start, smooth_transition
 from .band import Band
 from .expected_error import ExpectedError, free_run_error, parameter_error
 from .inverse import Inverse
@@ -54,11 +54,11 @@ class Plan:
     sample_period : float
         Sample period [s].
     reachability : Reachability
-        Reachability of the approach and the path; times count from the start of the path.
+        Reachability of the approach and the path. The times of its parts count from the start of the path.
     expected : ExpectedError
         Expected error along the path.
     left_out, not_on_path : tuple of str
-        Effects that the inverse does not contain.
+        Effects that have no inverse, and effects that the drive voltage does not influence.
     preview : int
         Number of samples by which the drive is ahead of the path.
     end : ChainState
@@ -87,7 +87,7 @@ class Plan:
 
     @property
     def largest_slew(self) -> float:
-        """Steepest change of the drive [V/s]."""
+        """Largest rate of change of the drive [V/s]."""
         return float(np.abs(np.diff(self.voltage)).max(initial=0.0)) / self.sample_period
 
     @property
@@ -102,7 +102,7 @@ def _way_back(last: float, rest: float, duration: float, limits: Limits, period:
         return np.empty(0)
     steepest = 0.5 * np.pi * abs(rest - last)  # largest slope of a half cosine, times its duration
     count = max(round(duration / period), math.ceil(1.001 * steepest / limits.max_slew_rate / period), 1)
-    return np.append(smooth_way(last, rest, count)[1:], rest)
+    return np.append(smooth_transition(last, rest, count)[1:], rest)
 
 
 def plan(
@@ -116,7 +116,7 @@ def plan(
     band: Band | None = None,
     approximate: bool = False,
 ) -> Plan:
-    """Drive for a path, from the model alone.
+    """Plan the drive for a path, from the model alone.
 
     Parameters
     ----------
@@ -136,7 +136,11 @@ def plan(
     band : Band, optional
         Low-pass filter of the path. Default: `Band.of` the sample period of the model.
     approximate : bool
-        Leave out effects that cannot be inverted.
+        Leave out effects that cannot be inverted instead of refusing the model.
+
+    Returns
+    -------
+    Plan
 
     Raises
     ------
@@ -150,7 +154,7 @@ def plan(
     state = start or settled_start(model, limits)
     band = band or Band.of(model.sample_period)
     at = float(model.run([state.inputs[0]], state)[0][0])
-    way = smooth_way(at, float(y[0]), round(approach / model.sample_period))
+    way = smooth_transition(at, float(y[0]), round(approach / model.sample_period))
     whole = np.concatenate((way, y))
     found = reachable(model, limits, whole, start=state, band=band, approximate=approximate)
     late = way.size * model.sample_period

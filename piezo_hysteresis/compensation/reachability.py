@@ -35,15 +35,16 @@ class UnreachablePart:
     begin, end : float
         Time from the start of the path [s].
     largest : float
-        Largest deviation from the path inside the limits, with its sign [m].
+        Displacement with the limits minus displacement without them, where its magnitude is largest [m].
     needed_min, needed_max : float
-        Lowest and highest voltage that the path would need [V].
+        Lowest and highest voltage that this part would need [V].
     needed_slew : float
-        Steepest change that it would need [V/s].
+        Largest rate of change of the voltage that it would need [V/s].
     limit : str
-        ``voltage_min``, ``voltage_max`` or ``max_slew_rate``.
+        The limit that is exceeded most: ``voltage_min``, ``voltage_max`` or ``max_slew_rate``.
     after_loop : bool
-        True if the displacement is reachable from rest, but not after the motion before it, because of the hysteresis.
+        True if the displacement can be reached from rest, but not after the preceding motion, because of the
+        hysteresis.
     """
 
     begin: float
@@ -76,7 +77,7 @@ class UnreachablePart:
 
 @dataclass(frozen=True, slots=True)
 class NearestPath:
-    """Changes of a path that make it reachable, each alone; None if that change does not.
+    """Changes of a path, each of which alone makes it reachable; None for a change that does not.
 
     Parameters
     ----------
@@ -113,7 +114,7 @@ class Reachability:
     parts : tuple of UnreachablePart
         Unreachable parts; empty if the whole path is reachable.
     nearest : NearestPath or None
-        Nearest reachable path; None if the whole path is reachable.
+        Nearest reachable path; None if the whole path is reachable, or if there was no search.
     displacement : (n,) ndarray
         Displacement under the limited drive [m].
     voltage : (n + preview,) ndarray

@@ -14,8 +14,8 @@
 
 """The part of the inverse that is nonlinear in the last sample: creep, hysteresis, amplifier and limits in one loop.
 
-Every state follows the limited drive, not the wanted one. So the inverse continues from the real state of the stage
-after a limit was reached.
+Every state is computed from the limited drive. So the inverse continues from the real state of the stage after a limit
+was reached.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from .hysteresis_solver import loop_end, solve, static_part
 PER_VOLT, LEFT, LEAD, BACK, PLAY, REACH, LOWER, UPPER, CORNER, LOWEST, HIGHEST, STEP, LOW, HIGH, TURN, RESOLUTION = (
     range(16)
 )
-"""Numbers of the drive: 1/voltage scale, pole, play, slew limit and saturation of the amplifier, limits of the drive
-[V], ends of the search [v], sign of the static slope, smallest change that turns a play round [V]."""
+"""Indices of the numbers of the drive: 1/voltage scale [1/V], pole, play, slew limit, saturation of the amplifier,
+limits of the drive [V], limits of the search for v, sign of the static slope, least change that reverses a play [V]."""
 DRIVE = (
     "per_volt", "left", "lead", "back", "play", "reach", "lower", "upper", "corner", "lowest", "highest", "step", "low",
     "high", "turn", "resolution",
 )  # fmt: skip
 """Names of the same numbers, in `InverseTerms` and in C code."""
 VOLTAGE, SLEWED, POLE, HELD, PUSHED, LAST, H, W = range(8)
-"""States: drive; after the slew limit, the pole and the play; before the play [V]; v, h and w."""
+"""Indices of the states: drive, voltages after slew limit, pole and play, and before the play [V]; v, h and w [1]."""
 STATE = ("voltage", "slewed", "pole", "held", "pushed", "v", "h", "w")
 """Names of the same states, in `InverseStart` and in C code."""
 SAME = 1e-13
@@ -61,7 +61,7 @@ def ramp(excess, corner):
 
 @inlined
 def before_saturation(v, lower, upper, corner):
-    """Inverse of `saturated`; if v is beyond the limit, the voltage at which the limit is reached."""
+    """Inverse of `saturated`; for v beyond a limit, the voltage at which this limit is reached."""
     width, middle = upper - lower, 0.5 * (lower + upper)
     bent = corner if width >= 2.0 * corner else 0.25 * width * width / corner  # output range of one bend alone
     if v > upper - bent:
@@ -73,7 +73,7 @@ def before_saturation(v, lower, upper, corner):
 
 @inlined
 def voltage_for(v, d, state):
-    """Drive voltage inside the limits for a voltage v after the play."""
+    """Drive voltage [V], inside the limits, for a voltage v [V] after the play."""
     pushed = v
     if d[PLAY] > 0.0:
         move, same = v - state[HELD], SAME * (abs(v) + d[PLAY])
@@ -92,7 +92,7 @@ def voltage_for(v, d, state):
 
 @inlined
 def drive(u, d, state):
-    """Voltage after the play for the drive u; the state is updated."""
+    """Voltage after the play [V] for the drive u [V]; the state is updated."""
     state[VOLTAGE] = u
     slewed = saturated(u, d[LOWER], d[UPPER], d[CORNER])
     slewed = min(max(slewed, state[SLEWED] - d[REACH]), state[SLEWED] + d[REACH])
@@ -105,7 +105,7 @@ def drive(u, d, state):
 
 @inlined
 def settle_before(target, starts, direct, fade, lead, weights, lasts, banks, gains, ahead):
-    """w that gives `target` after the relaxation banks; ahead (s,) is set to their states for an unchanged input."""
+    """w for which the relaxation banks give `target`; ahead (s,) is set to their states for an unchanged input."""
     for b in range(direct.size - 1, -1, -1):
         rest, last = 0.0, lasts[b]
         for j in range(starts[b], starts[b + 1]):
@@ -117,7 +117,7 @@ def settle_before(target, starts, direct, fade, lead, weights, lasts, banks, gai
 
 @inlined
 def relax_to(w, starts, direct, lead, weights, lasts, banks, ahead):
-    """States of the banks for the next w."""
+    """Update the states of the banks for the next w."""
     for b in range(direct.size):
         moved, lasts[b] = w - lasts[b], w
         for j in range(starts[b], starts[b + 1]):
@@ -130,11 +130,11 @@ def relax_to(w, starts, direct, lead, weights, lasts, banks, ahead):
 
 @kernel
 def invert(targets, kind, p, periods, poly, c, radii, d, bank, state, plays, lasts, banks, u):
-    """Drive u (n,) [V] for wanted outputs of the material (n,).
+    """Drive u (n,) [V] for wanted outputs of the creep (n,) [1].
 
-    `bank` is (starts, direct, fade, lead, weights, gains); state (8,), plays (s,), lasts and banks are updated. The
-    numbers p, periods, poly and d are tuples: compiled code would count the users of an array at every inlined call,
-    which costs as much as the search itself.
+    `bank` is (starts, direct, fade, lead, weights, gains); state (8,), plays (s,), lasts and banks are updated. p,
+    periods, poly and d are tuples: with arrays, the compiled code would count references at every inlined call, which
+    takes as long as the search itself.
     """
     starts, direct, fade, lead, weights, gains = bank
     ahead = banks.copy()
@@ -162,7 +162,7 @@ static const double SAME = {SAME!r}, TOUCHING = {TOUCHING!r};
 
 """
     """\
-/* The voltage that the saturation turns into v; where v is beyond the end, where the end is reached. */
+/* The voltage that is v after the saturation; for v beyond a limit, the voltage at which this limit is reached. */
 static double before_saturation(double v, double lower, double upper, double corner)
 {
     const double width = upper - lower, middle = 0.5 * (lower + upper);
@@ -199,7 +199,7 @@ DRIVE_IN_C = """\
 const hysteresis_before b = { loop, poly, c, bend, radius, s->play, PLAYS, s->h, s->v };
 double v = solve(&b, x, s->w, turn, low, high) / per_volt, u, w, before;
 int j;
-/* the drive voltage for a voltage v behind the play, inside the limits */
+/* the drive voltage, inside the limits, for a voltage v after the play */
 u = v;
 if (play > 0.0) {
     const double move = v - s->held, same = SAME * (fabs(v) + play), touching = play * (1.0 - TOUCHING);
@@ -215,7 +215,7 @@ u = smaller(larger(u, s->slewed - reach), s->slewed + reach);
 u = before_saturation(u, lower, upper, corner);
 u = smaller(larger(u, s->voltage - step), s->voltage + step);
 u = smaller(larger(u, lowest), highest);
-/* what the stage makes of it: the states follow what the limits have let through */
+/* the states for the limited drive */
 s->voltage = u;
 before = s->slewed;
 s->slewed = u - ramp(u - upper, corner) + ramp(lower - u, corner);

@@ -24,7 +24,7 @@ import pytest
 from piezo_hysteresis.blocks.inverses.factors import factors, preview_taps, zero_phase_taps
 from piezo_hysteresis.blocks.inverses.linear_inverse import LinearInverse
 from piezo_hysteresis.compensation import Band, Inverse, Limits, plan
-from piezo_hysteresis.compensation.approach import smooth_way
+from piezo_hysteresis.compensation.approach import smooth_transition
 from piezo_hysteresis.effects import AmplifierBandwidth, Arx, Backlash, BoucWen, Creep, ExtraResonance, HysteresisMemory
 from piezo_hysteresis.errors import ModelError, StageError
 from piezo_hysteresis.model.model import Model
@@ -98,7 +98,7 @@ def test_rounding_of_a_constant_path_does_not_reverse_a_backlash() -> None:
     model = stage(Backlash(b=0.05), AmplifierBandwidth(tau=1e-5))
     limits = Limits(0.0, 10.0)
     levels = (3e-6, 5e-6, 7e-6, 5e-6, 3e-6)
-    held = [np.append(smooth_way(a, b, 250), np.full(2000, b)) for a, b in itertools.pairwise(levels)]
+    held = [np.append(smooth_transition(a, b, 250), np.full(2000, b)) for a, b in itertools.pairwise(levels)]
     wanted = np.concatenate(held)
     found = plan(model, wanted, limits)
     jumps = np.abs(np.diff(found.voltage)) > 0.05
