@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""C text of a `CForm`: its structures, its constants and its two functions."""
+"""Writes a `CForm` as C text: its structures, its constants and its two functions."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ import numpy as np
 from ..c_form import CForm, Number
 
 INDENT = " " * 4
-"""One level of C code."""
+"""Indentation of one level of C code."""
 ROW = 4
-"""Number of values in a line of an array."""
+"""Number of values in one line of an array."""
 
 
 def number(value: float) -> str:
-    """A double that is read back bit for bit.
+    """A double as C text that is read back bit for bit.
 
     >>> number(0.1), number(-2.0), number(math.inf)
     ('0.1', '-2.0', 'INFINITY')
@@ -42,14 +42,14 @@ def number(value: float) -> str:
 
 
 def array(values: np.ndarray) -> str:
-    """Initialiser of an array, with braces, several numbers in a line."""
+    """Initialiser of an array (n,) as C text, with `ROW` numbers in a line."""
     rows = [values[k : k + ROW] for k in range(0, values.size, ROW)]
     lines = ",\n".join(2 * INDENT + ", ".join(number(v) for v in row) for row in rows)
     return f"{{\n{lines}\n{INDENT}}}" if len(rows) > 1 else "{ " + lines.strip() + " }"
 
 
 def constants(numbers: Mapping[str, Number], body: str) -> Iterator[str]:
-    """Declarations of the constants that a body uses."""
+    """C declarations of those constants that a function body uses."""
     for name, value in numbers.items():
         if not re.search(rf"(?<![\w.>]){name}\b", body):
             continue
@@ -62,7 +62,7 @@ def constants(numbers: Mapping[str, Number], body: str) -> Iterator[str]:
 
 
 def structures(prefix: str, name: str, form: CForm) -> Iterator[str]:
-    """Types of the state of a form and of its parts, innermost first; none for a form without state."""
+    """C types of the state of a form and of its parts, innermost first; none for a form without state."""
     if not form.has_state:
         return
     for part, inner in form.parts.items():
@@ -92,7 +92,7 @@ def functions(prefix: str, name: str, form: CForm, *, always_rest: bool = True) 
 
 
 def library(forms: Mapping[str, CForm]) -> tuple[str, ...]:
-    """Library functions of the forms and their parts, each once."""
+    """C library functions that the forms and their parts need, each once."""
     found: dict[str, None] = {}
     for form in forms.values():
         found |= dict.fromkeys((*library(form.parts), *form.library))

@@ -37,14 +37,26 @@ from .prediction import prediction
 from .program import c_program, model_hash, templates
 
 UNITS = {"s": 's="1"', "V": 'kg="1" m="2" s="-3" A="-1"', "m": 'm="1"', "K": 'K="1"'}
-"""Units of the variables by their exponents of base units."""
+"""Units of the variables, as XML attributes with the exponents of the SI base units."""
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
 """Options of the compiler."""
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Input or output of a unit: name, SI unit, meaning, and start value."""
+    """Input or output of a co-simulation unit.
+
+    Parameters
+    ----------
+    name : str
+        Name of the variable.
+    unit : str
+        SI unit, a key of `UNITS`.
+    meaning : str
+        Description.
+    start : float
+        Start value [`unit`].
+    """
 
     name: str
     unit: str
@@ -65,7 +77,7 @@ CHANNELS = {
 
 @dataclass(frozen=True, slots=True)
 class CoSimulation:
-    """Description of one unit.
+    """Description of one co-simulation unit.
 
     Parameters
     ----------
@@ -74,13 +86,13 @@ class CoSimulation:
     prefix : str
         Prefix of its functions in the C program: empty, or ``"inverse_"``.
     token : str
-        Token by which an importer distinguishes this unit from others.
+        Text that differs between units of different models.
     description : str
-        One sentence.
+        Description in one sentence.
     inputs, output : tuple of Quantity, Quantity
         Inputs in the order of the arguments of the C function, and its output.
     limit : float
-        Outputs of this size mean that the model diverges.
+        Outputs with a larger magnitude mean that the model diverges [unit of the output].
     """
 
     identifier: str
@@ -93,9 +105,23 @@ class CoSimulation:
 
 
 def fmus(model: Model, name: str = "piezo", inverse: Inverse | None = None) -> Mapping[str, bytes]:
-    """Co-simulation units by file name: NAME.fmu, and NAME_inverse.fmu with an inverse.
+    """Write a model as co-simulation units.
 
     They contain their C sources, and a library for this computer if it has a C compiler (see `compiler`).
+
+    Parameters
+    ----------
+    model : Model
+        Model to export.
+    name : str
+        Name of the units, a lower-case C identifier.
+    inverse : Inverse, optional
+        Inverse of the same model, to export with it.
+
+    Returns
+    -------
+    mapping of str to bytes
+        Content by file name: NAME.fmu, and NAME_inverse.fmu with an inverse.
 
     Raises
     ------
@@ -117,7 +143,7 @@ def fmus(model: Model, name: str = "piezo", inverse: Inverse | None = None) -> M
 
 
 def compiler() -> str | None:
-    """The C compiler of this computer: from the environment variable CC, or cc, gcc or clang; None without one."""
+    """Path of a C compiler on this computer: of the environment variable CC, or cc, gcc or clang; None without one."""
     return next(filter(None, (shutil.which(c) for c in (os.environ.get("CC"), "cc", "gcc", "clang") if c)), None)
 
 
@@ -142,7 +168,7 @@ def _packed(part: CoSimulation, model: Model, name: str, program: Mapping[str, s
 
 
 def _library(identifier: str, sources: Mapping[str, str]) -> dict[str, bytes]:
-    """The compiled library by its path in the unit; none if there is no compiler."""
+    """The compiled library by its path in the unit; empty without a compiler or on an unknown operating system."""
     program, system = compiler(), {"Linux": ("linux", ".so"), "Darwin": ("darwin", ".dylib")}.get(platform.system())
     if program is None or system is None:
         return {}

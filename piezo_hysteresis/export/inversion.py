@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The inverse of a model as C forms, from the wanted displacement to the drive voltage."""
+"""The inverse of a model as a series of C forms, from the wanted displacement to the drive voltage."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class CInverse:
     forms : dict of str to CForm
         Forms by name, in the order of the inverse; the first takes metres, the last returns volts.
     stages : dict of str to (int or None)
-        Number of the block that each form inverts; None for a form that rests at the displacement.
+        Number of the block that each form inverts; None for a form whose input at rest is the displacement.
     preview : int
-        Number of samples that must be known ahead.
+        Number of samples of the wanted displacement that must be known in advance.
     """
 
     forms: dict[str, CForm]
@@ -44,7 +44,7 @@ class CInverse:
     preview: int
 
     def rest_calls(self, prefix: str, chain: dict[str, CForm]) -> Iterator[str]:
-        """C calls that set every stage to rest, between the calls of the prediction, which pass on x."""
+        """C calls that set every stage to rest, each after the call of the prediction that computes its x at rest."""
         waiting = {at: name for name, at in self.stages.items() if self.forms[name].has_state}
         for k, (name, form) in enumerate(chain.items()):
             if k in waiting:
@@ -54,7 +54,7 @@ class CInverse:
             yield f"{prefix}_{waiting[None]}_rest(&state->{waiting[None]}, x);"
 
     def step_calls(self, prefix: str) -> list[str]:
-        """C calls of one sample."""
+        """C calls that process one sample."""
         return list(step_calls(prefix, self.forms, "state"))
 
 

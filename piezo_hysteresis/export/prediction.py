@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The prediction of a model as C forms, in the order of its chain."""
+"""The prediction of a model as a series of C forms, in the order of its chain."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class CChain:
     forms : mapping of str to CForm
         Forms by name, in chain order; the first takes volts, the last returns metres.
     channels : tuple of str
-        Further measured inputs in alphabetical order, the order of the arguments.
+        Further measured inputs, in alphabetical order, which is the order of the arguments in C.
     """
 
     forms: dict[str, CForm]
@@ -59,14 +59,14 @@ def prediction(model: Model) -> CChain:
 
 
 def rest_calls(prefix: str, forms: dict[str, CForm], state: str) -> Sequence[str]:
-    """C calls that set every form in turn to rest at x, and set x to its output."""
+    """C calls that set every form to rest at x and then set x to the output of the form."""
     return [
         f"x = {prefix}_{name}_rest({f'&{state}->{name}, ' if form.has_state else ''}x);" for name, form in forms.items()
     ]
 
 
 def step_calls(prefix: str, forms: dict[str, CForm], state: str) -> Sequence[str]:
-    """C calls of one sample."""
+    """C calls that process one sample."""
     calls = []
     for name, form in forms.items():
         arguments = [f"&{state}->{name}"] * form.has_state + ["x"] + [form.channel] * bool(form.channel)
@@ -75,7 +75,7 @@ def step_calls(prefix: str, forms: dict[str, CForm], state: str) -> Sequence[str
 
 
 def units(names: Sequence[str]) -> dict[str, str]:
-    """Units of input and output of every form of a chain."""
+    """Units of input and output of every form of a chain, as text by name."""
     at = [names.index(scale) for scale in ("voltage_scale", "displacement_scale")]
     normalised = "normalised [1]"
     found = {}

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A model as a C program: header, source and self-test."""
+"""`c_program`: writes a model as a C program: header, source and self-test."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from .prediction import prediction, rest_calls, step_calls, units
 from .vectors import vectors
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,40}")
-"""Valid names of a program; every file, type and function of a block begins with the name."""
+"""Valid names of a program; every file, type and function begins with the name."""
 
 
 @cache
 def templates() -> Environment:
-    """Templates of the files."""
+    """Jinja environment with the templates of the files."""
     environment = Environment(
         loader=PackageLoader("piezo_hysteresis.export"), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, keep_trailing_newline=True,
@@ -49,7 +49,7 @@ def templates() -> Environment:
 
 
 def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None) -> Mapping[str, str]:
-    """Files of a C program by their names: NAME.h, NAME.c and NAME_test.c.
+    """Write a model as a C program.
 
     Parameters
     ----------
@@ -59,6 +59,11 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
         Beginning of the names of all files, functions and types.
     inverse : Inverse, optional
         Inverse of the same model, to export with it.
+
+    Returns
+    -------
+    mapping of str to str
+        Text by file name: NAME.h, NAME.c and NAME_test.c.
 
     Raises
     ------
@@ -105,10 +110,10 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
 
 
 def model_hash(model: Model) -> str:
-    """Hash of the model without validity and provenance, as in the model file."""
+    """Hash of the model as in the model file; validity and provenance do not influence it."""
     return str(to_parameters(model)[f"{PREFIX}hash"])
 
 
 def _comment(text: str) -> str:
-    """Text without the end of a C comment."""
+    """Text in which nothing ends a C comment."""
     return text.replace("*/", "* /")

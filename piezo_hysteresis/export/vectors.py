@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Test vectors of an exported model: a drive with swings, steps and holds, and the prediction of the model."""
+"""Test vectors of an exported model: a drive with swings, a step and holds, and the prediction of the model."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ class Vectors:
     Parameters
     ----------
     start : float
-        Voltage at rest before [V].
+        Voltage at which the stage has settled before [V].
     voltage : (n,) ndarray
         Drive [V].
     channels : mapping of str to (n,) ndarray
-        Further measured inputs.
+        Further measured inputs [m] or [K].
     displacement : (n,) ndarray
         Prediction of the model [m].
     inverse : (n,) ndarray or None
@@ -72,7 +72,8 @@ def drive(low: float, high: float, size: int = SIZE) -> Array:
 def vectors(model: Model, inverse: Inverse | None = None) -> Vectors:
     """Values that the exported model and its inverse have to reproduce.
 
-    The voltages are inside the identified range, if the model contains it.
+    The voltages are inside the identified range if the model file contains this range, otherwise between 0 V and the
+    voltage scale.
 
     Raises
     ------

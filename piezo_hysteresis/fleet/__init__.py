@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Many recordings on Dask: identify, validate or diagnose each, one row of a Parquet table for each."""
+"""Identifies, validates or diagnoses many recordings on Dask workers; the result is one table row per recording."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`attempt`: one recording from its URL to its row, in a worker process."""
+"""`attempt`: processes one recording in a worker process, from its URL to its row."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class OtherCodeError(PiezoError):
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """The order for a worker.
+    """What a worker has to do: one task for one recording.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Order:
     reading : mapping of str to object
         Arguments of `recording.read`.
     settings : str
-        Hash of work and reading.
+        Hash of `work` and `reading`.
     code : str
         `code_hash` of the client.
     limit : float
@@ -101,16 +101,21 @@ class Order:
 
 
 def attempt(order: Order) -> Row:
-    """The row of a recording, also if it fails.
+    """Process one recording. An error in the recording, the task or the storage becomes part of the row.
 
     Parameters
     ----------
     order : Order
 
+    Returns
+    -------
+    dict
+        The row: values by column, see `table.schema`.
+
     Raises
     ------
     OtherCodeError
-        If this process has other code than the client, because its results would get a wrong hash.
+        If this process runs other code than the client: the code hash in the row would be wrong.
     """
     if code_hash() != order.code:
         raise OtherCodeError(
@@ -121,7 +126,7 @@ def attempt(order: Order) -> Row:
     columns: Row = {}
     try:
         with within(order.limit), ExitStack() as stack:
-            status = _worked_on(order, stack, columns)
+            status = _process(order, stack, columns)
     except RecordingTimeSpent:
         status = RowStatus.TIMED_OUT
         columns["error"] = f"no result within the time limit of {order.limit:g} s; increase --time-limit"
@@ -129,7 +134,7 @@ def attempt(order: Order) -> Row:
     return order.row(status, worker=f"{socket.gethostname()}", **columns)
 
 
-def _worked_on(order: Order, stack: ExitStack, columns: Row) -> RowStatus:
+def _process(order: Order, stack: ExitStack, columns: Row) -> RowStatus:
     try:
         path = fetch(order.source, stack)
         columns["data_hash"] = content_hash(order.source, path)
@@ -160,11 +165,16 @@ def _line(error: BaseException) -> str:
 
 
 def lost(order: Order) -> Row:
-    """The row of a recording with which every worker process ended.
+    """The row of a recording for which the worker process ended in every attempt.
 
     Parameters
     ----------
     order : Order
+
+    Returns
+    -------
+    dict
+        The row: values by column.
     """
-    said = "the worker process ended in every attempt: too little memory, or a crash in a library"
-    return order.row(RowStatus.KILLED, error=said)
+    reason = "the worker process ended in every attempt: too little memory, or a crash in a library"
+    return order.row(RowStatus.KILLED, error=reason)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`cluster`: Dask workers on this machine, or those of another scheduler, with compiled kernels."""
+"""`cluster`: Dask workers on this machine, or the workers of another scheduler, with compiled kernels."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from ..record import Record
 from .extra import package
 
 PERIOD = 2e-5
-"""Sample period of the signals for loading the kernels [s]."""
+"""Sample period of the signals with which the kernels are loaded [s]."""
 BEAT = 5.0
 """Time between two reports of a worker to the scheduler [s]."""
 
@@ -68,15 +68,15 @@ def _plugin() -> type:
 def _beat_slowly(worker: Any) -> None:
     """Let a worker report to the scheduler every `BEAT` seconds.
 
-    The scheduler asks for two reports a second, which cost 3 ms of processor time. It misses a worker that has ended
-    at once, because the connection ends, and one that is silent after five minutes.
+    By default a worker sends two reports a second, which take 3 ms of processor time. Fewer are enough: the scheduler
+    notices the end of a worker at once, because the connection closes, and a silent worker after five minutes.
     """
     callbacks = worker.periodic_callbacks
     asked = callbacks["heartbeat"]
 
     async def beat() -> None:
         await worker.heartbeat()
-        callbacks["heartbeat"].callback_time = 1e3 * BEAT  # the answer of the scheduler has set it
+        callbacks["heartbeat"].callback_time = 1e3 * BEAT  # [ms]; the answer of the scheduler changes it
 
     callbacks["heartbeat"] = type(asked)(beat, asked.callback_time)
     if asked.is_running():
@@ -103,17 +103,17 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
     distributed, dask = package("distributed"), package("dask")
     settings = {
         "distributed.scheduler.allowed-failures": 0,  # `dispatch` decides
-        # every nanny, every worker and the scheduler look at their own event loop 50 times a second otherwise, which
-        # with eight workers is 15 % of a core, whether there is work or not
+        # by default every nanny, every worker and the scheduler check their event loop 50 times a second, which takes
+        # 15 % of a core with eight workers, also if they are idle
         "distributed.admin.tick.interval": "10s",
         "distributed.admin.tick.cycle": "10s",
-        "distributed.admin.tick.limit": "20s",  # otherwise every look reports an event loop that does not respond
+        "distributed.admin.tick.limit": "20s",  # must exceed the interval, or each check reports a blocked event loop
         "distributed.admin.system-monitor.interval": "5s",
         "distributed.worker.memory.monitor-interval": "2s",
         "distributed.scheduler.active-memory-manager.start": False,  # every result is one row
         "distributed.deploy.lost-worker-timeout": "120s",  # on a busy machine, the restart of a worker takes long
-        "distributed.worker.profile.enabled": False,  # it samples the stack of a fit a hundred times a second
-        # with this variable, every step of a fit allocates and frees arrays in the system: twice the processor time
+        "distributed.worker.profile.enabled": False,  # the profiler samples the stack a hundred times a second
+        # with this variable, each step of a fit returns its memory to the system: twice the processor time
         "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
     }
     with dask.config.set(settings):
@@ -141,17 +141,17 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
                 yield client
         finally:
             if host is not None:
-                with suppress(TimeoutError):  # a killed worker that is slow to end must not fail a run that is over
+                with suppress(TimeoutError):  # a killed worker that ends slowly must not make a finished run fail
                     host.close()
 
 
 def revive(client: Any) -> None:
-    """Restart workers of this machine that were killed during their start, which Dask does not restart.
+    """Start new workers for those on this machine that were killed during their start; Dask does not replace these.
 
     Parameters
     ----------
     client : distributed.Client
-        From `cluster`; nothing is done for another scheduler.
+        Client from `cluster`; with another scheduler, nothing is done.
     """
     host = client.cluster
     if host is None:

@@ -32,7 +32,7 @@ LIBRARIES = ("numba", "numpy", "scipy")
 
 @cache
 def code_hash() -> str:
-    """``sha256:`` and 16 digits of the sources that a result depends on, and of the versions of numerical packages."""
+    """Hash of the source files in `ROOMS` and of the versions of `LIBRARIES`: ``sha256:`` and 16 digits."""
     package = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for room in ROOMS:

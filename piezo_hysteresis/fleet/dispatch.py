@@ -28,13 +28,14 @@ from .attempt import Order, Row, attempt, lost
 from .cluster import revive
 
 AHEAD = 4
-"""Number of submitted recordings per thread."""
+"""Number of recordings that are submitted at once, per thread of the workers."""
 TOGETHER, ALONE = 2, 2
-"""Numbers of lost workers after which a recording fails: while others run, which may be the cause, and alone."""
+"""Numbers of lost workers after which a recording fails. The first attempts run beside other recordings, one of which
+may be the cause; the last attempts run alone."""
 WAIT, COLLECT, LOOK = 0.5, 2.0, 5.0
 """Longest wait for the end of a recording, and times between two collections of rows and two checks of the workers [s].
 
-Every submission and every collection costs messages between three processes, however many recordings it is about.
+Every submission and every collection needs messages between three processes, for one recording as for many.
 """
 
 
@@ -63,24 +64,27 @@ class Dispatch:
         """Whether every recording has its row."""
         return not (self._waiting or self._suspects or self._running or self._over)
 
-    def submit(self, room: int) -> None:
-        """Submit recordings until `room` of them are running, as soon as less than half of them are.
+    def submit(self, capacity: int) -> None:
+        """If at most half of `capacity` recordings are running, submit others until `capacity` are running.
 
-        Recordings that lost a worker run last, one by one.
+        A recording that lost `TOGETHER` workers is submitted when all others are done, alone.
         """
-        if self._waiting and 2 * len(self._running) <= room:
-            free = min(room - len(self._running), len(self._waiting))
+        if self._waiting and 2 * len(self._running) <= capacity:
+            free = min(capacity - len(self._running), len(self._waiting))
             self._submit([self._waiting.popleft() for _ in range(free)])
         elif self._suspects and not (self._waiting or self._running or self._over):
             self._submit([self._suspects.popleft()])
 
     def rows(self) -> list[Row]:
-        """The rows of recordings that have ended, from time to time; otherwise nothing, after a short wait."""
+        """The rows of the recordings that have ended since the last collection.
+
+        It waits up to `WAIT`. The list is empty if the last collection is less than `COLLECT` ago.
+        """
         self._wait()
         if not self._over or (self._running and time.monotonic() - self._collected < COLLECT):
             return []
         self._collected = time.monotonic()
-        # the results of a lost worker are computed again, which may fail; then there is no row
+        # Dask computes the results of a lost worker again; if that fails, there is no row yet
         finished = {number: future for future, number in self._over.items() if future.status == "finished"}
         found: dict[int, Row | None] = self._client.gather(finished, errors="skip")
         over, self._over = self._over, {}
@@ -136,8 +140,8 @@ class Dispatch:
         if isinstance(error, PiezoError):
             raise error
         if type(error).__name__ != "KilledWorker":
-            said = printable(" ".join(str(error).split())) or type(error).__name__
-            raise RecordingError(f"{self._orders[number].source.url}: {said}; see the log of the workers")
+            reason = printable(" ".join(str(error).split())) or type(error).__name__
+            raise RecordingError(f"{self._orders[number].source.url}: {reason}; see the log of the workers")
         self._deaths[number] += 1
         if self._deaths[number] >= TOGETHER + ALONE:
             return [lost(self._orders[number])]
@@ -146,13 +150,18 @@ class Dispatch:
 
 
 def finished(orders: Sequence[Order], client: Any) -> Iterator[list[Row]]:
-    """The rows of orders as they are finished, in lists; a list may be empty.
+    """Process recordings on the workers of a client.
 
     Parameters
     ----------
     orders : sequence of Order
     client : distributed.Client
-        From `cluster`.
+        Client from `cluster`.
+
+    Yields
+    ------
+    list of dict
+        Rows of the recordings that have finished; the list may be empty.
 
     Raises
     ------
@@ -160,11 +169,11 @@ def finished(orders: Sequence[Order], client: Any) -> Iterator[list[Row]]:
         If a worker runs other code, or the scheduler was lost.
     """
     dispatch = Dispatch(orders, client)
-    looked, room = -LOOK, 0
+    looked, capacity = -LOOK, 0
     while not dispatch.is_over:
         if time.monotonic() - looked > LOOK:
             dispatch.check()
             revive(client)
-            looked, room = time.monotonic(), AHEAD * max(1, sum(client.nthreads().values()))
-        dispatch.submit(room)
+            looked, capacity = time.monotonic(), AHEAD * max(1, sum(client.nthreads().values()))
+        dispatch.submit(capacity)
         yield dispatch.rows()

@@ -30,13 +30,18 @@ BLOCK = 1 << 20
 
 
 def fetch(source: Source, stack: ExitStack) -> Path:
-    """The path of a recording on this machine: the original, or a copy that exists as long as `stack`.
+    """Make a recording readable on this machine.
 
     Parameters
     ----------
     source : Source
     stack : ExitStack
-        Removes the copy.
+        Its end removes a copy.
+
+    Returns
+    -------
+    Path
+        The recording itself if it is on a disk, otherwise a copy.
 
     Raises
     ------
@@ -62,7 +67,7 @@ def fetch(source: Source, stack: ExitStack) -> Path:
 
 
 def _copy(fs: Any, file: str, target: Path) -> None:
-    """Copy a file; from S3 without asking first whether it is a folder, which takes a third of the time."""
+    """Copy a file. For S3, `get_file` is not used: it first asks whether the file is a folder, a third of the time."""
     if fs.protocol != "s3":
         fs.get_file(file, str(target))
         return

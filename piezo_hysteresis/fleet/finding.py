@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`find_recordings`: the recordings of paths, patterns and URLs, without reading them."""
+"""`find_recordings`: lists the recordings at paths, patterns and URLs, without reading them."""
 
 from __future__ import annotations
 
@@ -44,22 +44,26 @@ Info = dict[str, Any]
 def find_recordings(
     urls: Sequence[str], storage: Storage | None = None, names: NamePattern | None = None
 ) -> tuple[Source, ...]:
-    """The existing recordings, each once, in the order of their URLs.
+    """List the recordings at URLs, each once, sorted by URL.
 
     Parameters
     ----------
     urls : sequence of str
         Files, folders or patterns with ``*``, ``?`` and ``**``: local, s3:// or http(s)://. In a folder, at any depth,
-        a bag or a folder of ``NN_<phase>.npz`` is one recording, and every other file with a known ending too.
+        a bag is one recording, a folder of ``NN_<phase>.npz`` is one, and so is every other file with a known ending.
     storage : Storage, optional
         Access to S3.
     names : NamePattern, optional
         Pattern that finds stage and date in a URL.
 
+    Returns
+    -------
+    tuple of Source
+
     Raises
     ------
     RecordingError
-        If there is nothing at a URL, or its storage cannot be reached.
+        If there is no recording at a URL, or its storage cannot be reached.
     """
     storage, names = storage or Storage(), names or NamePattern()
     found: dict[str, Source] = {}

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`run_fleet`: processes many recordings, and keeps one row for each."""
+"""`run_fleet`: processes many recordings and writes one row for each."""
 
 from __future__ import annotations
 
@@ -31,8 +31,9 @@ from .table.results import Known, Results
 from .work import Work
 
 FLUSH_TIME, FLUSH_ROWS = 20.0, 1000
-"""Time [s], and number of rows, after which rows are written; a killed run loses at most so many."""
+"""Time [s] and number of rows after which rows are written. A killed run loses the rows that were not written yet."""
 Progress = Callable[[str, float], None]
+"""Function of a message and of the fraction done, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,7 @@ class FleetSummary:
     Parameters
     ----------
     counts : mapping of str to int
-        Number of recordings by status; ``unchanged``: files with a new version but the same data.
+        Number of recordings by status. ``unchanged`` counts files that have a new version but contain the same data.
     seconds : float
         Duration of the run [s].
     """
@@ -61,7 +62,7 @@ class FleetSummary:
 
 
 def settings_hash(work: Work, reading: Mapping[str, Any]) -> str:
-    """``sha256:`` and 16 digits, from the options that influence a result."""
+    """Hash of the options that influence a result: ``sha256:`` and 16 digits."""
     given = sorted((name, repr(value)) for name, value in reading.items() if value not in (None, {}, [], ()))
     return "sha256:" + hashlib.sha256(f"{work.settings()}\n{given}".encode()).hexdigest()[:16]
 
@@ -75,7 +76,7 @@ def open_orders(
     limit: float = float("inf"),
     retry: bool = False,
 ) -> list[Order]:
-    """Orders for all recordings without a row, or with changed data, code or options.
+    """Orders for the recordings that have to be processed: without a row, or with changed data, code or options.
 
     Parameters
     ----------
@@ -89,6 +90,10 @@ def open_orders(
         Time limit per recording [s]; a recording that exceeded a smaller limit is tried again.
     retry : bool
         Whether recordings that failed are tried again.
+
+    Returns
+    -------
+    list of Order
     """
     reading, code = dict(reading or {}), code_hash()
     settings = settings_hash(work, reading)
@@ -113,18 +118,22 @@ def _is_final(known: Known, limit: float, retry: bool) -> bool:
 
 
 def run_fleet(orders: Sequence[Order], results: Results, client: Any, progress: Progress | None = None) -> FleetSummary:
-    """Process recordings, and write their rows when they are finished.
+    """Process recordings and write each row when its recording is finished.
 
     Parameters
     ----------
     orders : sequence of Order
-        From `open_orders`.
+        Orders from `open_orders`.
     results : Results
         Results, open for writing.
     client : distributed.Client
-        From `cluster`.
+        Client from `cluster`.
     progress : callable, optional
-        Called with a message and the fraction done.
+        Called with a message and the fraction done, 0 to 1.
+
+    Returns
+    -------
+    FleetSummary
 
     Raises
     ------
@@ -158,7 +167,7 @@ def run_fleet(orders: Sequence[Order], results: Results, client: Any, progress: 
 
 
 def _refresh(results: Results, unchanged: Sequence[Row]) -> None:
-    """Keep the rows of recordings whose files have a new version but the same data."""
+    """Write the new version and dates into the rows of recordings whose files changed but whose data did not."""
     now = {(row["task"], row["recording"]): row for row in unchanged}
     fresh = ("version", "stage", "month", "recorded_at", "finished_at")
     for row in list(results.rows(now)):

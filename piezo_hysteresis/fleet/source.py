@@ -41,20 +41,20 @@ class Source:
     Parameters
     ----------
     url : str
-        Path or URL, the identifier of the recording.
+        Path or URL; it identifies the recording.
     files : tuple of str
         Paths of its files in the storage.
     folder : str
         Path of the folder of the recording; empty for a single file.
     storage : Storage
-        Storage that opens it.
+        Storage that opens the URL.
     stage : str
         Name of the stage.
     recorded_at : datetime or None
-        Time of the recording [UTC]; None if neither name nor storage contain it.
+        Time of the recording [UTC]; None if neither the URL nor the storage contains it.
     version : str
-        Sizes and modification times, or tags, as listed by the storage; if they differ, the data may have changed.
-        Empty if the storage does not list them.
+        Sizes and modification times (or tags) of the files, as listed by the storage. If they differ, the data may have
+        changed. Empty if the storage does not list them.
     """
 
     url: str
@@ -78,13 +78,13 @@ class NamePattern:
     Parameters
     ----------
     text : str
-        Regular expression with a group ``stage``, a group ``date`` or both; empty for the default: the folder of the
-        recording, and the first date in the URL.
+        Regular expression with a group ``stage``, a group ``date`` or both. If it is empty, the stage is the folder of
+        the recording, and the date is the first date in the URL.
 
     Raises
     ------
     ParameterError
-        If it is not a regular expression, or has neither group.
+        If `text` is not a regular expression, or has neither group.
     """
 
     text: str = ""
@@ -130,7 +130,7 @@ class NamePattern:
 
 
 def version_of(infos: list[dict[str, Any]]) -> str:
-    """Sizes and times or tags of files in one line; empty if the storage lists neither time nor tag of some file."""
+    """Sizes and times (or tags) of files as text; empty if the storage lists neither for one of the files."""
     parts = []
     for info in infos:
         mark = info.get("ETag") or info.get("mtime") or info.get("Last-Modified") or info.get("LastModified")

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Storage`: opens the location of a URL: a disk, an S3 server, a web server."""
+"""`Storage`: gives access to the files at a URL: on a disk, on an S3 server or on a web server."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Storage:
         Raises
         ------
         RecordingError
-            If there is none for such a URL.
+            If the URL has an unknown scheme, or its bucket cannot be read.
         """
         scheme = urlsplit(url).scheme if "://" in url else ""
         if scheme == "s3":

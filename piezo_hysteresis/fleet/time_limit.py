@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A time limit for work in a thread: first the work is interrupted; if it does not end, its process is ended."""
+"""A time limit for work in a thread. First the work is interrupted; if it does not end, the process is ended."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 GRACE = 60.0
-"""Time that a library has to return to Python after the limit, before the process is ended [s]."""
+"""Time between the interruption and the end of the process [s]; a library that runs must return to Python within it."""
 
 
 class RecordingTimeSpent(BaseException):
-    """The time limit of a recording has passed; not an `Exception`, so that error handlers do not catch it."""
+    """The time limit of a recording has passed. It is not an `Exception`, so that error handlers do not catch it."""
 
 
 @contextmanager

@@ -35,7 +35,7 @@ from .work_result import WorkResult, fitted_parameters
 
 
 class Work(Protocol):
-    """A function of an experiment; it can be sent to another process."""
+    """A task: a function of an experiment that can be sent to another process."""
 
     @property
     def name(self) -> str:
@@ -45,7 +45,7 @@ class Work(Protocol):
         """Everything that influences the result besides data and code, as text."""
 
     def __call__(self, experiment: Experiment) -> WorkResult:
-        """The result of an experiment. The message of a PiezoError becomes the error of the row."""
+        """The result for an experiment. If it raises an error, the row contains its message."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Identify:
     Parameters
     ----------
     hysteresis : str
-        Name of the operator.
+        Name of the hysteresis operator, one of `effects.OPERATORS`.
     """
 
     hysteresis: str = HYSTERESIS.name
@@ -157,9 +157,13 @@ def work_for(task: str, model: str = "", hysteresis: str = HYSTERESIS.name) -> W
     task : str
         One of `TASKS`.
     model : str
-        Text of a model file: needed to validate, possible to diagnose.
+        Text of a model file: required for ``validate``, optional for ``diagnose``, not allowed for ``identify``.
     hysteresis : str
-        Name of the operator to identify.
+        Name of the hysteresis operator to identify.
+
+    Returns
+    -------
+    Work
 
     Raises
     ------
@@ -179,7 +183,9 @@ def work_for(task: str, model: str = "", hysteresis: str = HYSTERESIS.name) -> W
 
 
 def described(percent: float) -> str:
-    """How well a model describes a stage, in one word.
+    """How well a model describes a stage, in one word, from its free-run error [% of range].
+
+    The limits are `POOR` and `USELESS`. An error that is not a number gives ``not_described``.
 
     >>> described(0.1), described(5.0), described(126.0)
     ('described', 'poor', 'not_described')

@@ -32,7 +32,7 @@ class WorkResult:
     Parameters
     ----------
     verdict : str
-        One of a fixed set of words, see docs/fleet.md.
+        Result in one word; docs/fleet.md lists the words.
     effects : tuple of str
         Effects of the model, or those that a diagnosis names.
     converged : bool or None
@@ -44,7 +44,7 @@ class WorkResult:
     parameters : tuple of mapping
         ``name``, ``value``, ``lower`` and ``upper`` (95 %, may be None), ``unit``, ``at_bound``; in SI units.
     notices : tuple of Notice
-        Notices about the data.
+        Findings about the data.
     model : str or None
         Text of the model file.
     """

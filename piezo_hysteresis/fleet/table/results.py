@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Results`: the folder of results, a table in Parquet that always holds one row per recording and task.
+"""`Results`: the folder of results, a table in Parquet with one row per recording and task.
 
-Rows are first written as small parts in the folder of their partition. Every file is written atomically. Parts are
-merged from time to time and at the end. A killed run may leave parts, or parts whose rows are merged already; the next
-run repairs this before it begins.
+Rows are first written as small files (parts) in the folder of their partition. Every file is written atomically. Parts
+are merged into one file when there are many, and at the end. A killed run may leave parts, also parts whose rows are
+merged already. The next run removes them before it begins.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ from ..extra import package
 from .schema import PARTITIONS, schema
 
 MERGED = "rows.parquet"
-"""File of a partition with merged parts."""
+"""Name of the file of a partition into which its parts are merged."""
 MOST_PARTS = 20
-"""Number of parts of a partition from which they are merged."""
+"""Number of parts in a partition at which they are merged."""
 INDEX = (
     "recording", "task", "status", "data_hash", "code_hash", "settings_hash", "version", "time_limit_s", "finished_at",
 )  # fmt: skip
@@ -49,7 +49,10 @@ INDEX = (
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """Known data of a recording in the results."""
+    """Columns of an existing row that decide whether its recording has to be processed again, and its file.
+
+    `time_limit` is in seconds, infinite for none; `finished_at` is in UTC.
+    """
 
     status: str
     data_hash: str
@@ -73,6 +76,7 @@ class Results:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.known: dict[tuple[str, str], Known] = {}
+        """The existing rows, by task and recording."""
         self._new: list[Row] = []
         self._changed: set[Path] = set()
         self._number = 0
@@ -84,7 +88,7 @@ class Results:
         Raises
         ------
         RecordingError
-            If another process uses it, or it cannot be read or written.
+            If another process uses the folder, or it cannot be read or written.
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -114,7 +118,7 @@ class Results:
             os.close(self._lock)
 
     def add(self, row: Row) -> None:
-        """Add a row; it replaces the row of the same recording and task. It is on disk after `flush`."""
+        """Add a row, which replaces the row of the same recording and task; `flush` writes it to disk."""
         self._new.append(row)
 
     @property
@@ -123,7 +127,7 @@ class Results:
         return len(self._new)
 
     def flush(self) -> None:
-        """Write the added rows."""
+        """Write the added rows to disk; RecordingError if the folder cannot be written."""
         groups: dict[Path, list[Row]] = defaultdict(list)
         for row in self._new:
             names = (f"{column}={quote(str(row[column]), safe='')}" for column in PARTITIONS)
@@ -145,7 +149,7 @@ class Results:
             self._merge(place)
 
     def rows(self, recordings: Iterable[tuple[str, str]]) -> Iterator[Row]:
-        """The complete rows of recordings, given as (task, recording)."""
+        """The complete rows of some recordings, each given as (task, recording)."""
         wanted: dict[Path, set[tuple[str, str]]] = defaultdict(set)
         for identity in recordings:
             wanted[self.known[identity].file].add(identity)
@@ -206,7 +210,7 @@ class Results:
 
 
 def read_results(folder: Path, columns: list[str] | None = None) -> Any:
-    """All rows as an Arrow table, with the columns ``stage`` and ``month``.
+    """Read all rows, with the columns ``stage`` and ``month``.
 
     Parameters
     ----------
@@ -214,6 +218,10 @@ def read_results(folder: Path, columns: list[str] | None = None) -> Any:
         Folder written by `Results`.
     columns : list of str, optional
         Columns to read; default: all.
+
+    Returns
+    -------
+    pyarrow.Table
 
     Raises
     ------

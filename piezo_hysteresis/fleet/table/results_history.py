@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The results of a folder as the history for the page."""
+"""Reads the results of a folder as the history that the report of a fleet draws."""
 
 from __future__ import annotations
 
@@ -29,18 +29,22 @@ COLUMNS = [
     "recording", "task", "stage", "status", "verdict", "error", "recorded_at", "free_run_error_percent",
     "floor_percent", "parameters",
 ]  # fmt: skip
-"""Columns that the page needs."""
+"""Columns that the report needs."""
 
 
 def results_history(folder: Path, task: str) -> FleetHistory:
-    """The rows of one task, in the order of their time.
+    """The rows of one task, sorted by the time of the recording.
 
     Parameters
     ----------
     folder : Path
         Folder written by `Results`.
     task : str
-        Task of the rows.
+        Name of the task.
+
+    Returns
+    -------
+    FleetHistory
 
     Raises
     ------
