@@ -52,15 +52,21 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
             interval = f"± {sure[name]:.2g}" if name in sure else ""
             message = f"{bounds}: at a bound" if name in hit else bounds
             rows.append((name, row.symbol, f"{value:.4g}", interval, row.unit, message, row.meaning))
+    drive, stroke = model.voltage_scale, 1e6 * model.displacement_scale
     note = (
-        "Single ARX coefficients are not identifiable, because poles and zeros nearly cancel. "
-        "Compare the frequency response of G instead."
+        f"Parameters with the unit 1 belong to the scales v = u / {drive:.5g} V and x = y / {stroke:.5g} µm. "
+        "Do not compare them with those of a model that has other scales."
     )
+    if Arx.name in model:
+        note += (
+            " Single ARX coefficients are not identifiable, because poles and zeros nearly cancel. "
+            "Compare the frequency response of G instead."
+        )
     return Table(
         "Parameters",
         ("name", "symbol", "value", "95 %", "unit", "bounds", "meaning"),
         tuple(rows),
-        note if Arx.name in model else "",
+        note,
         frozenset({2, 3, 5}),
     )
 
