@@ -83,7 +83,7 @@ def cross_validate(
     floors: Sequence[float] | Array,
     columns: Array,
     alone: Collection[int] = (),
-    room: tuple[Array, Array] | None = None,
+    room: tuple[Array | float, Array | float] = (-np.inf, np.inf),
 ) -> Score:
     """Score of a model extended by `columns`; every record is judged with parameters from the others.
 
@@ -97,7 +97,7 @@ def cross_validate(
         Directions of the parameters as combinations of the rows of `grams`; zero in the last row, the residual.
     alone : collection of int
         Indices of records that are the only ones of their kind; they are judged with the parameters from all records.
-    room : tuple of two (q,) ndarray, optional
+    room : tuple of two (q,) array_like
         Smallest and largest step along every direction. A direction at a bound is held there if the records together
         pull it outwards: an amplifier does not lead, even where a negative time constant would improve the prediction.
     """
@@ -106,16 +106,16 @@ def cross_validate(
     slopes = np.array([columns.T @ p[:, -1] for p in products])
     power = np.array([p[-1, -1] for p in products])
     hessian, slope = hessians.sum(axis=0), slopes.sum(axis=0)
-    step = _solve(hessian[None], slope[None], _scale(hessian))[0]
-    while room is not None:
-        outwards = ((step < 0.0) & (room[0] >= 0.0)) | ((step > 0.0) & (room[1] <= 0.0))
+    low, high = room
+    while True:
+        scale = _scale(hessian)
+        step = _solve(hessian[None], slope[None], scale)[0]
+        outwards = ((step < 0.0) & (low >= 0.0)) | ((step > 0.0) & (high <= 0.0))
         if not outwards.any():
             break
         for sums in (hessians, hessian, slopes, slope):
             sums[..., outwards] = 0.0
         hessians[:, outwards], hessian[outwards] = 0.0, 0.0
-        step = _solve(hessian[None], slope[None], _scale(hessian))[0]
-    scale = _scale(hessian)
     left = np.array([i not in alone for i in counted], dtype=float) * (len(counted) > 1)
     steps = _solve(hessian - left[:, None, None] * hessians, slope - left[:, None] * slopes, scale)
     changes = np.einsum("rj,rjk,rk->r", steps, hessians, steps) - 2.0 * np.sum(steps * slopes, axis=1)
