@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ...effects import Arx, Effect, MainsHum, Offset
 from ...errors import DivergenceError, ModelError, ParameterError
-from ...identification.fit.bounded_step import room
+from ...identification.fit.bounded_step import room_of
 from ...identification.fit.fit import Fit, gauge
 from ...identification.fit.normal_equations import Gram, grams
 from ...model.model import Model
@@ -127,15 +127,6 @@ def _products(model: Model, training_data: TrainingData) -> tuple[list[Gram], Ar
     products = grams(model, training_data.records, names, training_data.nuisance)
     columns = directions(model, names)
     return products, training_data.floors, columns, room_of(model, names, columns)
-
-
-def room_of(model: Model, names: Sequence[str], columns: Array) -> tuple[Array, Array]:
-    """Smallest and largest step along every column before a parameter leaves its bounds."""
-    values = model.values()
-    theta = np.array([values[n] for n in names])
-    lower, upper = (np.array([getattr(model.row(n), end) for n in names]) for end in ("lower", "upper"))
-    moves = columns[: len(names)]
-    return room(lower, theta, moves, -np.inf), room(upper, theta, moves, np.inf)
 
 
 def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:

@@ -27,11 +27,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...identification.fit.bounded_step import bounded_step
+from ...identification.fit.bounded_step import bounded_step, room_of
 from ...identification.fit.normal_equations import grams
 from ...identification.records.excitation_content import excitation_content
 from ...model.model import Model
-from ..search.candidates import directions, free_numbers, room_of
+from ..search.candidates import directions, free_numbers
 from ..search.training_data import TrainingData
 
 Array = NDArray[np.float64]

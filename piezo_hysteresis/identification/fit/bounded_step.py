@@ -12,13 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`bounded_step`: the minimum of a small quadratic function inside bounds, for the steps of a fit."""
+"""`bounded_step`: the minimum of a small quadratic function inside bounds, and the bounds of the steps of a fit."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
+from ...model.model import Model
 
 Array = NDArray[np.float64]
 
@@ -59,7 +63,21 @@ def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Ar
     return np.asarray(scale * found.x)
 
 
-def room(limits: Array, theta: Array, directions: Array, open_end: float) -> Array:
+def bounds_of(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
+    """Lower and upper bounds of parameters of a model."""
+    rows = [model.row(n) for n in names]
+    return np.array([r.lower for r in rows]), np.array([r.upper for r in rows])
+
+
+def room_of(model: Model, names: Sequence[str], columns: Array) -> tuple[Array, Array]:
+    """Smallest and largest step along every column before one of the parameters leaves its bounds."""
+    values, moves = model.values(), columns[: len(names)]
+    theta = np.array([values[n] for n in names])
+    lower, upper = bounds_of(model, names)
+    return _room(lower, theta, moves, -np.inf), _room(upper, theta, moves, np.inf)
+
+
+def _room(limits: Array, theta: Array, directions: Array, open_end: float) -> Array:
     """Largest step along every direction; `open_end` if it changes several numbers."""
     far = np.full(directions.shape[1], open_end)
     for j, column in enumerate(directions.T):

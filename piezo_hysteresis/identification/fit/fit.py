@@ -27,7 +27,7 @@ from ...errors import DivergenceError, IdentificationError, ParameterError
 from ...model.model import Model
 from ...model.parameter_covariance import ParameterCovariance
 from ...record import Record
-from .bounded_step import bounded_step, room
+from .bounded_step import bounded_step, bounds_of, room_of
 from .covariance import covariance
 from .normal_equations import Gram, Nuisance, grams, residuals
 
@@ -181,8 +181,7 @@ def fit(
             f"fit: got {len(free)} free numbers and {len(records)} records, expected some of both"
         )
     sizes = np.ones(len(records)) if floors is None else np.asarray(floors, dtype=float)
-    lower = np.array([model.row(n).lower for n in free])
-    upper = np.array([model.row(n).upper for n in free])
+    lower, upper = bounds_of(model, free)
     values = model.values()
     theta = np.array([values[n] for n in free])
     directions = gauge(model, free)
@@ -200,7 +199,7 @@ def fit(
         idle = np.diag(hessian) <= np.finfo(float).tiny
         hessian[idle, :] = hessian[:, idle] = 0.0
         diagonal = np.where(idle, 1.0, np.diag(hessian))
-        low, high = room(lower, theta, directions, -np.inf), room(upper, theta, directions, np.inf)
+        low, high = room_of(model, free, directions)
         while True:
             step = directions @ bounded_step(hessian + np.diag(damping * diagonal), slope, low, high)
             trial = _bounded(free, np.clip(theta + step, lower, upper))

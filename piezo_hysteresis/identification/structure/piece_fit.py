@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...effects import Arx
 from ...errors import DivergenceError, ParameterError
 from ...model.model import Model
-from ..fit.bounded_step import bounded_step
+from ..fit.bounded_step import bounded_step, bounds_of
 from ..fit.fit import gauge
 from ..fit.normal_equations import grams
 from .pieces import WEIGHTS, RecordPiece
@@ -114,14 +114,13 @@ class PieceFit:
     def box(self) -> tuple[Array, Array]:
         """Distance of every parameter to its lower and upper bound; zeros are not bounded."""
         values = self.model.values()
-        rows = [self.model.row(n) for n in self.names]
         now = np.array([values[n] for n in self.names])
         zeros = np.full(self.matrices.shape[1] - 1 - now.size, np.inf)
-        ends = [(r.lower, r.upper) for r in rows]
+        lower, upper = bounds_of(self.model, self.names)
         if POLE in self.names:
-            ends[self.names.index(POLE)] = (-LARGEST_POLE, 0.0)
-        low, high = np.array(ends).reshape(-1, 2).T - now
-        return np.concatenate((low, -zeros)), np.concatenate((high, zeros))
+            pole = self.names.index(POLE)
+            lower[pole], upper[pole] = -LARGEST_POLE, 0.0
+        return np.concatenate((lower - now, -zeros)), np.concatenate((upper - now, zeros))
 
 
 def linearised(
@@ -201,10 +200,9 @@ def _step(now: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float],
     total, names = now.total, now.names
     step = best_step(now, total, damping)
     values = now.model.values()
+    moved = np.clip([values[n] for n in names] + step[: len(names)], *bounds_of(now.model, names))
     try:
-        moved = {n: values[n] + d for n, d in zip(names, step.tolist(), strict=False)}
-        rows = {n: now.model.row(n) for n in names}
-        model = now.model.with_values({n: min(max(v, rows[n].lower), rows[n].upper) for n, v in moved.items()})
+        model = now.model.with_values(dict(zip(names, moved.tolist(), strict=True)))
         if not _cost(model, pieces, floors, names) < now.cost:  # without slopes, which take most of the time
             return None
         matrices, weights = linearised(model, pieces, floors, names)
