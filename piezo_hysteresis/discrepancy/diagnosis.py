@@ -165,23 +165,11 @@ class Diagnosis(Pictured):
                     "predicted_live": effect.is_predicted_live(),
                     "member_certain": step.member_certain,
                     "explained_fraction": round(self.selection.explained(step.best.score), 4),
-                    "parameters": self._parameters(effect.name),
+                    "parameters": _parameters(self.fit, effect.name),
                     "confusable_with": list(step.confusable_with),
                     "held_out_gain": round(step.before.cost - step.best.score.cost, 4),
                 }
             )
-        return rows
-
-    def _parameters(self, effect: str) -> dict[str, dict[str, Any]]:
-        assert self.fit is not None
-        rows: dict[str, dict[str, Any]] = {}
-        for name, value in self.fit.model.values().items():
-            owner, _, parameter = name.partition(".")
-            row = self.fit.model.row(name)
-            if owner == effect and not row.fixed and not row.per_record:
-                ends = self.fit.interval(name) if name in self.fit.names else (value, value)
-                interval = [min(max(end, row.lower), row.upper) for end in ends]
-                rows[parameter] = {"value": value, "interval_95": interval, "unit": row.unit}
         return rows
 
     def _gap(self) -> dict[str, Any]:
@@ -261,3 +249,16 @@ class Diagnosis(Pictured):
             lines.append(f"  next: record '{self.next_experiment.phase}' to separate {pair}")
         lines += [f"  {n.kind}: {n.message}" for n in self.experiment.notices if n.severe]
         return "\n".join(lines)
+
+
+def _parameters(fit: Fit, effect: str) -> dict[str, dict[str, Any]]:
+    """The fitted parameters of an effect, as in ``answer.json``."""
+    rows: dict[str, dict[str, Any]] = {}
+    for name, value in fit.model.values().items():
+        owner, _, parameter = name.partition(".")
+        row = fit.model.row(name)
+        if owner == effect and not row.fixed and not row.per_record:
+            ends = fit.interval(name) if name in fit.names else (value, value)
+            interval = [min(max(end, row.lower), row.upper) for end in ends]
+            rows[parameter] = {"value": value, "interval_95": interval, "unit": row.unit}
+    return rows

@@ -69,9 +69,8 @@ class Correction:
 
     def sentence(self) -> str:
         """The correction in words."""
-        if not self.accepted:
+        if self.model is None or self.gap is None:
             return f"A correction without a name was refused: {self.refusal}."
-        assert self.gap is not None and self.model is not None
         known = self.model.provenance
         low, high = (float(known[key]) for key in ("voltage_min", "voltage_max"))
         slow, fast = (float(known[key]) for key in ("frequency_min", "frequency_max"))
@@ -102,7 +101,11 @@ class Correction:
 
 def without_corrections(model: Model) -> Model:
     """The model without unnamed corrections, which could hide a missing effect."""
-    for effect in model.effects:
-        if isinstance(effect, UnnamedCorrection):
-            model = model.without(effect.name)
+    for effect in corrections_in(model):
+        model = model.without(effect.name)
     return model
+
+
+def corrections_in(model: Model) -> list[UnnamedCorrection]:
+    """The unnamed corrections of a model."""
+    return [e for e in model.effects if isinstance(e, UnnamedCorrection)]

@@ -80,7 +80,14 @@ def groups_of(values: Sequence[float]) -> Array:
     return found
 
 
-def held_out(model: Model, training_data: TrainingData, correction: str = "") -> HeldOut | None:
+def rate_and_amplitude_groups(training_data: TrainingData) -> tuple[Array, Array]:
+    """Number of the group of rate, and of the group of amplitude, of every record with a finite floor."""
+    counted = zip(training_data.records, training_data.floors, strict=True)
+    contents = [excitation_content(r) for r, floor in counted if np.isfinite(floor)]
+    return groups_of([c.bandwidth for c in contents]), groups_of([c.span for c in contents])
+
+
+def held_out(model: Model, training_data: TrainingData, correction: str = "") -> HeldOut:
     """Errors of a fitted model with whole groups left out, computed from inner products.
 
     Parameters
@@ -91,18 +98,9 @@ def held_out(model: Model, training_data: TrainingData, correction: str = "") ->
         Records and floors.
     correction : str
         Identifier of the correction, whose parameters go to zero if the other groups do not determine them.
-
-    Returns
-    -------
-    HeldOut or None
-        None if all records have the same rate or the same amplitude.
     """
     counted = [i for i, floor in enumerate(training_data.floors) if np.isfinite(floor)]
-    records = [training_data.records[i] for i in counted]
-    contents = [excitation_content(r) for r in records]
-    rates, amplitudes = groups_of([c.bandwidth for c in contents]), groups_of([c.span for c in contents])
-    if not (rates.any() and amplitudes.any()):
-        return None
+    rates, amplitudes = rate_and_amplitude_groups(training_data)
     names = free_numbers(model, training_data)
     columns = directions(model, names)[:-1]
     products = grams(model, training_data.records, names, training_data.nuisance)

@@ -31,8 +31,8 @@ from ..search.candidate_refits import LEAST_GAIN
 from ..search.refit import FAILURES, LAST, PRECISE, joint
 from ..search.selection_result import explained
 from ..search.training_data import TrainingData
-from .correction import Correction
-from .held_out import HeldOut, held_out
+from .correction import Correction, corrections_in
+from .held_out import HeldOut, held_out, rate_and_amplitude_groups
 
 Array = NDArray[np.float64]
 
@@ -64,14 +64,14 @@ def offered(model: Model, setup: BaselineSetup, null: float) -> Correction | Non
     Correction or None
         None if the records have only one rate or amplitude, if there is no test record, or if no form has a gain.
     """
-    before = held_out(model, setup.training_data)
-    if before is None or not setup.test_records:
+    if not (setup.test_records and all(g.any() for g in rate_and_amplitude_groups(setup.training_data))):
         return None
+    before = held_out(model, setup.training_data)
     found = [c for form in forms(model, setup.training_data) if (c := tried(model, form, before, setup.training_data))]
     if not found:
         return None
     best = max(found, key=lambda c: min(c.gain_rate, c.gain_amplitude))
-    return judged(best, model, setup, null) if best.accepted else best
+    return best if best.refusal else judged(best, model, setup, null)
 
 
 def forms(model: Model, training_data: TrainingData) -> Iterator[UnnamedCorrection]:
@@ -110,8 +110,7 @@ def tried(model: Model, form: UnnamedCorrection, before: HeldOut, training_data:
     except FAILURES:
         return None
     axes = [axis for axis, gain in (("rates", by_rate), ("amplitudes", by_amplitude)) if gain < LEAST_GAIN]
-    effect = fit.model[form.name]
-    assert isinstance(effect, UnnamedCorrection)
+    (effect,) = corrections_in(fit.model)
     refusal = (
         f"a function of the {form.depends_on} lowers mean ln R² by only {min(by_rate, by_amplitude):.2f} at "
         f"{' and '.join(axes)} that were not fitted, and {LEAST_GAIN:g} is needed"
@@ -132,8 +131,7 @@ def judged(correction: Correction, model: Model, setup: BaselineSetup, null: flo
         return replace(correction, refusal=f"its last fit failed ({error})")
     ratios = np.array([(p.before / p.floor, p.after / p.floor) for p in gap.per_phase])
     first, second = np.mean(ratios**2, axis=0).tolist()
-    removed, effect = explained(first, second, null), fit.model[correction.effect.name]
-    assert isinstance(effect, UnnamedCorrection)
+    removed, (effect,) = explained(first, second, null), corrections_in(fit.model)
     found = replace(correction, effect=effect, gap=gap, removed=removed)
     if removed < REMOVES:
         return replace(found, refusal=f"it removes {100 * removed:.0f} % of the gap on the test records")
@@ -147,7 +145,6 @@ def judged(correction: Correction, model: Model, setup: BaselineSetup, null: flo
 def _gains(model: Model, form: str, before: HeldOut, training_data: TrainingData) -> tuple[float, float]:
     """G at rates and at amplitudes that were left out."""
     after = held_out(model, training_data, form)
-    assert after is not None
     return _gain(before.by_rate, after.by_rate), _gain(before.by_amplitude, after.by_amplitude)
 
 
