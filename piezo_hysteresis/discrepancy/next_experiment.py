@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,14 +69,7 @@ def menu(training_data: TrainingData, model: Model) -> dict[str, Record]:
         max_slew_rate=np.inf,
         ramp_rate=extent.span,
     )
-    slow = DriveLimits(
-        sample_period=max(period, SLOW),
-        voltage_min=extent.voltage_min,
-        voltage_max=extent.voltage_max,
-        safe_voltage=extent.voltage_min,
-        max_slew_rate=np.inf,
-        ramp_rate=extent.span,
-    )
+    slow = replace(fast, sample_period=max(period, SLOW))
     top = min(400.0, 0.02 / period)
     waves = {
         "staircase": (excitation.steps(slow, (0.0, 0.5, 1.0, 0.5, 0.0), 10.0, slew_rate=extent.span), slow),

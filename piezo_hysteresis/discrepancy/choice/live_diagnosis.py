@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ...effects import CATALOGUE, Effect
@@ -107,7 +107,7 @@ class LiveDiagnosis:
     found: Diagnosis | None = None
     separation: Separation | None = None
     untested: tuple[str, ...] = ()
-    end: End | None = field(default=None)
+    end: End | None = None
 
     def advanced(self, experiment: Experiment, progress: Progress | None = None) -> LiveDiagnosis:
         """The state after the phases that were due have been played.
