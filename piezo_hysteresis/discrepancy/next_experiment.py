@@ -49,13 +49,10 @@ class NextExperiment:
         Phase name.
     separates : tuple of str
         Effects that it would separate.
-    power : float
-        Expected squared difference between their predictions, in floors² per second of stage time.
     """
 
     phase: str
     separates: tuple[str, ...]
-    power: float
 
 
 def menu(training_data: TrainingData, model: Model) -> dict[str, Record]:
@@ -149,25 +146,8 @@ def distances(
     return found
 
 
-def propose(first: Model, second: Model, names: tuple[str, str], training_data: TrainingData) -> NextExperiment:
-    """Phase of `menu` on which two fitted models differ most.
-
-    Parameters
-    ----------
-    first, second : Model
-        Fitted models, one with each effect.
-    names : (str, str)
-        Names of the effects.
-    training_data : TrainingData
-        Recorded data.
-    """
-    powers = separations(first, second, training_data)
-    phase = max(powers, key=lambda name: powers[name])
-    return NextExperiment(phase, names, powers[phase])
-
-
 def decide(selection: Selection, training_data: TrainingData) -> NextExperiment | None:
-    """Phase that would separate the first accepted effect with a rival from that rival; None if there is no rival.
+    """Phase of `menu` that separates the first accepted effect with a rival best; None if there is no rival.
 
     Parameters
     ----------
@@ -180,6 +160,7 @@ def decide(selection: Selection, training_data: TrainingData) -> NextExperiment 
         mine = step.best
         others = [r for r in step.rivals if r.effect.public_name() != mine.effect.public_name()]
         if others:
+            powers = separations(mine.fit.model, others[0].fit.model, training_data)
             pair = (mine.effect.public_name(), others[0].effect.public_name())
-            return propose(mine.fit.model, others[0].fit.model, pair, training_data)
+            return NextExperiment(max(powers, key=lambda name: powers[name]), pair)
     return None
