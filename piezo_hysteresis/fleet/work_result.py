@@ -82,7 +82,8 @@ class WorkResult:
 def fitted_parameters(fit: Fit | None) -> tuple[Mapping[str, Any], ...]:
     """The fitted parameters in SI units, with their 95 % intervals, limited to their bounds.
 
-    Every recording has scales of its own, so the dimensionless numbers of two recordings cannot be compared.
+    Every recording has scales and a sample period of its own, so the dimensionless numbers and the delays in samples of
+    two recordings cannot be compared.
 
     Parameters
     ----------
@@ -97,13 +98,15 @@ def _parameters(fit: Fit) -> Iterable[Mapping[str, Any]]:
         row = fit.model.row(name)
         lower, upper = fit.interval(name)
         volts, metres = row.powers
-        factor = fit.model.voltage_scale**volts * fit.model.displacement_scale**metres
+        factor, unit = fit.model.voltage_scale**volts * fit.model.displacement_scale**metres, row.physical_unit
+        if unit == "samples":
+            factor, unit = fit.model.sample_period, "s"
         yield {
             "name": name,
             "value": _finite(factor * value),
             "lower": _finite(factor * max(lower, row.lower)),
             "upper": _finite(factor * min(upper, row.upper)),
-            "unit": row.physical_unit,
+            "unit": unit,
             "at_bound": name in fit.at_bounds,
         }
 

@@ -28,6 +28,7 @@ from ..figures.drawing import Drawing
 from ..figures.style import FLOOR, canvas, legend_above, plain_log, styled
 from ..palette import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
 from ..words import POOR
+from .changes import ChangedStage
 from .history import FleetHistory
 from .outliers import OutlyingStage
 
@@ -41,17 +42,17 @@ _MARKS = ((ORANGE, "o"), (BLUE, "s"), (GREEN, "^"), (PURPLE, "D"), (SKY, "v"))
 """Colours and marks of the stages with a separate colour."""
 
 
-def apart(history: FleetHistory, outliers: Sequence[OutlyingStage]) -> tuple[str, ...]:
-    """The stages with a separate colour: all if there are few, otherwise the most outlying ones."""
+def apart(history: FleetHistory, found: Sequence[OutlyingStage | ChangedStage]) -> tuple[str, ...]:
+    """The stages with a separate colour: all if there are few, otherwise those found, the farthest first."""
     if len(history.stages) <= len(_MARKS):
         return history.stages
-    return tuple(dict.fromkeys(o.stage for o in outliers))[: len(_MARKS)]
+    return tuple(dict.fromkeys(f.stage for f in sorted(found, key=lambda f: -f.distance)))[: len(_MARKS)]
 
 
 @styled
-def parameters_over_time(history: FleetHistory, outliers: Sequence[OutlyingStage]) -> Drawing | None:
+def parameters_over_time(history: FleetHistory, found: Sequence[OutlyingStage | ChangedStage]) -> Drawing | None:
     """One panel per parameter: estimates with their intervals against the time of the recording."""
-    far = {o.parameter: o.distance for o in reversed(outliers)}
+    far = {f.parameter: f.distance for f in sorted(found, key=lambda f: f.distance)}
     names = sorted(
         (n for n, s in history.parameters.items() if np.any(~np.isnat(history.time[s.index]))),
         key=lambda n: (-far.get(n, 0.0), -history.parameters[n].index.size, n),
@@ -60,7 +61,7 @@ def parameters_over_time(history: FleetHistory, outliers: Sequence[OutlyingStage
         return None
     rows = -(-len(names) // 2)
     figure, axes = canvas(rows, min(2, len(names)), 2.4 * rows + 0.5, sharex=True)
-    coloured = apart(history, outliers)
+    coloured = apart(history, found)
     handles: dict[str, Any] = {}
     data: dict[str, NDArray[Any]] = {}
     for axis, name in zip(axes.flat, names, strict=False):
@@ -91,8 +92,8 @@ def parameters_over_time(history: FleetHistory, outliers: Sequence[OutlyingStage
     return Drawing(
         "parameters_over_time",
         "Parameters over time",
-        "One mark per recording, with its 95 % interval. Outlying stages have a separate colour. The "
-        f"parameters in which stages differ most come first; at most {PANELS} are drawn.",
+        "One mark per recording, with its 95 % interval. Outlying and changed stages have a separate colour. The "
+        f"parameters with the largest differences come first; at most {PANELS} are drawn.",
         f"{len(names)} parameters against the date of the recording: {', '.join(names)}.",
         figure,
         data,

@@ -25,8 +25,9 @@ from ..document import framed
 from ..page import Page
 from ..verdict import VerdictText
 from ..words import POOR
+from .changes import ChangedStage, changed_stages
 from .fleet_figures import errors_by_stage, errors_over_time, parameters_over_time
-from .fleet_tables import failure_table, outlier_table, stage_table
+from .fleet_tables import change_table, failure_table, outlier_table, stage_table
 from .history import FleetHistory
 from .outliers import OutlyingStage, outlying_stages
 
@@ -45,9 +46,12 @@ def fleet_page(history: FleetHistory) -> Page:
     history : FleetHistory
         History of one task.
     """
-    outliers = outlying_stages(history)
+    outliers, changes = outlying_stages(history), changed_stages(history)
     candidates = {
-        "Parameters": ([parameters_over_time(history, outliers)], [outlier_table(outliers)]),
+        "Parameters": (
+            [parameters_over_time(history, (*outliers, *changes))],
+            [outlier_table(outliers), change_table(changes)],
+        ),
         "Errors": (
             [errors_over_time(history), errors_by_stage(history)],
             [stage_table(history), failure_table(history)],
@@ -59,13 +63,17 @@ def fleet_page(history: FleetHistory) -> Page:
     }
     parts = {heading: part for heading, part in parts.items() if any(part)}
     done = int(history.is_done.sum())
-    verdict = VerdictText(f"{done} of {history.size} recordings have a result", tuple(_sentences(history, outliers)))
+    verdict = VerdictText(
+        f"{done} of {history.size} recordings have a result", tuple(_sentences(history, outliers, changes))
+    )
     title, about = f"Many recordings: {history.task}", f"{len(history.stages)} stages"
     html = framed(title, history.source, about, verdict, tuple(_merit(history)), parts, FOOTER)
     return Page(html, tuple(d for drawings, _ in parts.values() for d in drawings))
 
 
-def _sentences(history: FleetHistory, outliers: Sequence[OutlyingStage]) -> Iterator[str]:
+def _sentences(
+    history: FleetHistory, outliers: Sequence[OutlyingStage], changes: Sequence[ChangedStage]
+) -> Iterator[str]:
     errors = history.error[np.isfinite(history.error)]
     if errors.size:
         good = int(np.sum(errors <= POOR))
@@ -81,6 +89,10 @@ def _sentences(history: FleetHistory, outliers: Sequence[OutlyingStage]) -> Iter
         first = f"the first in {outliers[0].parameter}"
         count = "One stage differs" if len(names) == 1 else f"{len(names)} stages differ"
         yield f"{count} from the others: {', '.join(names[:5])}, {first}."
+    if changes:
+        names = list(dict.fromkeys(c.stage for c in changes))
+        count = "One stage has" if len(names) == 1 else f"{len(names)} stages have"
+        yield f"{count} changed over time: {', '.join(names[:5])}, the first in {changes[0].parameter}."
     lost = Counter(history.status[~history.is_done].tolist())
     if lost:
         words = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in lost.most_common())

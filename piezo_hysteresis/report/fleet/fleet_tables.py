@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The tables about many recordings: outlying stages, stages, recordings without a result."""
+"""The tables about many recordings: outlying and changed stages, all stages, recordings without a result."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ import numpy as np
 
 from ..tables.table import Table
 from ..words import POOR
+from .changes import ChangedStage
 from .history import FleetHistory
 from .outliers import FAR, OutlyingStage
 
@@ -47,6 +48,21 @@ def outlier_table(outliers: Sequence[OutlyingStage]) -> Table | None:
     )
     header = ("stage", "parameter", "median", "all stages", "unit", "distance")
     return Table("Outlying stages", header, rows[:ROWS], note + _more(rows), frozenset({2, 3, 5}))
+
+
+def change_table(changes: Sequence[ChangedStage]) -> Table | None:
+    """The stages with a parameter that has changed, the largest change first."""
+    if not changes:
+        return None
+    rows = tuple(
+        (c.stage, c.parameter, f"{c.earlier:.5g}", f"{c.later:.5g}", c.unit, f"{c.distance:.1f}") for c in changes
+    )
+    note = (
+        "Changed: the medians of the earlier and of the later half of the recordings differ by more than "
+        f"{FAR:g} standard errors of the difference of two recordings."
+    )
+    header = ("stage", "parameter", "earlier", "later", "unit", "distance")
+    return Table("Changed stages", header, rows[:ROWS], note + _more(rows), frozenset({2, 3, 5}))
 
 
 def stage_table(history: FleetHistory) -> Table:

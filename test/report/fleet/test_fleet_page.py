@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from piezo_hysteresis.report.fleet.changes import changed_stages
 from piezo_hysteresis.report.fleet.fleet_page import fleet_page
 from piezo_hysteresis.report.fleet.history import FleetHistory, ParameterSeries
 from piezo_hysteresis.report.fleet.outliers import outlying_stages
@@ -79,6 +80,17 @@ def test_three_stages_show_no_outlier():
     few = ParameterSeries("1", kept, series.value[kept], series.lower[kept], series.upper[kept])
     object.__setattr__(h, "parameters", {"bouc_wen.A": few})
     assert outlying_stages(h) == ()
+
+
+def test_a_stage_that_changes_is_named_with_its_change():
+    h = history()
+    assert changed_stages(h) == ()
+    late = (h.stage == "s2") & (h.time > np.datetime64("2026-03-10"))
+    h.parameters["bouc_wen.A"].value[late] += 0.05
+    (found,) = changed_stages(h)
+    assert (found.stage, found.parameter) == ("s2", "bouc_wen.A")
+    assert found.later - found.earlier == pytest.approx(0.05, abs=0.01)
+    assert "One stage has changed over time: s2, the first in bouc_wen.A." in fleet_page(h).html
 
 
 def test_the_sentences_of_the_page_agree_with_the_numbers(tmp_path):
