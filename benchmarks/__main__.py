@@ -43,6 +43,7 @@ QUALITY = (
     "real_recordings",
     "reading",
     "mirror",
+    "one_amplitude",
     "one_process",
 )
 """Benchmarks that take minutes or need data; they run by name only."""
