@@ -61,7 +61,7 @@ class CompensationNode(GuardedNode):
         self._status = CompensationStatus(self)
         self._driver = DriverClient(self, self._values["driver"])
         self._error, self._rms = advertise(self, "tracking_error"), advertise(self, "tracking_rms")
-        self._runs = PathRuns(self._driver, self._status, self._values, self._known)
+        self._runs = PathRuns(self._driver, self._status, self._values)
         self._reader = SampleReader()
         self._model: Model | None = None
         self._applied: AppliedState | None = None
@@ -130,7 +130,7 @@ class CompensationNode(GuardedNode):
             self._status.refuse(name[:64], str(error))
             return Trigger.Response(message=str(error))
         self._set_point.leave()
-        self._begin(name, self._runs.follow(name, wanted, limits))
+        self._begin(name, self._runs.follow(name, applied, wanted, limits))
         return Trigger.Response(success=True)
 
     def _on_goal(self, goal: Any) -> Trigger.Response:
@@ -145,7 +145,7 @@ class CompensationNode(GuardedNode):
             applied, limits = self._ready(moves=True)
             if not applied.is_ready:
                 raise ModelError("the new model is being run over the applied voltages; send it again in a moment")
-            found = self._runs.planned(np.full(16, float(message.data)), limits, way_back=False)
+            found = self._runs.planned(applied, np.full(16, float(message.data)), limits, way_back=False)
             if not found.reachability.is_whole:
                 raise StageError(why_not(found))
         except PiezoError as error:
@@ -179,10 +179,6 @@ class CompensationNode(GuardedNode):
         check_period(self._model, driver.sample_period)
         slew = driver.max_slew_rate * (1.0 - 1e-9)  # rounding must not cause a step that the driver refuses
         return self._applied, Limits(driver.voltage_min, driver.voltage_max, slew)
-
-    def _known(self) -> AppliedState:
-        assert self._applied is not None
-        return self._applied
 
     def _begin(self, phase: str, job: Job) -> None:
         self._phase, self._job = phase, job
@@ -230,7 +226,7 @@ class CompensationNode(GuardedNode):
 
     def _on_learn(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            _, limits = self._ready(moves=True)
+            applied, limits = self._ready(moves=True)
             if self._runs.last is None:
                 raise StageError("no trajectory yet: publish one on 'trajectory' first")
             name, found = self._runs.last
@@ -240,7 +236,7 @@ class CompensationNode(GuardedNode):
             response.message = str(error)
             return response
         self._set_point.leave()
-        self._begin(name, self._runs.rounds(name, found, limits))
+        self._begin(name, self._runs.rounds(name, applied, found, limits))
         response.success, response.message = True, f"{1 + self._values['learning_rounds']} rounds of '{name}' at most"
         return response
 

@@ -54,8 +54,6 @@ class PathRuns:
         Publishes every step.
     values : mapping of str to object
         Parameters of the node.
-    applied : callable
-        Returns the state of the model after the applied voltages.
 
     Attributes
     ----------
@@ -70,9 +68,8 @@ class PathRuns:
         driver: DriverClient,
         status: CompensationStatus,
         values: Mapping[str, Any],
-        applied: Callable[[], AppliedState],
     ) -> None:
-        self._driver, self._status, self._values, self._applied = driver, status, values, applied
+        self._driver, self._status, self._values = driver, status, values
         self._pool = ThreadPoolExecutor(1, "plan")
         self.tracking: Tracking | None = None
         self.last: tuple[str, Plan] | None = None
@@ -81,9 +78,8 @@ class PathRuns:
         """Refuse all further plans."""
         self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def planned(self, wanted: np.ndarray, limits: Limits, way_back: bool = True) -> Plan:
-        """Plan of a path (n,) [m] that starts at the present state of the stage."""
-        applied = self._applied()
+    def planned(self, applied: AppliedState, wanted: np.ndarray, limits: Limits, way_back: bool = True) -> Plan:
+        """Plan of a path (n,) [m] that starts at the present state of the stage, which `applied` contains."""
         return plan(
             applied.model,
             wanted,
@@ -107,7 +103,7 @@ class PathRuns:
             yield
         return future.result()
 
-    def follow(self, name: str, wanted: np.ndarray, limits: Limits) -> Job:
+    def follow(self, name: str, applied: AppliedState, wanted: np.ndarray, limits: Limits) -> Job:
         """Plan a path and play it.
 
         Raises
@@ -118,8 +114,8 @@ class PathRuns:
             If the driver refuses or stops the drive, or no samples arrive.
         """
         self._status.show("planning", f"{wanted.size} samples", name)
-        yield from self._until(lambda: self._applied().is_ready, "the model to be run over the applied voltages")
-        found: Plan = yield from self._in_thread(self._pool.submit(self.planned, wanted, limits))
+        yield from self._until(lambda: applied.is_ready, "the model to be run over the applied voltages")
+        found: Plan = yield from self._in_thread(self._pool.submit(self.planned, applied, wanted, limits))
         self.last = (name, found)
         if not found.reachability.is_whole:
             raise PathError(why_not(found))
@@ -158,7 +154,7 @@ class PathRuns:
             yield
         return tracking
 
-    def rounds(self, name: str, first: Plan, limits: Limits) -> Job:
+    def rounds(self, name: str, applied: AppliedState, first: Plan, limits: Limits) -> Job:
         """Play the last trajectory again, corrected by the measurement; no other program drives the stage meanwhile.
 
         Raises
@@ -169,13 +165,12 @@ class PathRuns:
         self._driver.claim()
         try:
             yield from self._until(lambda: bool(self._driver.holder), "the claim on the stage")
-            yield from self._learn(name, first, limits)
+            yield from self._learn(name, applied, first, limits)
         finally:
             self._driver.release()
 
-    def _learn(self, name: str, first: Plan, limits: Limits) -> Job:
-        yield from self._until(lambda: self._applied().is_ready, "the model to be run over the applied voltages")
-        applied = self._applied()
+    def _learn(self, name: str, applied: AppliedState, first: Plan, limits: Limits) -> Job:
+        yield from self._until(lambda: applied.is_ready, "the model to be run over the applied voltages")
         learning = IterativeLearning(
             applied.model,
             first,
@@ -184,7 +179,7 @@ class PathRuns:
             approximate=self._values["approximate"],
         )
         # the stage is no longer where the first plan began
-        again: Plan = yield from self._in_thread(self._pool.submit(self.planned, first.wanted, limits))
+        again: Plan = yield from self._in_thread(self._pool.submit(self.planned, applied, first.wanted, limits))
         learning.next = again if again.reachability.is_whole else None
         for number in range(1 + self._values["learning_rounds"]):
             if learning.next is None:

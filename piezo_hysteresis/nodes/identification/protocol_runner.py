@@ -20,6 +20,7 @@ import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from ...errors import PiezoError, RecordingError, StageError
 from ...identification.protocol.drive_limits import DriveLimits
@@ -27,6 +28,9 @@ from ...identification.protocol.protocol import Protocol, ProtocolPhase
 from ..runtime.guarded_node import GuardedNode
 from .bag_recorder import BagRecorder
 from .driver_client import DriverClient
+
+T = TypeVar("T")
+"""Type of the value that a wait returns."""
 
 PATIENCE = 30.0
 """Longest wait for the driver, for an answer, and for samples [s]."""
@@ -114,11 +118,10 @@ def run_protocols(node: GuardedNode, driver: DriverClient, following: Following,
     IdentificationError
         If a protocol does not fit the limits.
     """
-    yield from _until(lambda: driver.limits is not None, lambda: driver.missing)
-    assert driver.limits is not None
+    limits = yield from _until(lambda: driver.limits, lambda: driver.missing)
     if driver.stopped:
         raise StageError(driver.stopped)
-    protocol = yield from following(driver.limits)
+    protocol = yield from following(limits)
     if protocol is None:
         return
     recorder = BagRecorder(node, path)
@@ -184,12 +187,14 @@ def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol,
     yield from _until(lambda: recorder.holds(end), lambda: "the last samples")
 
 
-def _until(condition: Callable[[], bool], missing: Callable[[], str]) -> Generator[Progress]:
+def _until(wanted: Callable[[], T | None], missing: Callable[[], str]) -> Generator[Progress, None, T]:
+    """Wait until `wanted` returns something true, and return that."""
     deadline = time.monotonic() + PATIENCE
-    while not condition():
+    while not (found := wanted()):
         if time.monotonic() > deadline:
             raise StageError(f"waited {PATIENCE:g} s, but did not find {missing()}")
         yield Progress("waiting", f"for {missing()}")
+    return found
 
 
 def _require_claim(driver: DriverClient) -> None:

@@ -31,6 +31,7 @@ from std_srvs.srv import Trigger
 from ...acquisition.sample_block import SampleBlock
 from ...errors import PiezoError
 from ...model.model import Model
+from ...model.model_parameters import model_hash
 from ...online.change.baseline import Baseline
 from ...online.change.score import GROUPS, UNITS
 from ...online.change.watch import ChangeWatch, baseline_path
@@ -120,8 +121,8 @@ class ChangeReporter:
         except PiezoError as error:
             self._report_problem(f"the change watch has stopped: {error}")
             return
-        if completed:
-            self._save()
+        if completed is not None:
+            self._save(completed)
         if self.watch.alarms > self._alarms:
             self._alarms = self.watch.alarms
             self._publish()
@@ -144,7 +145,7 @@ class ChangeReporter:
         if self._adopted is not None and self._adopted[0] is model:
             self.watch, self._alarms = ChangeWatch(self.interval, self._adopted[1]), 0
             return
-        path = baseline_path(self.folder, model)
+        path = baseline_path(self.folder, model_hash(model))
         baseline = None
         try:
             baseline = Baseline.load(path) if path.is_file() else None
@@ -152,13 +153,11 @@ class ChangeReporter:
             self._report_problem(str(error))
         self.watch, self._alarms = ChangeWatch(self.interval, baseline), 0
 
-    def _save(self) -> None:
-        assert self.watch.baseline is not None
-        assert self._model is not None
-        path = baseline_path(self.folder, self._model)
+    def _save(self, baseline: Baseline) -> None:
+        path = baseline_path(self.folder, baseline.model)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            self.watch.baseline.save(path)
+            baseline.save(path)
         except OSError as error:
             self._report_problem(
                 f"{path}: the baseline cannot be written ({error.strerror}); it holds until the node ends"

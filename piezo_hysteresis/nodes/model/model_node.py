@@ -75,7 +75,7 @@ class ModelNode(GuardedNode):
         self._topics = ModelTopics(self)
         self._changes = ChangeReporter(self, self._values)
         self._diagnostics = ModelDiagnostics(self, ResidualAlarm(self._values), self._changes)
-        self._recalibrator = Recalibrator(self, self._changes, self._recalibrated)
+        self._recalibrator = Recalibrator(self, self._changes, self._follow)
         if self._values["model_file"]:
             self._load(self._values["model_file"])
         self.add_on_set_parameters_callback(self._check)
@@ -105,7 +105,7 @@ class ModelNode(GuardedNode):
         self._diagnostics.saw(block, now(self))
         if answer.model is not None and answer.prediction.size:
             counted = block.after(answer.first)
-            self._topics.publish(counted, answer, predictor)
+            self._topics.publish(counted, answer, answer.model, predictor)
             self._changes.add(counted, answer, predictor)
             self._recalibrator.add(counted, answer, predictor)
 
@@ -142,12 +142,6 @@ class ModelNode(GuardedNode):
             return False
         return predictor.is_swapping or predictor.model is self._model
 
-    def _recalibrated(self, model: Model, offset: float | None) -> None:
-        assert self._predictor is not None
-        self._predictor.swap(model, offset)
-        self._model = model
-        self._diagnostics.model(model)
-
     def end(self) -> None:
         """End a running fit."""
         self._recalibrator.end()
@@ -158,9 +152,9 @@ class ModelNode(GuardedNode):
         except PiezoError as error:
             self._diagnostics.refused(f"model_file: {error}")
 
-    def _follow(self, model: Model) -> None:
+    def _follow(self, model: Model, offset: float | None = None) -> None:
         if self._predictor is not None:
-            self._predictor.swap(model)
+            self._predictor.swap(model, offset)
         self._model = model
         self._diagnostics.model(model)
 

@@ -50,11 +50,10 @@ class ModelTopics:
         self._rms = advertise(node, "residual_rms")
         self._live = advertise(node, "predicted_live")
 
-    def publish(self, block: SampleBlock, answer: Prediction, predictor: Predictor) -> None:
-        """Publish prediction and residual of a block, all of whose samples are new."""
-        assert answer.model is not None
-        if self._named is None or self._named[0] is not answer.model:
-            self._named = (answer.model, hash_number(answer.model))
+    def publish(self, block: SampleBlock, answer: Prediction, model: Model, predictor: Predictor) -> None:
+        """Publish prediction and residual of a block, all of whose samples are new; `model` computed them."""
+        if self._named is None or self._named[0] is not model:
+            self._named = (model, hash_number(model))
         message = self._writer.write(
             block, answer.prediction, answer.residual, self._named[1], valid=not answer.warming_up
         )

@@ -171,16 +171,17 @@ class Recalibrator:
             raise IdentificationError("the baseline was removed meanwhile; nothing was changed")
         is_new = model_hash(model) != model_hash(fit.model)
         folder, problem = self._changes.folder, ""
+        baseline = baseline.of_model(model_hash(model))
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            baseline.of_model(model_hash(model)).save(baseline_path(folder, model))
+            baseline.save(baseline_path(folder, baseline.model))
             if is_new:
                 save(model, folder / f"recalibrated_{model_hash(model).partition(':')[2]}.yaml")
             if self._history is not None:
                 self._history.add(outcome.numbers)
         except (OSError, PiezoError) as error:
             problem = f"; not kept: {error}"
-        self._changes.adopt(model, baseline.of_model(model_hash(model)))
+        self._changes.adopt(model, baseline)
         self._swap(model, outcome.offset if fit.predictor.offset == fit.offset else None)
         if is_new:
             send(self._models, String(data=dumps(model)))

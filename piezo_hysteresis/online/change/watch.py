@@ -71,6 +71,7 @@ class ChangeWatch:
         self.groups: tuple[str, ...] = ()
         self._strongest = 0.0
         self._model: Model | None = None
+        self._hash = ""
         self._scores: Scores | None = None
         self._detector: ChangeDetector | None = None
         self._wanted = 0
@@ -89,7 +90,7 @@ class ChangeWatch:
         """Discard all scores, because the sensor offset was measured again or samples were lost."""
         self._scores = None
 
-    def add(self, voltage: Array, answer: Prediction, predictor: Predictor, stamp: int) -> bool:
+    def add(self, voltage: Array, answer: Prediction, predictor: Predictor, stamp: int) -> Baseline | None:
         """Compare one block of the stream with the baseline, or add it to the baseline that is being taken.
 
         Parameters
@@ -105,19 +106,19 @@ class ChangeWatch:
 
         Returns
         -------
-        bool
-            True if this block completed a baseline.
+        Baseline or None
+            Baseline that this block completed, if any.
         """
         is_idle = self.baseline is None and not self.is_taking
         if is_idle or answer.model is None or answer.warming_up or answer.residual.size == 0:
             self.restart()
-            return False
+            return None
         if self._scores is None or answer.model is not self._model:
             self._follow(answer.model, predictor, float(voltage[-1]))
-            return False
-        completed = False
+            return None
+        completed = None
         for score in self._scores.add(voltage, answer.residual, stamp):
-            completed |= self._score(score)
+            completed = self._score(score) or completed
         return completed
 
     def _follow(self, model: Model, predictor: Predictor, voltage: float) -> None:
@@ -126,27 +127,26 @@ class ChangeWatch:
             return
         if self._model is not None and model is not self._model:
             self.since, self._wanted = 0, 0
-        self._model = model
+        self._model, self._hash = model, model_hash(model)
         loop = loop_heights(model)
         self._scores = Scores(chain, state, loop, chain.rest_tangent(voltage, loop, state.time))
         self._watch(self.baseline, same_offset=False)
 
     def _watch(self, baseline: Baseline | None, *, same_offset: bool) -> None:
         self.change, self._detector = Change(), None
-        if baseline is not None and self._model is not None and baseline.model == model_hash(self._model):
+        if baseline is not None and baseline.model == self._hash:
             self._detector = ChangeDetector(baseline, self._interval, same_offset=same_offset)
 
-    def _score(self, score: ChangeScore) -> bool:
+    def _score(self, score: ChangeScore) -> Baseline | None:
         if self._wanted:
             self._taken.append(score)
             if len(self._taken) < self._wanted:
-                return False
-            assert self._model is not None
+                return None
             taken, self._wanted, self._taken = self._taken, 0, []
-            self.baseline = Baseline.of(taken, model_hash(self._model))
+            self.baseline = Baseline.of(taken, self._hash)
             self.since = 0
             self._watch(self.baseline, same_offset=True)
-            return True
+            return self.baseline
         if self._detector is not None:
             self.change = self._detector.add(score)
             if self.change.statistic > 1.0 and not self.since:
@@ -156,9 +156,9 @@ class ChangeWatch:
                 self.since = 0
             if self.since and self.change.statistic > self._strongest:
                 self._strongest, self.groups = self.change.statistic, self.change.groups
-        return False
+        return None
 
 
-def baseline_path(folder: Path, model: Model) -> Path:
-    """Path of the file in a folder that holds the baseline of a model."""
-    return folder / f"baseline_{model_hash(model).partition(':')[2]}.npz"
+def baseline_path(folder: Path, model: str) -> Path:
+    """Path of the file in a folder that contains the baseline of a model, given by its hash."""
+    return folder / f"baseline_{model.partition(':')[2]}.npz"

@@ -88,8 +88,7 @@ class PageServer:
     @property
     def port(self) -> int:
         """Port of the server."""
-        assert self._server is not None
-        return int(self._server.port or 0)
+        return self._port
 
     @property
     def url(self) -> str:
@@ -130,7 +129,7 @@ class PageServer:
         family = socket.AF_INET6 if ":" in self._address else socket.AF_INET
         listening = socket.create_server((self._address, self._port), family=family)
         listening.setblocking(False)
-        port = listening.getsockname()[1]
+        port = self._port = int(listening.getsockname()[1])
         try:
             tornado = BoundedTornado(
                 {"/": self._application},

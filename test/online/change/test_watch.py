@@ -21,6 +21,7 @@ from scipy.signal import lfilter
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.model_parameters import model_hash
 from piezo_hysteresis.online.change.baseline import Baseline, drive_class
 from piezo_hysteresis.online.change.detector import ChangeDetector
 from piezo_hysteresis.online.change.false_alarm_threshold import (
@@ -165,7 +166,7 @@ def test_at_constant_voltage_only_the_offset_is_watched():
 
 def test_a_baseline_outlives_the_process_and_belongs_to_its_model(drive, tmp_path):
     watch, _ = follow(drive, run(MODEL, drive))
-    path = baseline_path(tmp_path, MODEL)
+    path = baseline_path(tmp_path, model_hash(MODEL))
     watch.baseline.save(path)
     loaded = Baseline.load(path)
     displacement, _ = with_change(drive, "gain")
