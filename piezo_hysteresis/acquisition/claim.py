@@ -25,7 +25,7 @@ _OWNER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 
 
 class Claim:
-    """Held by at most one owner at a time, who has to renew it. Times are in s on the steady clock.
+    """A claim on a stage. At most one owner holds it and must renew it. Times are in s on the steady clock.
 
     Parameters
     ----------
@@ -35,9 +35,9 @@ class Claim:
     Attributes
     ----------
     timeout : float
-        As above; it may be changed.
+        The same time; it may be changed.
     owner : str
-        Owner of the claim; empty where the stage is not claimed.
+        Owner of the claim; empty if the stage is not claimed.
     """
 
     def __init__(self, timeout: float) -> None:
@@ -61,14 +61,14 @@ class Claim:
         return is_new
 
     def renew(self, owner: str, now: float) -> bool:
-        """Renew the claim. Returns False where it has ended, so that an owner that was suspended finds out."""
+        """Renew the claim; returns False if it has ended, for example because the owner was suspended."""
         if not owner or owner != self.owner:
             return False
         self._heard = now
         return True
 
     def release(self, owner: str) -> bool:
-        """Release the claim; returns False where this owner does not hold it."""
+        """Release the claim; returns False if this owner does not hold it."""
         if not owner or owner != self.owner:
             return False
         self.owner = ""
@@ -79,7 +79,7 @@ class Claim:
         return bool(self.owner) and now - self._heard > self.timeout
 
     def require(self, owner: str, what: str) -> None:
-        """Refuse requests of others while the stage is claimed. An empty `owner` is a sender without a claim.
+        """Refuse the request `what` of a sender who does not hold the claim. An empty `owner` claims nothing.
 
         Raises
         ------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`CommandCheck`: checks a command, which is then either played completely or refused completely. No ROS."""
+"""`CommandCheck`: checks a command, which is either played completely or refused completely. No ROS."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class CommandCheck:
     Parameters
     ----------
     limits : Description
-        Of the stage, narrowed to the limits of the driver.
+        Description of the stage, with the limits of the driver.
     sample_period : float
         Time between samples [s].
     max_age : float
-        Largest age of a command that is played, and largest time by which it may lie in the future [s].
+        Largest age of a command that is played, and largest time by which its stamp may be in the future [s].
     """
 
     limits: Description
@@ -42,7 +42,7 @@ class CommandCheck:
     max_age: float
 
     def waveform(self, voltage: Samples, stamp: int, now: int) -> Samples:
-        """The checked waveform of a command [V], shape (n,). `first_step` checks its first step.
+        """Check the waveform of a command without its first step, which `first_step` checks.
 
         Parameters
         ----------
@@ -53,10 +53,15 @@ class CommandCheck:
         now : int
             Time on the driver's clock [ns].
 
+        Returns
+        -------
+        (n,) ndarray of float64
+            The waveform [V].
+
         Raises
         ------
         StageError
-            With the reason for the refusal.
+            If the command is refused; the message states the reason.
         """
         self._require_drivable()
         age = (now - stamp) / 1e9
@@ -66,11 +71,11 @@ class CommandCheck:
         return self.limits.check_voltage(voltage, float(voltage[0]), self.sample_period)
 
     def first_step(self, waveform: Samples, present_voltage: float) -> None:
-        """Raise StageError where a waveform begins too far from the present voltage [V]."""
+        """Raise StageError if a waveform begins too far from the present voltage [V]."""
         self.limits.check_voltage(waveform[:1], present_voltage, self.sample_period)
 
     def set_point(self, voltage: float) -> float:
-        """A voltage to ramp to [V]; raises StageError where it is outside the limits or not finite."""
+        """Check a voltage to ramp to [V], and return it; StageError if it is outside the limits or not finite."""
         self._require_drivable()
         low, high = self.limits.voltage_min, self.limits.voltage_max
         if not (math.isfinite(voltage) and low <= voltage <= high):

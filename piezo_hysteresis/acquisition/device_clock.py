@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`DeviceClock`: adjusts the time base to the clock of a device that paces its samples itself. No ROS."""
+"""`DeviceClock`: adjusts the time base to the clock of a device that has its own sample clock. No ROS."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ import math
 from .time_base import TimeBase
 
 _WINDOW = 100
-"""Number of blocks from which the least delayed one is taken to compare the clocks."""
+"""Number of blocks; the one with the smallest delay is used to compare the clocks."""
 
 
 class DeviceClock:
     """Estimates the clock of a device from the arrival times of its blocks.
 
-    Two quartz clocks drift apart by about 50 µs per second. A block arrives after its last sample was taken, with a
-    varying delay. Among many blocks, the least delayed one shows the difference of the clocks.
+    The difference of two quartz clocks changes by up to about 50 µs per second. A block arrives with a varying delay
+    after its last sample. The smallest delay among many blocks gives the difference of the clocks.
 
     Parameters
     ----------
     time_base : TimeBase
-        It is shifted when the clocks differ by more than its tolerance.
+        The time base to adjust; it is shifted when the clocks differ by more than its tolerance.
     """
 
     def __init__(self, time_base: TimeBase) -> None:
@@ -46,14 +46,14 @@ class DeviceClock:
         Returns
         -------
         float
-            Shift of the time base to later times [s]; 0 where no shift was needed.
+            Shift of the time base to later times [s]; 0 if no shift was needed.
         """
         late = now - self._time_base.due(end)
         self._least, self._blocks = min(self._least, late), self._blocks + 1
         if late >= -self._time_base.tolerance and self._blocks < _WINDOW:
             return 0.0
-        parted = self._least
+        difference = self._least
         self._least, self._blocks = math.inf, 0
-        if abs(parted) <= self._time_base.tolerance:
+        if abs(difference) <= self._time_base.tolerance:
             return 0.0
-        return self._time_base.postpone(end, self._time_base.due(end) + parted)
+        return self._time_base.postpone(end, self._time_base.due(end) + difference)

@@ -32,13 +32,13 @@ class Phase:
     Parameters
     ----------
     number : int
-        Counts up from 0 while the driver is active.
+        Running number, from 0 when the driver becomes active.
     name : str
         Phase name.
     commanded : bool
-        True where the phase belongs to a commanded waveform.
+        True if the phase is a commanded waveform.
     stamp : int
-        Stamp of that command [ns].
+        Stamp of that command [ns]; 0 without a command.
     """
 
     number: int
@@ -78,7 +78,7 @@ class Drive:
     phase : (n,) ndarray of uint32
         Number of the phase of every sample.
     events : tuple of Event
-        In order.
+        Events in the order of their offsets.
     """
 
     voltage: Samples

@@ -29,7 +29,7 @@ class LatencyBuffer:
     Parameters
     ----------
     latency : int
-        Samples between a voltage and the measurement of its effect.
+        Number of samples between a voltage and the measurement of its effect.
     phase : int
         Number of the phase of the samples that are returned first.
     """
@@ -41,14 +41,14 @@ class LatencyBuffer:
         self._rested = 0
 
     def has_settled(self, at_rest: bool, count: int) -> bool:
-        """Whether all that came before the drive was at rest has been returned.
+        """Whether the labels of all samples before the rest of the drive have been returned.
 
         Parameters
         ----------
         at_rest : bool
             Whether the drive was at rest for the whole of the last block.
         count : int
-            Samples of that block.
+            Number of samples of that block.
         """
         self._rested = self._rested + count if at_rest else 0
         return self._rested >= self._latency and not self._events
@@ -63,7 +63,7 @@ class LatencyBuffer:
         Returns
         -------
         Drive
-            As many samples as were given. Phases and events are delayed; the voltage is that of the given drive.
+            Drive with the same number of samples and the same voltage; phases and events are delayed.
         """
         if not self._latency:
             return drive

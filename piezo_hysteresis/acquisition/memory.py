@@ -34,8 +34,8 @@ class MemoryAcquisition(StreamingAcquisition):
     The index follows the clock, so that it jumps over the time in which nothing was measured; such a block is marked by
     `SampleBlock.follows_gap`.
 
-    A block that was given to the device is played to its end, and only a stop breaks it off. A set-point that arrives
-    meanwhile is approached from the voltage at the end of the block; a waveform is refused.
+    The device plays a block to its end unless it is stopped. A ramp to a set-point that arrives meanwhile begins at the
+    end of the block; a waveform that arrives meanwhile is refused.
 
     Parameters
     ----------
@@ -138,13 +138,13 @@ class MemoryAcquisition(StreamingAcquisition):
             self._pass_on(first, drive, acquired)
 
     def _continue(self, playback: Playback) -> None:
-        """After a block: approach the set-point that arrived meanwhile, if any."""
+        """After a block, begin the ramp to a set-point that arrived meanwhile, if any."""
         target, self._next_target, self._given = self._next_target, None, False
         if target is not None:
             playback.ramp_to(target)
 
     def _break_off(self, playback: Playback) -> None:
-        """Let the device go to its safe voltage by itself; the samples on the way are not read."""
+        """Let the device go to its safe voltage by itself; the samples of this ramp are not read."""
         self._go_safe()
         self._keeper.require()
         with self._access:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`record_phases`: plays waveforms to a stage in turn, and returns the samples of each as records. No ROS."""
+"""`record_phases`: plays waveforms to a stage one after the other, and returns their samples as records. No ROS."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from .session import DriverSession
 from .streaming import StreamingAcquisition
 
 SILENCE = 60.0
-"""Time without a sample, beyond the length of the waveform, after which the recording ends with an error [s]."""
+"""Time without a sample after which the recording fails [s]; twice the duration of the waveform is added."""
 
 
 def record_phases(
@@ -40,7 +40,7 @@ def record_phases(
     progress: Callable[[str], None] = lambda name: None,
     keep: Callable[[list[Record]], None] = lambda records: None,
 ) -> tuple[Record, ...]:
-    """Play phases and record them. Afterwards the stage is at its safe voltage.
+    """Play and record phases, and bring the stage to its safe voltage at the end, also after an error.
 
     Parameters
     ----------
@@ -51,13 +51,13 @@ def record_phases(
     progress : callable
         Called with the name of each phase before it is played.
     keep : callable
-        Called with the records of each phase when it is complete, also where a later phase fails.
+        Called with the records of each phase as soon as the phase is complete.
 
     Returns
     -------
     tuple of Record
-        One record per phase. Where samples were not measured (a device that reads out its memory) a phase gives several
-        records, and all but the first continue the state of the stage.
+        One record per phase, or several if samples in it were not measured (while a device reads out its memory). Every
+        record but the first continues the state of the stage.
 
     Raises
     ------

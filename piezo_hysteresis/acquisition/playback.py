@@ -25,11 +25,11 @@ from ..errors import StageError
 from .drive import Drive, Event, EventKind, Phase, Samples
 
 _ENDLESS = 1 << 62
-"""Number of samples that stands for an unlimited hold."""
+"""Number of samples of an unlimited hold."""
 
 
 class Playback:
-    """Present voltage and phase, and the samples that follow.
+    """Knows the present voltage and phase, and computes the samples that follow.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ class Playback:
 
     Notes
     -----
-    Phase 0 is ``idle``. A waveform begins the next phase. All that follows it (held voltage, set-points, the ramp to
-    the safe voltage) is a phase ``hold``. `CommandCheck` checks the waveforms.
+    Phase 0 is ``idle``. A waveform begins the next phase. The samples after a waveform (held voltage, set-points, the
+    ramp to the safe voltage) form a phase ``hold``. `CommandCheck` checks the waveforms before they are played.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Playback:
 
     @property
     def pending(self) -> int:
-        """Samples until the present waveform or ramp ends; 0 while a voltage is held."""
+        """Number of samples until the present waveform or ramp ends; 0 while a voltage is held."""
         if self._waveform is not None:
             return self._waveform.size - self._played
         return math.ceil(abs(self._target - self.voltage) / self._step - 1e-9)
@@ -93,7 +93,7 @@ class Playback:
         Raises
         ------
         StageError
-            While another waveform is played, or the stage is on its way to the safe voltage.
+            If another waveform is being played, or the stage is on its way to the safe voltage.
         """
         self.require_free(name)
         self._waveform, self._played = waveform, 0
@@ -124,7 +124,7 @@ class Playback:
         self._hold()
 
     def pass_unseen(self, count: int) -> None:
-        """Skip `count` samples of a held voltage that are not measured; they only count for the hold time-out."""
+        """Skip `count` samples of a held voltage that are not measured; they count for the hold time-out only."""
         self._held = min(self._held + count, self._hold_limit - 1)
 
     def preview(self, count: int) -> Drive:
@@ -151,7 +151,7 @@ class Playback:
         return Drive(voltage, phase, tuple(events))
 
     def _advance(self, count: int) -> Samples:
-        """Between one and `count` samples of the present waveform, ramp or hold, and the state after them."""
+        """Return one to `count` samples of the present waveform, ramp or hold, and advance the state."""
         if self._waveform is not None:
             part = self._waveform[self._played : self._played + count]
             self._played += part.size

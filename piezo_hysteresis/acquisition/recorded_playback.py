@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`RecordedPlayback`: the phases of a replayed experiment, which take the place of commanded phases. No ROS."""
+"""`RecordedPlayback`: labels samples with the phases of a replayed experiment instead of commanded phases. No ROS."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .drive import Drive, Event, EventKind, Phase
 
 
 class RecordedPlayback:
-    """The counterpart of `Playback` for a stage that replays records and cannot be driven.
+    """Used instead of `Playback` for a stage that replays records and cannot be driven.
 
     Parameters
     ----------
@@ -75,12 +75,12 @@ class RecordedPlayback:
         raise StageError(f"{name}: a recording is replayed and cannot be driven")
 
     def play(self, waveform: object, name: str, stamp: int = 0) -> Phase:
-        """Refused."""
+        """Raise StageError: a replayed stage accepts no command."""
         self.require_free(name)
         return self.phase
 
     def ramp_to(self, voltage: float) -> None:
-        """Refused."""
+        """Raise StageError: a replayed stage accepts no command."""
         self.require_free("set_voltage")
 
     def stop(self) -> Phase:

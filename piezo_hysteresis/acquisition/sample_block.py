@@ -28,7 +28,7 @@ from .drive import Event
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SampleBlock:
-    """Consecutive samples of a stage, as one message of `samples`.
+    """Consecutive samples of a stage: the content of one message of the topic `samples`.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ class SampleBlock:
     frame : str
         Frame in which the displacement is measured; in recordings of earlier versions the name of the stage.
     follows_gap : bool
-        True where the index jumps because samples were not measured (a device that reads out its memory); False where a
-        jump of the index means lost messages.
+        True if the samples missing before the block were never measured (a device reads out its memory). If it is
+        False, missing samples mean lost messages.
     """
 
     stamp: int
@@ -71,7 +71,7 @@ class SampleBlock:
         return {name: getattr(self, name) for name in ("time", "voltage", "displacement", "index", "phase")}
 
     def after(self, count: int) -> SampleBlock:
-        """The block without its first samples."""
+        """The block without its first `count` samples."""
         if count == 0:
             return self
         kept: dict[str, Any] = {name: values[count:] for name, values in self.columns.items()}
@@ -90,16 +90,16 @@ class SampleBlock:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Delivery:
-    """One block and what happened in it.
+    """One block and the events in it.
 
     Parameters
     ----------
     block : SampleBlock
         The samples.
     first : int
-        Number of the first sample, without the wrap at 2^32.
+        Index of the first sample, not wrapped at 2^32.
     events : tuple of Event
-        With offsets into the block.
+        Events; their offsets count from the first sample of the block.
     """
 
     block: SampleBlock
@@ -109,7 +109,18 @@ class Delivery:
 
 @dataclass(slots=True)
 class Tally:
-    """Counters and times [s] of an acquisition since its start."""
+    """Counters and times of an acquisition since its start.
+
+    Parameters
+    ----------
+    samples, blocks, never_measured : int
+        Numbers of delivered samples, of blocks, and of samples that were not measured.
+    latest : float
+        Largest delay of a block [s].
+    postponed, clock_jumps, clock_drift : float
+        Sums of the shifts of the time base [s]: after delays, after jumps of the node's clock, and to follow the clock
+        of a device.
+    """
 
     samples: int = 0
     blocks: int = 0

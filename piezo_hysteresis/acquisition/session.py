@@ -39,24 +39,24 @@ from .streaming import Source, StreamingAcquisition
 from .time_base import TimeBase
 
 _KEEPER_TIME = 10.0
-"""Longest wait for the keeper of a stage that this driver could not make safe, beside the ramps [s]."""
+"""Longest wait for the keeper of a stage that this driver could not make safe, in addition to two ramps [s]."""
 
 
 class DriverSession:
-    """Opens a stage and streams its samples between `start` and `make_safe`, which may be repeated until `close`.
+    """An opened stage. It streams samples between `start` and `make_safe`, which may be repeated until `close`.
 
     Parameters
     ----------
     settings : DriverSettings
-        Of the driver.
+        Settings of the driver.
     values : mapping
-        Of the rows of the back end, by name.
+        Values of the parameters of the back end, by name.
     place : str
-        Description of the topic and domain that no other driver may use.
+        Description of the topic and domain, which no other driver may use.
     read : callable, optional
         Function that reads the records of a recording from its path, for the stage `replay`.
     latch : StopLatch, optional
-        A latch that is kept beyond the session; by default the session makes its own.
+        A latch that exists longer than the session; by default the session creates its own.
 
     Raises
     ------
@@ -154,7 +154,7 @@ class DriverSession:
             self._lock.add(f"device {found.name}")
 
     def _kept(self) -> KeeperLink | None:
-        """The keeper of a device that allows a second connection."""
+        """The keeper of the device, if its back end has one and it is not switched off."""
         settings = self.settings
         if not (BACK_ENDS[settings.stage].has_keeper and settings.keeper_timeout):
             return None
@@ -170,7 +170,7 @@ class DriverSession:
         )
 
     def _longest_step(self) -> float:
-        """Time in which a stage that works goes to its safe voltage and answers every call [s]."""
+        """Time within which a working stage reaches its safe voltage and answers every call [s]."""
         once = self.settings.longest_ramp(self.limits) + self.limits.latency + self._values.get("timeout", 0.0)
         return 2.0 + 2.0 * (once + self.settings.block_size(self.stage.sample_period) * self.stage.sample_period)
 
@@ -180,17 +180,17 @@ class DriverSession:
         settings, safe = self.settings, self.limits.safe_voltage
         playback = Playback(stage.voltage, safe, self.sample_period, settings.ramp_rate, settings.hold_timeout)
         if abs(stage.voltage - safe) > settings.ramp_rate * self.sample_period:
-            playback.stop()  # a killed driver or another program has left the stage there
+            playback.stop()  # a killed driver or another program has left the stage at this voltage
         return playback
 
     def make_safe(self) -> None:
-        """Ramp to the safe voltage and end the stream; does nothing where there is no stream.
+        """Ramp to the safe voltage and end the stream; does nothing without a stream.
 
         Raises
         ------
         StageError
-            If the ramp was not finished in time. The stage was then asked to go there by itself. A call of the stage
-            that does not return leaves it to the keeper.
+            If the ramp was not finished in time; the stage has then been commanded to go there by itself. If a call of
+            the stage does not return, its keeper makes it safe.
         """
         if self._acquisition is None:
             return
@@ -201,7 +201,7 @@ class DriverSession:
                 self._keeper.abandon()
             raise StageError(
                 f"{self.limits.name}: a call of the stage does not return; its voltage is unknown, "
-                f"{'its keeper was told to make it safe' if self._keeper else 'and it has no keeper'}; end this "
+                f"{'its keeper was asked to make it safe' if self._keeper else 'and it has no keeper'}; end this "
                 "program, and switch the amplifier off by hand"
             )
         self._acquisition = None
@@ -217,7 +217,7 @@ class DriverSession:
         Raises
         ------
         StageError
-            If the stage did not get there. Its keeper has then tried it, too, and the message says with what result.
+            If the stage did not reach it. The message then also states whether its keeper has reached it.
         """
         try:
             self.make_safe()

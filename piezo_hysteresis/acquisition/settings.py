@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`DriverSettings`: the parameters of the driver as a table, and as one frozen value that has been checked."""
+"""`DriverSettings`: the parameters of the driver, as a table and as one frozen value."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _SOURCE = "driver"
 """Source of the parameters of the driver."""
 
 LARGEST_STEP = 0.4
-"""Largest change of the drive from one sample to the next, as a share of the voltage range, where `max_slew_rate` is 0.
+"""Largest change of the drive from one sample to the next if `max_slew_rate` is 0, as a share of the voltage range.
 
-It is four thirds of the steepest edge of the identification protocols (0.3 of the range in one sample).
+It is four thirds of the largest step of the identification protocols (0.3 of the range in one sample).
 """
 
 DRIVER: tuple[Row, ...] = (
@@ -118,7 +118,7 @@ class DriverSettings:
 
     @classmethod
     def from_values(cls, values: Mapping[str, Any]) -> DriverSettings:
-        """Pick the fields out of `values`."""
+        """The settings from a mapping of parameter names to values, which may contain others."""
         return cls(**{field.name: values[field.name] for field in fields(cls)})
 
     def limits(self, stage: Description, sample_period: float) -> Description:
@@ -134,7 +134,7 @@ class DriverSettings:
         Raises
         ------
         ParameterError
-            If the driver allows more than the stage.
+            If the limits of the driver exceed those of the stage, or exclude its safe voltage.
         """
         if stage.ignores_drive:
             return stage
@@ -166,5 +166,5 @@ class DriverSettings:
 
     def longest_ramp(self, limits: Description) -> float:
         """Duration of the longest ramp to the safe voltage [s]."""
-        longest_way = max(limits.voltage_max - limits.safe_voltage, limits.safe_voltage - limits.voltage_min)
-        return math.ceil(longest_way / self.ramp_rate / self.real_time_factor)
+        largest = max(limits.voltage_max - limits.safe_voltage, limits.safe_voltage - limits.voltage_min)
+        return math.ceil(largest / self.ramp_rate / self.real_time_factor)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`StageLock`: allows one driver per stage on a machine, and ends with its process. No ROS."""
+"""`StageLock`: allows one driver per stage on a computer; the lock ends with its process. No ROS."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from typing import TextIO
 from ..errors import StageError
 
 FOLDERS = (Path("/run/lock"), Path("/tmp"))
-"""Folders for locks; the first one in which every user may write is that of the machine."""
+"""Possible folders for locks; the first one in which every user may write is used."""
 
 
 class StageLock:
@@ -37,7 +37,7 @@ class StageLock:
     Parameters
     ----------
     holds : iterable of str
-        Descriptions of what is locked, for example ``"device E-727 0123"`` or ``"namespace /stage_x of domain 0"``.
+        Descriptions of what is locked, for example ``"device E-727 0123"`` or ``"/stage_x/samples of domain 0"``.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class StageLock:
                 raise
 
     def add(self, what: str) -> None:
-        """Add a lock; raises StageError where another process holds it."""
+        """Add a lock; raises StageError if another process holds it."""
         self._files.append(_lock(what))
 
     def release(self) -> None:
@@ -66,7 +66,7 @@ class StageLock:
 
 
 def _folder() -> Path:
-    """The same folder for every user and every environment: two drivers of one device must meet there."""
+    """Folder of the locks; it is the same for every user, so that two drivers of one device find the same lock."""
     for folder in FOLDERS:
         if folder.is_dir() and folder.stat().st_mode & stat.S_IWOTH:
             return folder
@@ -74,15 +74,18 @@ def _folder() -> Path:
 
 
 def _opened(path: Path) -> int:
-    """Descriptor of a file that every user may open. Linux lets nobody create it where it is another user's."""
+    """Descriptor of a file that every user may open; it is created if it does not exist.
+
+    The file is first opened without O_CREAT, because with it Linux refuses the file of another user in such folders.
+    """
     flags = os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW
     with suppress(FileNotFoundError):
         return os.open(path, flags)
     try:
         descriptor = os.open(path, flags | os.O_CREAT | os.O_EXCL, 0o666)
-    except FileExistsError:  # made by another driver at the same time
+    except FileExistsError:  # another driver created it at the same time
         return os.open(path, flags)
-    os.fchmod(descriptor, 0o666)  # whatever the umask is
+    os.fchmod(descriptor, 0o666)  # independent of the umask
     return descriptor
 
 

@@ -48,16 +48,15 @@ class StreamingAcquisition:
     playback : Playback or RecordedPlayback
         Source of the voltages.
     time_base : TimeBase
-        Pace and stamps.
+        Times and stamps of the samples.
     block_size : int
-        Samples per block.
+        Number of samples per block.
     node_clock : callable
         The clock of the stamps [ns].
     deliver : callable
         Function that takes every `Delivery`; called in the thread.
     fail : callable
-        Function that takes the PiezoError that ended the thread. The stage has then gone to its safe voltage if it
-        could.
+        Called with the PiezoError that ended the thread, after the attempt to bring the stage to its safe voltage.
     ready : callable, optional
         The first block waits until this function returns True.
     latch : StopLatch, optional
@@ -107,9 +106,16 @@ class StreamingAcquisition:
         check: Callable[[Samples, float], None],
         accepted: Callable[[Phase, int], None],
     ) -> Phase:
-        """Play a waveform next if `check` accepts it at the voltage of that moment; see `Playback.play`.
+        """Play a waveform [V] next; see `Playback.play`. StageError if it is refused.
 
-        `accepted` is called with the phase and the number of samples before the first one is applied.
+        Parameters
+        ----------
+        waveform, name, stamp
+            As for `Playback.play`.
+        check : callable
+            Called with the waveform and the present voltage [V]; it raises StageError to refuse the waveform.
+        accepted : callable
+            Called with the phase and the number of samples before the first sample is applied.
         """
         with self._access:
             self._latch.require_released(name)
@@ -120,7 +126,7 @@ class StreamingAcquisition:
             return phase
 
     def _require_free(self, name: str) -> None:
-        """Raise StageError where the waveform `name` cannot be played next."""
+        """Raise StageError if the waveform `name` cannot be played next."""
         self.playback.require_free(name)
 
     def ramp_to(self, voltage: float) -> None:
@@ -130,7 +136,7 @@ class StreamingAcquisition:
             self.playback.ramp_to(voltage)
 
     def stop(self) -> tuple[Phase, bool]:
-        """As `cancel`, and forbid all motion until the latch is released."""
+        """Forbid all motion until the latch is released, and end the present phase as `cancel` does."""
         self._latch.set()
         return self.cancel()
 
@@ -146,8 +152,8 @@ class StreamingAcquisition:
         Returns
         -------
         bool
-            False where the stage was not at the safe voltage within `timeout` [s]. True also where the thread had
-            failed before, because it has then made the stage safe or reported that it could not.
+            False if the stage was not at the safe voltage within `timeout` [s]. True also if the thread had failed
+            before: it has then made the stage safe or reported that it could not.
         """
         if not self.is_running:
             return True
@@ -179,7 +185,7 @@ class StreamingAcquisition:
                 is_safe = self.playback.is_safe
                 if self._late.has_settled(was_safe and is_safe, self.index - begin) and is_safe:
                     self._safe.set()
-            if not self._safe.is_set():  # nobody waits any longer, because a call of the stage took too long
+            if not self._safe.is_set():  # `make_safe` has given up, because a call of the stage took too long
                 self._go_safe()
         except Exception as error:  # after any exception the stage must not keep its voltage
             self._fail(self._abandon(error))
@@ -188,7 +194,7 @@ class StreamingAcquisition:
             self._keeper.end_step()
 
     def _go_safe(self) -> None:
-        """Send the stage to its safe voltage, unless it was left to its keeper; one that acts finishes first."""
+        """Bring the stage to its safe voltage after a keeper that acts has ended, unless the keeper has the stage."""
         self._keeper.let_finish()
         if not self._keeper.has_stage:
             self.stage.safe()
@@ -211,7 +217,7 @@ class StreamingAcquisition:
         self._pass_on(self.index, self._late.follow(drive), acquired)
 
     def _keep_pace(self) -> bool:
-        """Wait until the next block is due; returns False where the thread has to end before."""
+        """Wait until the next block is due; returns False if the thread has to end before."""
         due = self._time_base.due(self.index + self.block_size)
         if not self._wait_until(due):
             return False
@@ -222,7 +228,7 @@ class StreamingAcquisition:
         return True
 
     def _follow(self, clock: DeviceClock) -> None:
-        """Follow the clock of a device that paces its blocks itself."""
+        """Adjust the time base to the clock of the device."""
         end, now = self.index + self.block_size, time.monotonic()
         if self.index == 0:  # the time for opening the stream is unknown
             self._time_base.postpone(end, now)
@@ -230,7 +236,7 @@ class StreamingAcquisition:
         self.tally.clock_drift += clock.follow(end, now)
 
     def _wait_until(self, steady: float) -> bool:
-        """Wait until a time; returns False where the thread has to end before."""
+        """Wait until a time on the steady clock [s]; returns False if the thread has to end before."""
         self._keeper.begin_step()
         return not self._halting.wait(max(steady - time.monotonic(), 0.0))
 

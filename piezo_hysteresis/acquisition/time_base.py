@@ -31,7 +31,7 @@ def read_together(node_clock: Callable[[], int]) -> tuple[float, int]:
     """Simultaneous readings of the steady clock [s] and of the node's clock [ns].
 
     A busy computer may interrupt the program between the two readings, which would look like a jump of the node's
-    clock. Of several attempts the closest pair is therefore used.
+    clock. Therefore the clocks are read several times, and the two readings with the shortest time between are used.
     """
     apart, steady, node = float("inf"), 0.0, 0
     for _ in range(_ATTEMPTS):
@@ -44,23 +44,23 @@ def read_together(node_clock: Callable[[], int]) -> tuple[float, int]:
 
 
 class TimeBase:
-    """The sample clock of a driver, counted on the steady clock and stamped on the node's clock.
+    """The sample clock of a driver: it gives the time of every sample on the steady clock and on the node's clock.
 
     Parameters
     ----------
     sample_period : float
         Time between samples [s].
     rate : float
-        Seconds of the stage per second of the steady clock; 1 for every real stage.
+        Simulated seconds per second of the steady clock; 1 for every real stage.
 
     Notes
     -----
-    A stamp is anchor + (index − anchor index)·T_s, which is free of the jitter of the computer. A jump of the node's
-    clock is found by comparing the two clocks; a block that is published late does not change the stamps.
+    A stamp is anchor + (index − anchor index)·T_s, with the sample period T_s, so that delays of the computer do not
+    influence it. A jump of the node's clock is detected by comparing the two clocks.
     """
 
     tolerance = 1e-3
-    """Difference between the node's clock and the stamps from which the anchor is renewed [s]."""
+    """If the difference between the node's clock and the stamps exceeds this time [s], the anchor is renewed."""
 
     def __init__(self, sample_period: float, rate: float = 1.0) -> None:
         self.sample_period = sample_period
@@ -81,7 +81,7 @@ class TimeBase:
         return self._index + -int((self._steady - steady) // self._real_period)
 
     def stamp(self, index: int) -> int:
-        """Stamp of a sample [ns]. It is not below zero, also where a simulated clock has just begun."""
+        """Stamp of a sample [ns]; at least 0, also shortly after the start of a simulated clock."""
         return max(0, self._stamp_at(index))
 
     def follow(self, index: int, steady: float, node: int) -> float:
@@ -90,7 +90,7 @@ class TimeBase:
         Returns
         -------
         float
-            Shift of the stamps [s]; 0 where the clock has not jumped.
+            Shift of the stamps [s]; 0 if the clock has not jumped.
         """
         jump = node - round(steady * _NANO) - self._offset
         if abs(jump) <= self.tolerance * _NANO:
@@ -100,9 +100,9 @@ class TimeBase:
         return jump / _NANO
 
     def postpone(self, index: int, steady: float) -> float:
-        """Shift the time base so that sample `index` is due at `steady` [s], later or (fast device) earlier.
+        """Shift the time base to later or earlier times, so that sample `index` is due at `steady` [s].
 
-        In real time the stamps shift too. Where a simulated stage runs at another rate, they stay without a gap.
+        In real time the stamps are shifted as well. For a simulated stage at another rate they are not.
 
         Returns
         -------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Fault`: one way in which an emulated device or its stage misbehaves, and when."""
+"""`Fault`: a fault of an emulated device or of its stage, and when it occurs."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class Fault:
     occurrence : int
         Number of the occurrence of the command at which the fault occurs.
     value : float
-        Value for the kind: seconds, or an error number.
+        Number that belongs to some kinds: a time [s], an error number or a reading.
     lasts : bool
-        False where it occurs once, True where it lasts from then on.
+        False if the fault occurs once, True if it lasts from then on.
     """
 
     kind: str
@@ -54,12 +54,11 @@ class FaultCatalogue:
     Parameters
     ----------
     once : mapping of str to (str, str)
-        Faults that strike once: word -> (``COMMAND[:occurrence]`` they strike at unless stated otherwise, what
-        happens).
+        Faults that occur once: kind -> (``COMMAND[:occurrence]`` at which it occurs by default, what happens).
     lasting : mapping of str to str
-        Faults that last, from the start or from a command on: word -> what happens.
+        Faults that last, from the start or from a command on: kind -> what happens.
     values : mapping of str to float
-        Values where none is given.
+        Default value by kind.
     """
 
     once: Mapping[str, tuple[str, str]]
@@ -68,7 +67,7 @@ class FaultCatalogue:
 
     @property
     def meaning(self) -> dict[str, str]:
-        """What happens, by the word of the fault."""
+        """What happens, by kind of fault."""
         return {**{kind: what for kind, (_, what) in self.once.items()}, **self.lasting}
 
     def parse(self, text: str) -> Fault:
@@ -77,11 +76,11 @@ class FaultCatalogue:
         Raises
         ------
         StageError
-            If the text is not of that form.
+            If the text does not have this form, or the kind is unknown.
 
         Examples
         --------
-        >>> FaultCatalogue({"slow": ("POS?", "the answer comes late")}, {}).parse("slow@VOL?:2=0.5")
+        >>> FaultCatalogue({"slow": ("POS?", "the answer is late")}, {}).parse("slow@VOL?:2=0.5")
         Fault(kind='slow', command='VOL?', occurrence=2, value=0.5, lasts=False)
         """
         front, _, value = text.partition("=")
@@ -97,7 +96,7 @@ class FaultCatalogue:
 
 
 class Faults:
-    """Active faults: counts the commands and returns the fault that occurs at each.
+    """Counts the commands of a device, and returns the faults that occur.
 
     Parameters
     ----------
@@ -118,5 +117,5 @@ class Faults:
         return {f.kind: f.value for f in struck if not f.lasts}
 
     def lasts(self, kind: str) -> bool:
-        """True while a lasting fault is present."""
+        """Whether a lasting fault is present."""
         return kind in self._active

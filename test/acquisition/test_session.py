@@ -126,7 +126,7 @@ def test_a_call_that_does_not_return_is_left_to_the_keeper(kept, monkeypatch):
         monkeypatch.setattr(s.session.stage, "safe", lambda: (callers.append(threading.current_thread().name), safe()))
         monkeypatch.setattr(s.session, "_longest_step", lambda: 1.0)
         s.wait(hangs.is_set, "the call")
-        expected = "its keeper was told" if kept else "no keeper"
+        expected = "its keeper was asked" if kept else "no keeper"
         with pytest.raises(StageError, match=f"does not return; its voltage is unknown, .*{expected}"):
             s.session.close()
         assert callers == []

@@ -14,9 +14,9 @@
 
 """`keeper`: a process that brings a stage to its safe voltage when the heartbeats of its driver end. No ROS.
 
-It is started by the driver (`KeeperLink`), which sends on standard input, in one line of JSON, how to open the stage,
-and then sends a byte at regular intervals. The keeper opens the stage over its own connection, without moving it,
-answers ``ready``, and does nothing as long as bytes arrive.
+The driver starts it (`KeeperLink`). The driver sends a line of JSON on standard input, which states how to open the
+stage, and then a byte at regular intervals (the heartbeat). The keeper opens the stage over its own connection, without
+moving it, answers ``ready``, and does nothing while bytes arrive.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from ...stage.stage import Stage
 READY = "ready"
 """Answer of the keeper when it has opened the stage."""
 ACTING = "acting"
-"""Word of the keeper to a driver that may no longer use the stage."""
+"""Message of the keeper to a driver that may no longer use the stage."""
 GOODBYE = b"q"
 """Sent by a driver that has made its stage safe itself."""
 HANDOVER = b"h"
 """Sent by a driver that has released its stage and could not make it safe."""
 _HANDED_OVER = "the driver could not make the stage safe"
-"""Reason of a keeper that acts after a handover."""
+"""Reason why a keeper acts after a handover."""
 ATTEMPTS = 5
 """Number of attempts to bring the stage to its safe voltage."""
 _BETWEEN_ATTEMPTS = 0.2
@@ -54,8 +54,8 @@ _BETWEEN_ATTEMPTS = 0.2
 
 
 def main() -> int:
-    """Run the keeper of one stage. Returns 1 where the stage could not be brought to its safe voltage, otherwise 0."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver makes the stage safe, and says goodbye
+    """Run the keeper of one stage. Returns 1 if it could not open the stage or make it safe, otherwise 0."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver itself makes the stage safe and ends the keeper
     line = sys.stdin.readline()
     if not line:
         return 0  # the driver ended before it named the stage
@@ -73,7 +73,7 @@ def main() -> int:
     if not reason:
         os._exit(0)  # closing the stage would move it
     with suppress(BrokenPipeError):
-        print(ACTING, flush=True)  # noqa: T201  # a driver that goes on after a silence leaves the stage alone
+        print(ACTING, flush=True)  # noqa: T201  # a driver that continues after a silence must not use the stage
     sys.stderr.write(f"keeper: {reason}; bringing {stage.description.name} to its safe voltage\n")
     if order["ends_driver"] and reason != _HANDED_OVER:
         with suppress(ProcessLookupError):
@@ -88,7 +88,7 @@ def _opened(order: Mapping[str, Any]) -> Stage:
 
 
 def _listen(timeout: float) -> str:
-    """Reason why the heartbeats ended; empty where the driver ended them on purpose."""
+    """Wait for the end of the heartbeats, and return its reason; empty if the driver ended them on purpose."""
     heard, descriptor = b"", sys.stdin.fileno()
     while not heard.endswith(GOODBYE):
         ready, _, _ = select.select([descriptor], [], [], timeout)
@@ -103,7 +103,7 @@ def _listen(timeout: float) -> str:
 
 
 def _make_safe(stage: Stage, order: Mapping[str, Any]) -> int:
-    time.sleep(stage.description.latency)  # the samples in the buffer of a device are played first
+    time.sleep(stage.description.latency)  # the device first plays the samples in its buffer
     for _ in range(ATTEMPTS):
         try:
             if order["ends_driver"]:  # only the driver had used the device: read the present voltage first

@@ -34,13 +34,13 @@ from ...stage.description import Description
 from .keeper import GOODBYE, HANDOVER, READY
 
 _START = 30.0
-"""Longest time that a keeper takes to start and to open the stage [s]."""
+"""Longest wait for a keeper to start and to open the stage [s]."""
 _PER_TIMEOUT = 10
-"""Number of heartbeats within the time-out of the keeper."""
+"""Number of heartbeats per time-out of the keeper."""
 
 
 class NoKeeper:
-    """In place of a `KeeperLink` where a stage has no keeper."""
+    """Used instead of a `KeeperLink` for a stage without a keeper."""
 
     is_lost = has_stage = False
 
@@ -66,9 +66,9 @@ class KeeperLink:
     ramp_rate : float
         Rate of the ramp to the safe voltage [V/s].
     timeout : float
-        Silence of this process after which the keeper acts [s].
+        Time without a heartbeat after which the keeper acts [s].
     patience : float
-        Longest time that a step of the acquisition takes [s]; after it the heartbeats end.
+        Longest duration of a step of the acquisition [s]; after this time the heartbeats end.
 
     Raises
     ------
@@ -121,24 +121,24 @@ class KeeperLink:
 
     @property
     def is_lost(self) -> bool:
-        """True where the keeper acts or has ended, so that this driver may no longer drive the stage."""
+        """True if the keeper acts or has ended; this driver may then no longer drive the stage."""
         return self._is_lost or (not self._ended.is_set() and self._has_spoken())
 
     def _has_spoken(self) -> bool:
-        """Whether the keeper has said that it acts, or has ended."""
+        """Whether the keeper has sent a message (it acts) or has ended."""
         assert self._process.stdout is not None
         return bool(select.select([self._process.stdout], [], [], 0.0)[0])
 
     def begin_step(self) -> None:
-        """The acquisition goes on: send heartbeats for `patience` from now on, and no longer."""
+        """Begin a step of the acquisition: from now on, heartbeats are sent for `patience` and no longer."""
         self._until = time.monotonic() + self._patience
 
     def end_step(self) -> None:
-        """The acquisition has ended: send heartbeats without limit."""
+        """End the last step of the acquisition: heartbeats are sent without limit."""
         self._until = math.inf
 
     def require(self) -> None:
-        """Raise StageError where the keeper acts or has ended."""
+        """Raise StageError if the keeper acts or has ended."""
         if self.is_lost:
             raise StageError(
                 "the keeper of the stage has ended: this driver was silent for too long, or the keeper was killed; "
@@ -146,7 +146,7 @@ class KeeperLink:
             )
 
     def let_finish(self) -> None:
-        """Wait for the end of a keeper that acts: both would send commands otherwise."""
+        """Wait for the end of a keeper that acts, so that only one process sends commands."""
         if self.is_lost and not self.has_stage:
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(self._patience)
@@ -154,7 +154,7 @@ class KeeperLink:
     def close(self) -> None:
         """End the keeper, because the stage is safe; may be repeated."""
         if self._ended.is_set():
-            with suppress(subprocess.TimeoutExpired):  # one that was given the stage goes on
+            with suppress(subprocess.TimeoutExpired):  # a keeper that was given the stage continues
                 self._process.wait(1.0)
             return
         self._end(GOODBYE)
@@ -171,12 +171,12 @@ class KeeperLink:
         Parameters
         ----------
         timeout : float
-            Longest wait for the end of the keeper [s]; it goes on after that.
+            Longest wait for the end of the keeper [s]; the keeper continues after this time.
 
         Returns
         -------
         str
-            What became of the stage, as the end of a message.
+            Result, as the last part of a message.
         """
         if self._ended.is_set() or self.is_lost:
             return "its keeper had ended before"
@@ -190,7 +190,7 @@ class KeeperLink:
         return f"its keeper {'then brought it' if is_safe else 'could not bring it'} to its safe voltage"
 
     def abandon(self) -> None:
-        """Let the keeper act as if this driver had died, because its thread hangs in a call of the stage."""
+        """Let the keeper act as if this driver had died, because a call of the stage does not return."""
         if not self._ended.is_set():
             self.has_stage = self._is_lost = True
             self._end(b"")

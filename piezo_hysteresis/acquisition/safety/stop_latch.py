@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`StopLatch`: keeps the stage from moving after a stop until the user releases it. No ROS."""
+"""`StopLatch`: forbids motion of the stage after a stop until the user releases it. No ROS."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Calls`: the calls of NI's gRPC device server that clocked analogue output and input need, by their names there."""
+"""`Calls`: the calls of NI's gRPC device server that clocked analogue output and input need, under NI's names."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ANALOG_INPUT, _ANALOG_OUTPUT, _VOLTAGE = 10100, 10102, 10322
 _KIND_OF_CHANNEL = 0x187F
 """NI-DAQmx attribute: kind of a channel."""
 _GROUP_BY_CHANNEL = 0
-"""NI-DAQmx value: samples of one channel stand together."""
+"""NI-DAQmx value: the samples of one channel are consecutive in the array."""
 _FINITE, _WITHOUT_REGENERATION = 10178, 10158
 """NI-DAQmx values: finite sampling, and output without regeneration."""
 _REGENERATION, _SAMPLE_CLOCK_RATE = 0x1453, 0x1344
@@ -41,16 +41,32 @@ _VERSION = {0x1272: 26, 0x1923: 0, 0x2F22: 0}
 _NAME_OF_TASK, _CHANNELS_OF_TASK = 0x1276, 0x1273
 """NI-DAQmx attributes: name and channels of a task."""
 _TIMEOUT = (-200284, "Some or all of the samples requested have not yet been acquired.")
-"""Error of a read whose samples did not come in time."""
+"""Error number and text of a read whose samples were not available in time."""
 _NOT_DONE = (-200560, "Wait Until Done did not indicate that the task was done within the specified timeout.")
-"""Error of a wait for a task that did not end in time."""
+"""Error number and text of a wait for a task that did not end in time."""
 _NO_REGENERATION = (-200077, "Regeneration is not emulated; set out_stream.regen_mode to DONT_ALLOW_REGENERATION.")
-"""Error of a task that is set to regenerate."""
+"""Error number and text of a task that is set to regenerate."""
 
 
 @dataclass(slots=True)
 class Task:
-    """The configuration of a task."""
+    """The configuration of a task.
+
+    Parameters
+    ----------
+    kind : int
+        NI-DAQmx value of the kind of its channels; 0 for none.
+    channels : list of str
+        Names of its channels without the device.
+    rate : float
+        Rate of the sample clock [Hz]; 0 without a clock.
+    samples : int
+        Number of samples per channel of a finite task.
+    is_finite : bool
+        Whether the task ends after `samples`.
+    regenerates : bool
+        Whether old samples are repeated if the buffer is empty.
+    """
 
     kind: int = 0
     channels: list[str] = field(default_factory=list)
@@ -66,7 +82,7 @@ class Calls:
     Parameters
     ----------
     card : Card
-        Used by one thread at a time.
+        The emulated card; only one thread uses it at a time.
     """
 
     def __init__(self, card: Card) -> None:
@@ -77,24 +93,24 @@ class Calls:
         """Names of the calls."""
         return [name for name in dir(self) if name[0].isupper()]
 
-    def strike(self, name: str) -> dict[str, float]:
+    def count(self, name: str) -> dict[str, float]:
         """Count a call, and return the single faults that occur at it, with their values."""
         with self._turn:
             return self._card.faults.count(name)
 
     def underflow(self) -> None:
-        """End the run of the card; CardError."""
+        """Stop the card as if its output buffer were empty; always raises CardError."""
         with self._turn:
             self._card.underflow()
 
     def end(self) -> None:
-        """End all waits and tasks; the card stops at its present voltage."""
+        """End all waits and tasks; the card keeps its present voltage."""
         self._ended.set()
         with self._turn:
             self._card.stop()
 
     def sleep(self, seconds: float) -> None:
-        """Wait, until the server ends."""
+        """Wait for a time [s], or until the server ends."""
         self._ended.wait(seconds)
 
     def CreateTask(self, request: Any) -> dict[str, Any]:
@@ -213,7 +229,7 @@ class Calls:
         return {"value_raw": self._task(request).kind if request.attribute_raw == _KIND_OF_CHANNEL else _VOLTAGE}
 
     def _require_server(self) -> None:
-        """Refuse what a call in progress would leave in the output buffer behind an ended server; CardError."""
+        """Raise CardError if the server has ended, so that a call in progress puts nothing into the output buffer."""
         if self._ended.is_set():
             raise CardError(NOT_RUNNING, "The server has ended.")
 
@@ -233,7 +249,7 @@ class Calls:
         return {}
 
     def _wait(self, remaining: Callable[[], float], timeout: float, error: tuple[int, str]) -> None:
-        """Wait until `remaining` is 0 s, without blocking other calls."""
+        """Wait until `remaining` returns 0 s or less, without blocking other calls; CardError after `timeout` [s]."""
         due = time.monotonic() + timeout if timeout >= 0 else float("inf")
         while True:
             with self._turn:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Card`: an emulated multifunction card, its buffers on one clock, wired to a simulated stage."""
+"""`Card`: an emulated multifunction card that is wired to a simulated stage; output and inputs have the same clock."""
 
 from __future__ import annotations
 
@@ -31,40 +31,49 @@ UNDERFLOW, OUT_OF_RANGE, NOT_RUNNING = -200290, -200077, -200278
 """Error numbers of NI-DAQmx."""
 
 INPUTS = ("ai0", "ai1", "ai2", "_ao0_vs_aognd")
-"""Inputs, the last one inside the card: the output, read back."""
+"""Analogue inputs. The last one is an internal channel, which measures the output."""
 
 _TIMEBASE = 100e6
-"""Clock that sample clocks are divided from [Hz]."""
+"""Frequency of the clock from which the sample clock is divided [Hz]."""
 _LOOP_BACK_DELAY = 2
-"""Samples by which a wired loop back answers later."""
+"""Delay of a wired loop back from output to input [samples]."""
 
 
 class CardError(Exception):
-    """Ends a call with an error number of NI-DAQmx."""
+    """Ends a call with an error of NI-DAQmx.
 
-    def __init__(self, number: int, words: str) -> None:
-        super().__init__(words)
+    Parameters
+    ----------
+    number : int
+        Error number.
+    text : str
+        Text of the error.
+    """
+
+    def __init__(self, number: int, text: str) -> None:
+        super().__init__(text)
         self.number = number
 
 
 class Card:
     """Output ``ao0`` drives the stage; ``ai0`` is its sensor, ``ai1`` the amplifier's monitor, ``ai2`` the output.
 
-    The output can be read back inside the card, too, unless it is a card that cannot.
+    The internal channel ``_ao0_vs_aognd`` measures the output, if `reads_back` is set.
 
     Parameters
     ----------
     stage : SimulatedStage
-        What is wired to the card.
+        The stage that is wired to the card.
     sensor_gain : float
-        Displacement over sensor voltage [m/V].
+        Displacement divided by sensor voltage [m/V].
     monitor_gain : float
-        Monitor voltage over piezo voltage [V/V].
+        Monitor voltage divided by piezo voltage [V/V].
     speed : float
-        Seconds of the card per second; infinite to play what is in the output buffer as soon as it is asked for.
+        Simulated seconds per second of the computer; infinite to play the whole output buffer at the next call.
     reads_back : bool
-        False for a card that cannot read its output back.
+        Whether the card can measure its own output.
     faults : iterable of Fault
+        Faults that occur.
     """
 
     def __init__(
@@ -94,7 +103,7 @@ class Card:
 
     @property
     def available(self) -> int:
-        """Number of samples of every input that can be read."""
+        """Number of samples of every input that can be read now."""
         self._advance()
         return int(self._acquired.shape[1])
 
@@ -105,24 +114,24 @@ class Card:
         return self._buffer.size * self._stage.sample_period / self._speed if self.is_running else 0.0
 
     def coerced(self, rate: float) -> float:
-        """The rate that the clock sets for a requested rate [Hz]."""
+        """The nearest possible rate of the sample clock for a requested rate [Hz]."""
         possible = _TIMEBASE / max(round(_TIMEBASE / rate), 1)
         return possible / 2 if self.faults.lasts("wrong_clock") else possible
 
     def start(self, rate: float, is_finite: bool) -> None:
-        """Run the clock at `rate` [Hz]; a finite run ends with the buffer, any other one must never find it empty."""
+        """Start the clock at `rate` [Hz]. A finite run ends with the buffer; any other fails if it becomes empty."""
         self._stage.configure(1 / rate)
         self._acquired, self._played = np.empty((len(INPUTS), 0)), 0
         self._begin, self.is_running, self._is_finite = time.monotonic(), True, is_finite
 
     def stop(self) -> None:
-        """Stop the clock, also of a run that has ended by itself; the output holds what it has."""
+        """Stop the clock, also after a run that has ended; the output keeps its voltage."""
         with suppress(CardError):
             self._advance()
         self.is_running, self._buffer = False, np.empty(0)
 
     def write(self, voltage: Samples) -> None:
-        """Append to the output buffer [V]."""
+        """Append voltages (n,) to the output buffer [V]; CardError if one is out of range."""
         d = self._stage.description
         if not ((voltage >= d.voltage_min) & (voltage <= d.voltage_max)).all():
             raise CardError(OUT_OF_RANGE, "Requested value is not a supported value for this property.")
@@ -130,7 +139,7 @@ class Card:
         self._buffer = np.concatenate((self._buffer, voltage))
 
     def set(self, voltage: float) -> None:
-        """Put one voltage out without a clock [V]."""
+        """Set the output to one voltage without a clock [V]; CardError if it is out of range."""
         self.write(np.full(1, voltage))
         self._run(self._buffer[-1:])
         self._buffer = np.empty(0)
@@ -142,7 +151,7 @@ class Card:
         return self._chosen(self._run(np.full(1, self.voltage)), channels)
 
     def remaining(self, count: int) -> float:
-        """Time until `count` samples can be read [s]; infinite where they never can."""
+        """Time until `count` samples can be read [s]; infinite if a finite run has fewer. CardError if none runs."""
         if not self.is_running and not self._is_finite:
             raise CardError(NOT_RUNNING, "The specified task is not running.")
         missing = count - self.available
@@ -156,7 +165,7 @@ class Card:
         return self._chosen(taken, channels)
 
     def underflow(self) -> None:
-        """End the run as a card does whose output buffer has run empty; CardError."""
+        """Stop the clock as if the output buffer were empty; always raises CardError."""
         self.is_running = False
         raise CardError(UNDERFLOW, "The generation has stopped to prevent the regeneration of old samples.")
 
@@ -164,7 +173,7 @@ class Card:
         return inputs[[INPUTS.index(channel) for channel in channels]]
 
     def _advance(self) -> None:
-        """Play the samples that are due."""
+        """Play the samples that are due by now."""
         if not self.is_running:
             return
         if math.isinf(self._speed):
@@ -181,7 +190,7 @@ class Card:
             self.underflow()
 
     def _run(self, voltage: Samples) -> Samples:
-        """Inputs while so many voltages are put out [V], shape (4, n)."""
+        """Output voltages (n,) [V], and return the inputs meanwhile [V], shape (4, n)."""
         lasts, d = self.faults.lasts, self._stage.description
         drive = np.ascontiguousarray(voltage)
         if lasts("saturated"):

@@ -27,19 +27,20 @@ from .calls import Calls
 from .card import Card, CardError
 
 _LATE = (-200284, "Some or all of the samples requested have not yet been acquired.")
-"""Error of samples that come too late."""
+"""Error number and text for samples that are not available in time."""
 _RESOURCE_LOST = (-200324, "Device not available for routing. It is possible that it was removed.")
-"""Error of a card that is gone."""
+"""Error number and text for a card that was unplugged."""
 
 
 class DaqmxServer:
-    """Serves the calls that clocked analogue output and input need; every other one is unimplemented, and says so.
+    """Serves the calls that clocked analogue output and input need; gRPC reports every other call as unimplemented.
 
     Parameters
     ----------
     card : Card
+        The emulated card.
     host : str
-        Address to listen at.
+        Address at which the server listens.
     port : int
         TCP port; 31763 is that of NI's examples, 0 is any free one.
 
@@ -87,12 +88,12 @@ class DaqmxServer:
         call = getattr(self._calls, name)
 
         def answer(_: object, request: Any, context: Any) -> Any:
-            struck = self._calls.strike(name)
+            struck = self._calls.count(name)
             self._calls.sleep(struck.get("slow", 0.0))
             self._gone |= "gone" in struck
             try:
                 if self._gone or "link_lost" in struck:
-                    context.abort(self._grpc.StatusCode.UNAVAILABLE, "the fault that was asked for")
+                    context.abort(self._grpc.StatusCode.UNAVAILABLE, "a requested fault of the emulator")
                 self._refuse(struck)
                 values = call(request)
                 if name == "ReadAnalogF64":
@@ -106,7 +107,7 @@ class DaqmxServer:
 
     def _refuse(self, struck: dict[str, float]) -> None:
         if "error" in struck:
-            raise CardError(int(struck["error"]), "The fault that was asked for.")
+            raise CardError(int(struck["error"]), "A requested fault of the emulator.")
         if "device_lost" in struck:
             raise CardError(*_RESOURCE_LOST)
         if "late" in struck:

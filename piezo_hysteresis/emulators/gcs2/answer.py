@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Answers in GCS 2.0 form: lines of one answer, to be joined by space and line feed."""
+"""Answers in the form of GCS 2.0: the lines of one answer, which the server joins by a space and a line feed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ...stage.description import Samples
 
 
 def number(value: float) -> str:
-    """A number as controllers write it: nine digits, so that single precision survives."""
+    """A number as text with nine digits, so that a number of single precision is read back exactly."""
     return f"{value:.9g}"
 
 

@@ -12,7 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Arguments of GCS 2.0 commands, as an emulated controller with one axis and one channel takes them."""
+"""Checks of the arguments of GCS 2.0 commands for an emulated controller with one axis and one channel.
+
+An invalid argument raises `Refusal` with the error number of the controller.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +29,11 @@ AXIS, CHANNEL = "1", 1
 """The one axis of the emulated controller, and its channel."""
 
 Command = Callable[[list[str]], list[str] | None]
-"""Takes the arguments; returns the lines of the answer, or None if the command has no answer."""
+"""Function of the arguments of a command; returns the lines of the answer, or None if the command has no answer."""
 
 
 def groups(arguments: list[str], size: int) -> list[list[str]]:
-    """Arguments in groups of `size`."""
+    """The arguments in groups of `size`, at least one group."""
     if not arguments or len(arguments) % size:
         raise Refusal(WRONG_COUNT)
     return [arguments[i : i + size] for i in range(0, len(arguments), size)]
@@ -66,10 +69,10 @@ def positive(word: str) -> int:
 
 
 def of_axis(value: Callable[[], float | str]) -> Command:
-    """The query of a value of the axis."""
+    """The command that queries a value of the axis."""
     return lambda arguments: items(dict.fromkeys(axes(arguments), value()))
 
 
 def of_channel(value: Callable[[], float | str]) -> Command:
-    """The query of a value of the output channel or generator."""
+    """The command that queries a value of the output channel or generator."""
     return lambda arguments: items(dict.fromkeys(channels(arguments), value()))

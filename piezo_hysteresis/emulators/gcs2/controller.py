@@ -47,12 +47,12 @@ from .wave_commands import WaveCommands
 SERVO_TIME, RECORDER_POINTS = 0x0E000200, 0x16000200
 """Numbers of controller parameters: servo update time [s], points of the data recorder."""
 STOP, MOVING, READY, RUNNING = "\x18", "\x05", "\x07", "\x09"
-"""Single-byte commands: stop everything, is it moving, is it ready, is the generator running."""
+"""Commands of a single byte: stop everything; does the axis move, is it ready, does the generator run."""
 BYTES = {STOP: "#24", MOVING: "#5", READY: "#7", RUNNING: "#9"}
-"""Commands of a single byte, with the name that ``HLP?`` gives them."""
+"""Commands of a single byte, with their names in the answer to ``HLP?``."""
 
 _TABLES, _POINTS, _WAVE_TABLES = 8, 262144, 4
-"""Tables of the data recorder, their points in all, and wave tables."""
+"""Number of tables of the data recorder, total number of their points, and number of wave tables."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +62,9 @@ class Reply:
     Parameters
     ----------
     lines : list of str, optional
-        The answer; None for silence.
+        Lines of the answer; None if the command has no answer.
     struck : dict
-        Faults that strike once, with their values: the business of who sends the answer.
+        Single faults that occur at this command, with their values; the server applies them to the answer.
     """
 
     lines: list[str] | None
@@ -72,21 +72,22 @@ class Reply:
 
 
 class Controller:
-    """Carries out GCS 2.0 commands in open loop; closed loop is not simulated, only that it refuses open-loop moves.
+    """Carries out GCS 2.0 commands in open loop. With the servo on, it only refuses open-loop motion.
 
     Parameters
     ----------
     stage : SimulatedStage
-        Its sample period is the servo time, its limits times amplifier gain those of the piezo voltage.
+        Its sample period is the servo time. Its limits times the amplifier gain are the limits of the piezo voltage.
     serial : str
         Serial number in ``*IDN?``.
     command_per_volt : float
-        Open-loop command over piezo voltage.
+        Open-loop command divided by piezo voltage [1/V].
     recorder_points : int
-        Samples that all recorder tables together hold.
+        Number of samples that all recorder tables together can store.
     faults : iterable of Fault
+        Faults that occur.
     speed : float
-        Seconds of the stage per second; infinite to play every waveform at once.
+        Simulated seconds per second of the computer; infinite to play every waveform at once.
     """
 
     def __init__(
@@ -111,11 +112,12 @@ class Controller:
         self._commands = self._known()
 
     def carry_out(self, line: str) -> Reply:
-        """Carry out one command, a line without its line feed or a single byte.
+        """Carry out one command.
 
         Parameters
         ----------
         line : str
+            A line without its line feed, or a single byte.
 
         Returns
         -------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Motion`: a simulated stage that keeps running between commands, and plays a waveform meanwhile."""
+"""`Motion`: a simulated stage whose simulation continues between commands, and which plays waveforms."""
 
 from __future__ import annotations
 
@@ -28,24 +28,25 @@ from ..fault import Faults
 from .recorder import Recorder
 
 _LONGEST_REST = 0.2
-"""Longest time at rest that is simulated in one go [s]."""
+"""Longest time at rest that is simulated between two commands [s]."""
 
 
 class Motion:
     """The stage behind an emulated controller, advanced in servo cycles.
 
-    Time is that of the machine, times `speed`. Rest longer than 0.2 s between two commands is not simulated further:
-    creep stands still then.
+    The simulated time is that of the computer times `speed`. Of a rest between two commands, at most 0.2 s are
+    simulated; creep does not continue after this time.
 
     Parameters
     ----------
     stage : SimulatedStage
         Its sample period is the servo time.
     recorder : Recorder
-        Gets every sample.
+        Receives every sample.
     faults : Faults
+        Faults that occur.
     speed : float
-        Seconds of the stage per second; infinite to play every waveform at once.
+        Simulated seconds per second of the computer; infinite to play every waveform at once.
     """
 
     def __init__(self, stage: SimulatedStage, recorder: Recorder, faults: Faults, speed: float) -> None:
@@ -61,7 +62,7 @@ class Motion:
 
     @property
     def cycle(self) -> float:
-        """Servo cycle that is really run [s]."""
+        """Servo cycle that is really used [s]; the fault ``wrong_servo_time`` doubles it."""
         return self.stage.sample_period
 
     @property
@@ -81,7 +82,7 @@ class Motion:
         return self._position
 
     def advance(self) -> None:
-        """Live up to now."""
+        """Simulate the time since the last call."""
         now = time.monotonic()
         if math.isinf(self._speed):
             cycles = self._waveform.size
@@ -97,16 +98,16 @@ class Motion:
             self._run(np.full(rest, self.command))
 
     def set(self, drive: float) -> None:
-        """Apply one drive voltage [V] for a cycle and hold it."""
+        """Apply a drive voltage [V] for one cycle; it is then held."""
         self._run(np.full(1, drive))
 
     def play(self, waveform: Samples) -> None:
-        """Play drive voltages [V], one per servo cycle, from now on."""
+        """Start to play drive voltages (n,) [V], one per servo cycle."""
         self._updated, self._waveform = time.monotonic(), waveform
         self.advance()
 
     def stop(self) -> None:
-        """Hold what is applied now."""
+        """End the waveform and hold the present voltage."""
         self._waveform = np.empty(0)
 
     def _run(self, drive: Samples) -> None:

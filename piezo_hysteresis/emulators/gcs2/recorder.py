@@ -26,21 +26,22 @@ from ..fault import Faults
 from .refusal import Refusal
 
 OPTIONS = {0: "Nothing", 1: "Commanded Value", 2: "Actual Position of Axis", 7: "Voltage of Output Chan"}
-"""Record options that are there; position in µm, voltages in V at the piezo."""
+"""Supported record options; the position is in µm, voltages are those at the piezo in V."""
 
 
 class Recorder:
-    """Tables that share one memory; all start together and end when they are full.
+    """Tables that share one memory. All start together and end when the memory is full.
 
     Parameters
     ----------
     tables : int
         Number of tables.
     points : int
-        Samples that all tables together hold.
+        Number of samples that all tables together can store.
     command_gain : float
-        Open-loop command over drive voltage.
+        Open-loop command divided by drive voltage [1/V].
     faults : Faults
+        Faults that occur.
     """
 
     def __init__(self, tables: int, points: int, command_gain: float, faults: Faults) -> None:
@@ -63,14 +64,14 @@ class Recorder:
         return self._options[table]
 
     def start(self, expected_cycles: int) -> None:
-        """Begin to record; `expected_cycles` servo cycles are going to be played."""
+        """Begin to record; `expected_cycles` is the number of servo cycles of the waveform that is played."""
         self._parts, self._cycles = [], 0
         self._room = self.points // len(self.numbers) * self.rate
         if self._faults.lasts("short_record"):
             self._room = min(self._room, expected_cycles * 4 // 5)
 
     def take(self, drive: Samples, voltage: Samples, displacement: Samples) -> None:
-        """Servo cycles as they pass: drive [V], piezo voltage [V], displacement [m], shape (n,)."""
+        """Record servo cycles: drive [V], piezo voltage [V] and displacement [m], each of shape (n,)."""
         count = min(drive.size, self._room - self._cycles)
         if count > 0:
             columns = (drive * self._command_gain, displacement * 1e6, voltage)
@@ -79,11 +80,11 @@ class Recorder:
 
     @property
     def recorded(self) -> int:
-        """Samples in every table since the last start."""
+        """Number of samples in every table since the last start."""
         return -(-self._cycles // self.rate)
 
     def read(self, first: int, count: int, tables: Sequence[int]) -> Samples:
-        """Samples `first` (from 1) on of some tables, shape (count, tables)."""
+        """Samples of some tables from number `first` on, where 1 is the first sample; shape (count, tables)."""
         if first < 1 or count < 1:
             raise Refusal(OUT_OF_RANGE)
         if first + count - 1 > self.recorded:

@@ -32,8 +32,9 @@ class RecorderCommands:
     Parameters
     ----------
     recorder : Recorder
+        The data recorder.
     motion : Motion
-        What it records.
+        The motion that it records.
     """
 
     def __init__(self, recorder: Recorder, motion: Motion) -> None:

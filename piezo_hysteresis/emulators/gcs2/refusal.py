@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Refusal`: a command that an emulated controller does not carry out."""
+"""`Refusal`: ends a command that an emulated controller does not carry out."""
 
 from __future__ import annotations
 
 
-class Refusal(Exception):  # noqa: N818 - it is no error of the emulator
-    """Ends a command; its number waits for ``ERR?``.
+class Refusal(Exception):  # noqa: N818 - it is not an error of the emulator
+    """Ends a command; the query ``ERR?`` then returns its number.
 
     Parameters
     ----------

@@ -28,19 +28,20 @@ from .controller import BYTES, Controller, Reply
 _CODE_PAGE = "cp1252"
 """Character set of GCS."""
 _LONGEST_LINE = 1 << 20
-"""Largest length of a line [byte]."""
+"""Longest accepted line [bytes]."""
 
 
 class Gcs2Server:
-    """Serves any number of links, one command at a time, from threads of its own.
+    """Serves any number of links in its own threads, one command at a time.
 
     Parameters
     ----------
     controller : Controller
+        The emulated controller.
     host : str
-        Address to listen at; the loop-back device unless stated otherwise.
+        Address at which the server listens.
     port : int
-        TCP port; 0 for any free one.
+        TCP port; 0 for any free port.
 
     Raises
     ------
@@ -138,11 +139,11 @@ class Gcs2Server:
         if "reset" in struck:
             link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # closing sends a RST
         if struck.keys() & {"link_lost", "reset", "gone"}:
-            raise OSError("the fault that was asked for")
+            raise OSError("a requested fault of the emulator")
 
 
 def cut(received: bytes) -> tuple[list[str], bytes]:
-    """Commands in what was received, and the beginning of the next one."""
+    """The complete commands in the received bytes, and the bytes of an incomplete one."""
     commands: list[str] = []
     while received:
         if chr(received[0]) in BYTES:

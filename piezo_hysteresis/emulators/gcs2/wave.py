@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`WaveGenerator`: wave table and generator of an emulated controller."""
+"""`WaveGenerator`: wave tables and generator of an emulated controller."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from ...stage.gcs2.error_number import NO_WAVE_SELECTED, OUT_OF_RANGE, SYNTAX, W
 from .refusal import Refusal
 
 _LONGEST_RUN = 10_000_000
-"""Servo cycles of one run: the output is made before it is played."""
+"""Largest number of servo cycles of one run; the whole output is computed before it is played."""
 
 
 class WaveGenerator:
-    """Wave tables by number, and the settings of the one generator that plays them.
+    """Wave tables by number, and the settings of the generator that plays them.
 
     Parameters
     ----------
     tables : int
         Number of tables.
     longest : int
-        Points that a table holds.
+        Largest number of points of a table.
     lowest, highest : float
-        Limits of a point, in units of the open-loop command.
+        Limits of a point [unit of the open-loop command].
     """
 
     def __init__(self, tables: int, longest: int, lowest: float, highest: float) -> None:
@@ -57,7 +57,7 @@ class WaveGenerator:
         return self._points[table]
 
     def write(self, words: list[str]) -> None:
-        """Carry out ``WAV table X|& PNT first count values…`` or ``WAV table X|& LIN …``; no other curve is there."""
+        """Carry out ``WAV table X|& PNT first count values…`` or ``WAV table X|& LIN …``; other curves are refused."""
         if len(words) < 6:
             raise Refusal(WRONG_COUNT)
         table, mode, kind, *rest = words
@@ -78,7 +78,7 @@ class WaveGenerator:
         stored.extend(numbers)
 
     def waveform(self) -> Samples:
-        """What the generator plays, one command per servo cycle; endless output is not there."""
+        """The commands that the generator plays, one per servo cycle, shape (n,); endless output is refused."""
         points = self._points.get(self.table, [])
         if not points:
             raise Refusal(NO_WAVE_SELECTED)
@@ -95,7 +95,7 @@ def _points(words: list[str]) -> list[float]:
 
 
 def _line(words: list[str]) -> list[float]:
-    """A line of constant speed over the whole segment; the last point is one step before the end."""
+    """Points of a straight line over the whole segment; the last point is one step before its end."""
     segment, amplitude, offset, wave, first, speed_up = (float(word) for word in words)
     if not 1 <= segment == wave or first or speed_up:
         raise Refusal(OUT_OF_RANGE)

@@ -34,10 +34,11 @@ class WaveCommands:
     Parameters
     ----------
     wave : WaveGenerator
+        The wave generator.
     motion : Motion
-        What it moves.
+        The motion that it drives.
     start : callable
-        Starts generator and recorder, if the controller allows.
+        Starts generator and recorder, or raises `Refusal`.
     """
 
     def __init__(self, wave: WaveGenerator, motion: Motion, start: Callable[[], None]) -> None:
