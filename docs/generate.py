@@ -47,15 +47,15 @@ PICTURES = DOCS / "pictures.py"
 HEAD = """\
 # Catalogue of effects
 
-Generated from `piezo_hysteresis/effects` by `make docs`; `piezo effects` prints it too. In the order in which the
-effects act; every one has a value that switches it off exactly.
+Generated from `piezo_hysteresis/effects` by `make docs`; `piezo effects` prints it too. The effects are listed in
+the order in which they act. All except the hysteresis operators and `arx` have a value that switches them off exactly.
 
 """
 UNNAMED_HEAD = """\
 # Corrections without a name
 
-They are no effects. `piezo diagnose` offers one of them after the verdict *unknown*
-([how](gap.md#a-correction-without-a-name)), and no search for effects knows them.
+These corrections are not effects. `piezo diagnose` offers one of them after the verdict *unknown*
+([how](gap.md#a-correction-without-a-name)). A search for effects does not use them.
 """
 MARKED = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
