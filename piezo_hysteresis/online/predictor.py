@@ -165,9 +165,9 @@ class Predictor:
         displacement : (n,) array_like
             Measured displacement [m].
         follows_gap : bool
-            True where the samples missing before the block were never measured: the drive was held meanwhile.
+            True if the samples missing before the block were never measured: the drive was held meanwhile.
         settled : bool
-            False where the stage had been driven before the stream: the state of its hysteresis is then unknown.
+            False if the stage had been driven before the stream: the state of its hysteresis is then unknown.
 
         Returns
         -------

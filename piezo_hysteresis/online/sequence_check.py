@@ -92,7 +92,7 @@ class SequenceCheck:
         size : int
             Number of samples.
         follows_gap : bool
-            True where the samples missing before it were never measured; they are not counted as lost.
+            True if the samples missing before it were never measured; they are not counted as lost.
 
         Returns
         -------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`BackEnd`: a kind of stage that a driver can open. `Opening`: what it needs besides the values of its parameters."""
+"""`BackEnd`: a kind of stage that a driver can open. `Opening`: sample period and speed with which it is opened."""
 
 from __future__ import annotations
 

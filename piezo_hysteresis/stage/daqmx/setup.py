@@ -37,7 +37,7 @@ class DaqmxSetup:
     displacement_input : str
         Analogue input of the position sensor.
     voltage_input : str
-        Analogue input of the amplifier's monitor; empty where the drive is not measured.
+        Analogue input of the amplifier's monitor; empty if the drive is not measured.
     server : str
         ``host:port`` of an NI gRPC device server; empty for the driver on this machine.
     sample_period : float

@@ -151,7 +151,7 @@ class Tasks:
             task.wait_until_done(drive.size * sample_period + s.timeout)
 
     def output(self) -> float | None:
-        """Voltage at the output [V], read back by the card itself; None where it cannot."""
+        """Voltage at the output [V], read back by the card itself; None if it cannot."""
         s = self._setup
         try:
             with self._faults("reading the output back"), self._task() as task:

@@ -102,7 +102,7 @@ class Mechanics:
     poles : tuple of float
         Time constants of the sensor electronics [s].
     amplifier_time : float
-        Time constant with which w approaches its end within a hold [s]; 0 where it jumps.
+        Time constant with which w approaches its end within a hold [s]; 0 if it jumps.
     clock : Clock
     full : float
         Full stroke in units of w.

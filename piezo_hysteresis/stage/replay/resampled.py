@@ -48,7 +48,7 @@ class ResampledRecord:
     size : int
         Number of played samples.
     is_resampled : bool
-        True where the recorded period is another one.
+        True if the recorded sample period differs from the played one.
 
     Raises
     ------
