@@ -72,7 +72,7 @@ def diagnose(
     Raises
     ------
     ParameterError
-        If the time limit is not positive.
+        If the time limit is not positive, or `effects` holds something else than classes of effects.
     RecordError
         If `experiment` holds no records.
     IdentificationError
@@ -82,6 +82,9 @@ def diagnose(
     """
     if not time_limit > 0.0:
         raise ParameterError(f"diagnose: got a time limit of {time_limit:g} s, expected more than 0 s")
+    other = [e for e in effects if not (isinstance(e, type) and issubclass(e, Effect))]
+    if other:
+        raise ParameterError(f"diagnose: got {other[0]!r} in effects, expected classes of effects such as Creep")
     end = time.monotonic() + time_limit
     state = DiagnosisState(experiment_of(experiment), model, effects, progress or (lambda word, fraction: None), end)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # diverging trials have a large cost

@@ -188,6 +188,8 @@ def test_a_search_that_runs_out_of_time_gives_the_best_answer_so_far():
     assert found.gap.after == pytest.approx(found.gap.before)
     with pytest.raises(ParameterError, match="more than 0 s"):
         diagnose(hidden("creep").experiment(), time_limit=0.0)
+    with pytest.raises(ParameterError, match="got 'creep' in effects, expected classes of effects"):
+        diagnose(hidden("creep").experiment(), effects=["creep"])
 
 
 def test_logarithmic_creep_is_saved_as_the_correct_law():
