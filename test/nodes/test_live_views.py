@@ -63,7 +63,8 @@ def published():
     block = SampleBlock(0, PERIOD * index, u, 1e-6 * u, index, np.zeros(n, dtype=np.uint32), "stage")
     predictor = Predictor(PERIOD, Model((BoucWen(), Arx(b=[0.2])), PERIOD, displacement_scale=1e-4))
     driver.deliver(Delivery(block, 0, ()))
-    model.publish(block, predictor.predict(0, 0, block.voltage, block.displacement), predictor)
+    answer = predictor.predict(0, 0, block.voltage, block.displacement)
+    model.publish(block, answer, answer.model, predictor)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     for _ in range(200):
