@@ -60,12 +60,11 @@ def changed_stages(history: FleetHistory) -> tuple[ChangedStage, ...]:
 
 def _changed(history: FleetHistory, name: str, series: ParameterSeries) -> Iterator[ChangedStage]:
     time, owner = history.time[series.index], history.stage[series.index]
-    errors = (series.upper - series.lower) / (2 * 1.96)
+    errors = series.standard_error
     for stage in np.unique(owner):
         member = np.flatnonzero((owner == stage) & ~np.isnat(time) & np.isfinite(errors))
         if member.size < 2:
             continue
-        member = member[np.argsort(time[member], kind="stable")]
         before, after = member[: member.size // 2], member[-(member.size // 2) :]
         earlier, later = (float(np.median(series.value[half])) for half in (before, after))
         error = float(np.hypot(np.median(errors[before]), np.median(errors[after])))

@@ -36,33 +36,37 @@ _NUMBERS = re.compile(r"\d+(\.\d+)?([eE][+-]?\d+)?")
 
 def outlier_table(outliers: Sequence[OutlyingStage]) -> Table | None:
     """The outlying stages, the farthest first."""
-    if not outliers:
-        return None
-    rows = tuple(
-        (o.stage, o.parameter, f"{o.value:.5g}", f"{o.typical:.5g}", o.unit, f"{o.distance:.1f}") for o in outliers
-    )
     note = (
         f"Outlying: the median of the stage is more than {FAR:g} standard deviations from that of all stages. The "
         "standard deviation combines the spread of the stages (from their median absolute deviation) and the standard "
         "error of one recording."
     )
-    header = ("stage", "parameter", "median", "all stages", "unit", "distance")
-    return Table("Outlying stages", header, rows[:ROWS], note + _more(rows), frozenset({2, 3, 5}))
+    return _differences("Outlying stages", ("median", "all stages"), [(o, o.value, o.typical) for o in outliers], note)
 
 
 def change_table(changes: Sequence[ChangedStage]) -> Table | None:
     """The stages with a parameter that has changed, the largest change first."""
-    if not changes:
-        return None
-    rows = tuple(
-        (c.stage, c.parameter, f"{c.earlier:.5g}", f"{c.later:.5g}", c.unit, f"{c.distance:.1f}") for c in changes
-    )
     note = (
         "Changed: the medians of the earlier and of the later half of the recordings differ by more than "
         f"{FAR:g} standard errors of the difference of two recordings."
     )
-    header = ("stage", "parameter", "earlier", "later", "unit", "distance")
-    return Table("Changed stages", header, rows[:ROWS], note + _more(rows), frozenset({2, 3, 5}))
+    return _differences("Changed stages", ("earlier", "later"), [(c, c.earlier, c.later) for c in changes], note)
+
+
+def _differences(
+    title: str,
+    values: tuple[str, str],
+    found: Sequence[tuple[OutlyingStage | ChangedStage, float, float]],
+    note: str,
+) -> Table | None:
+    if not found:
+        return None
+    rows = tuple(
+        (f.stage, f.parameter, f"{first:.5g}", f"{second:.5g}", f.unit, f"{f.distance:.1f}")
+        for f, first, second in found
+    )
+    header = ("stage", "parameter", *values, "unit", "distance")
+    return Table(title, header, rows[:ROWS], note + _more(rows), frozenset({2, 3, 5}))
 
 
 def stage_table(history: FleetHistory) -> Table:

@@ -46,6 +46,11 @@ class ParameterSeries:
     lower: Array
     upper: Array
 
+    @property
+    def standard_error(self) -> Array:
+        """Standard errors of the estimates (k,), from their intervals; NaN without an interval."""
+        return (self.upper - self.lower) / (2 * 1.96)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FleetHistory:

@@ -72,7 +72,7 @@ def _outlying(history: FleetHistory, name: str, series: ParameterSeries) -> list
     if stages.size < FEWEST:
         return []
     medians = np.array([np.median(series.value[owner == stage]) for stage in stages])
-    errors = (series.upper - series.lower) / (2 * 1.96)
+    errors = series.standard_error
     known = np.isfinite(errors)
     sure = np.array([np.median(errors[(owner == s) & known]) if np.any((owner == s) & known) else 0.0 for s in stages])
     typical = float(np.median(medians))
