@@ -27,9 +27,10 @@ from ...errors import DivergenceError, IdentificationError, ParameterError
 from ...model.model import Model
 from ...model.parameter_covariance import ParameterCovariance
 from ...record import Record
-from .bounded_step import bounded_step, bounds_of, room_of
+from .bounded_step import bounds_of, room_of
 from .covariance import covariance
 from .normal_equations import Gram, Nuisance, grams, residuals
+from .stable_step import stable_step
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -117,12 +118,12 @@ def gauge(model: Model, names: Sequence[str]) -> Array:
         return directions
     b = [i for i, n in enumerate(names) if n.startswith(f"{Arx.name}.b[")]
     gains = {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.linear_numbers()}
-    if len(b) < len(model[Arx.name].array("b")) or not gains.issubset(names):
+    if len(b) < len(model.effect(Arx).array("b")) or not gains.issubset(names):
         return directions
     directions[b[0], b[1:]] = -1.0
     for i, n in enumerate(names):
         if n.startswith(f"{Arx.name}.a["):
-            directions[b[0], i] = model[Arx.name].dc_gain  # type: ignore[attr-defined]
+            directions[b[0], i] = model.effect(Arx).dc_gain
     return np.delete(directions, b[0], axis=1)
 
 
@@ -199,9 +200,9 @@ def fit(
         idle = np.diag(hessian) <= np.finfo(float).tiny
         hessian[idle, :] = hessian[:, idle] = 0.0
         diagonal = np.where(idle, 1.0, np.diag(hessian))
-        low, high = room_of(model, free, directions)
+        room = room_of(model, free, directions)
         while True:
-            step = directions @ bounded_step(hessian + np.diag(damping * diagonal), slope, low, high)
+            step = stable_step(model, free, directions, hessian + np.diag(damping * diagonal), slope, room)
             trial = _bounded(free, np.clip(theta + step, lower, upper))
             better, cost = _try(model, records, free, trial, nuisance, sizes)
             if better is not None and cost < total[-1, -1]:
