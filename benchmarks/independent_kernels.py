@@ -44,6 +44,19 @@ def bouc_wen(v, start, dt, A, beta, gamma, phi1, phi2, n, k, a, h):
 
 
 @kernel
+def explicit_bouc_wen(v, start, A, beta, gamma, h):
+    """h by one explicit step of Eq. (7) per sample, as simple simulators compute it."""
+    out = np.empty(v.size)
+    last = start
+    for i in range(v.size):
+        dv = v[i] - last
+        last = v[i]
+        h += A * dv - beta * abs(dv) * h - gamma * dv * abs(h)
+        out[i] = h
+    return out
+
+
+@kernel
 def plays(v, start, radii, weights):
     """Superposition of plays, centred where the drive starts."""
     out = np.zeros(v.size)

@@ -61,6 +61,7 @@ class Plant:
     zero: float = 2e-6
     hidden: Mapping[str, Any] = field(default_factory=dict)
     thorough: bool = False
+    explicit: bool = False
 
     @classmethod
     def random(cls, rng: np.random.Generator, **fixed: Any) -> Plant:
@@ -148,7 +149,10 @@ class Plant:
             phi1, phi2 = e.get("asymmetric_hysteresis", (0.0, 0.0))
             k, a = e.get("rate_dependent_hysteresis", (0.0, 0.5))
             n = e.get("hysteresis_exponent", 1.0)
-            h = kernels.bouc_wen(v, v0, dt, self.A, self.beta, self.gamma, phi1, phi2, n, k, a, h0)
+            if self.explicit:
+                h = kernels.explicit_bouc_wen(v, v0, self.A, self.beta, self.gamma, h0)
+            else:
+                h = kernels.bouc_wen(v, v0, dt, self.A, self.beta, self.gamma, phi1, phi2, n, k, a, h0)
             w, w0 = self.p1 * v**3 + self.p2 * v + h, self.p1 * v0**3 + self.p2 * v0 + h0
         if "even_input_polynomial" in e:
             w, w0 = w + e["even_input_polynomial"] * v**2, w0 + e["even_input_polynomial"] * v0**2

@@ -93,11 +93,11 @@ class Outcome:
         return not set(self.families) <= set(self.right_families)
 
 
-def answer(case: Case) -> Outcome:
+def answer(case: Case, explicit_step: bool = False) -> Outcome:
     """Make the data of a case and diagnose them; the time is the processor time of the diagnosis."""
     experiment = case.experiment()
     begin = time.process_time()
-    found = diagnose(experiment, effects=case.library)
+    found = diagnose(experiment, effects=case.library, explicit_step=explicit_step)
     seconds = time.process_time() - begin
     selection, gap = found.selection, found.gap
     steps = selection.steps if selection is not None else ()
@@ -183,7 +183,8 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5, help="seeds of every effect; other groups in proportion")
     parser.add_argument("--quick", action="store_true", help="one seed at the middle noise")
     parser.add_argument("--cases", type=int, help="largest number of cases")
-    parser.add_argument("--groups", nargs="+", choices=(*GROUPS, "quick"), default=list(GROUPS))
+    parser.add_argument("--groups", nargs="+", choices=(*GROUPS, "quick", "explicit"), default=list(GROUPS))
+    parser.add_argument("--explicit-step", action="store_true", help="as in piezo diagnose; for the group explicit")
     parser.add_argument("--only", default="", help="cases whose label contains this word")
     parser.add_argument("--json", type=Path, help="outcomes as JSON")
     parser.add_argument("--jobs", type=int, default=1, help="cases at a time, each on a core")
@@ -192,7 +193,7 @@ def main() -> None:
     wanted = [c for c in cases(tuple(options.groups), seeds, noises) if options.only in c.label][: options.cases]
     out, outcomes, crashes = console(), list[Outcome](), 0
     pool = ProcessPoolExecutor(options.jobs)
-    answers = [pool.submit(answer, case) for case in wanted]
+    answers = [pool.submit(answer, case, options.explicit_step) for case in wanted]
     for k, (case, found) in enumerate(zip(wanted, answers, strict=True), 1):
         try:
             outcome = found.result()

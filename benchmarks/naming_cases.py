@@ -52,7 +52,8 @@ class Case:
     noise : float
         Of the stroke, rms per sample.
     plant : str
-        ``independent``, ``thorough`` (the same with full dynamics in slow phases) or ``packaged``.
+        ``independent``, ``thorough`` (the same with full dynamics in slow phases), ``explicit`` (``thorough`` with the
+        explicit step of Eq. (7), without terms of the loop) or ``packaged``.
     layout : ProtocolVariant
         Of the experiment.
     without : tuple of str
@@ -104,7 +105,8 @@ class Case:
             plays=plays,
             volt=float(rng.choice([1.0, 10.0, 125.0])),
             hidden={**hidden, **self.extra},
-            thorough=self.plant == "thorough",
+            thorough=self.plant in ("thorough", "explicit"),
+            explicit=self.plant == "explicit",
         )
         return plant, seed
 
@@ -147,6 +149,7 @@ def cases(groups: tuple[str, ...], seeds: int, noises: tuple[float, ...] = NOISE
         "plays": _plays,
         "poor": _poor,
         "quick": _quick,
+        "explicit": _explicit,
     }
     for group in groups:
         yield from makers[group](seeds, noises)
@@ -291,3 +294,11 @@ def _draw(name: str, rng: np.random.Generator) -> Any:
         "mains_hum": lambda: (float(rng.choice([50.0, 60.0])), size(1e-3, 5e-3)),
     }
     return {**one, **several}[name]()
+
+
+def _explicit(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
+    """Cases of the groups ``effects`` and ``effect_free``, as a simulation with the explicit step gives them."""
+    for seed in range(seeds):
+        yield Case("effect_free", (), seed, noises[len(noises) // 2], "explicit")
+        for name in ("creep", "initial_state", "sensor_nonlinearity", "thermal_drift", "backlash"):
+            yield Case("effects", (name,), seed, noises[len(noises) // 2], "explicit")

@@ -32,12 +32,12 @@ from .search.baseline_setup import BaselineSetup
 from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection_result import Selection
 from .search.training_data import TrainingData
-from .unnamed.offer import offered
-from .verdict import conclusion_of, is_explained, is_makeshift
+from .unnamed.offer import best_correction
+from .verdict import conclusion_of, is_explained, is_substitute
 
 NOISY, WORTHWHILE = 1.1, 0.95
-"""Ratio of the cost to the cost of noise from which the last fit is restarted, and the largest ratio of the new cost to
-the old one for which it is restarted once more."""
+"""Ratio of the cost to the cost of noise above which the last fit is restarted, and largest ratio of the new cost to
+the old one for which the new fit is kept and tested again."""
 
 
 def concluded(
@@ -64,7 +64,7 @@ def concluded(
     """
     records, least, training_data = setup.records, setup.least, setup.training_data
     progress("gap", 0.85)
-    named = is_explained(selection) and not is_makeshift(selection)
+    named = is_explained(selection) and not is_substitute(selection)
     whole = setup.whole
     plain = selection.baseline if selection.accepted else selection.model  # the search may have found better dynamics
     first = joint(plain, replace(training_data, records=whole), LAST, PRECISE)
@@ -93,6 +93,7 @@ def concluded(
     progress("next experiment", 0.95)
     conclusion, reason = conclusion_of(selection, named, falls, gap)
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time
+    found = {s.best.effect.public_name() for s in selection.accepted} if named else set()
     return Diagnosis(
         conclusion=conclusion,
         reason=reason,
@@ -103,8 +104,8 @@ def concluded(
         where=where,
         gap=gap,
         next_experiment=decide(selection, training_data),
-        experiment=experiment.noting(*missing_excitation([records[i] for i in setup.usable])),
-        correction=offered(final.model, setup, selection.null) if is_unexplained else None,
+        experiment=experiment.noting(*missing_excitation([records[i] for i in setup.usable], found)),
+        correction=best_correction(final.model, setup, selection.null) if is_unexplained else None,
     )
 
 

@@ -32,7 +32,7 @@ from ..record import Record
 from .changes.same_stage import UNCHANGED
 from .diagnosis import Conclusion, Diagnosis, Verdict
 from .diagnosis_state import DiagnosisState
-from .passes import PASSES, subtract_explicit_steps
+from .passes import PASSES
 
 
 @on_one_core
@@ -42,7 +42,7 @@ def diagnose(
     *,
     effects: Collection[type[Effect]] = CATALOGUE,
     progress: Progress | None = None,
-    explicit_step: bool = True,
+    explicit_step: bool = False,
     time_limit: float = np.inf,
 ) -> Diagnosis:
     """Find where simulation and measurement disagree, name the missing effect, and measure the gap after adding it.
@@ -58,8 +58,8 @@ def diagnose(
     progress : callable, optional
         Called with a message and the fraction done.
     explicit_step : bool
-        Whether to look for the error of the explicit step of Eq. (7), which only simulated data can contain. If it is
-        found, it is subtracted before an effect is named.
+        Subtract the error of the explicit step of Eq. (7), which only data of a simulation can contain. By default,
+        data in which nothing else is missing have the verdict unknown, and the reason names this option.
     time_limit : float
         Time after which the search ends with the best answer so far [s]. It does not limit the baseline before the
         search and the last fit after it.
@@ -86,9 +86,10 @@ def diagnose(
     if other:
         raise ParameterError(f"diagnose: got {other[0]!r} in effects, expected classes of effects such as Creep")
     end = time.monotonic() + time_limit
-    state = DiagnosisState(experiment_of(experiment), model, effects, progress or (lambda word, fraction: None), end)
+    progress = progress or (lambda word, fraction: None)
+    state = DiagnosisState(experiment_of(experiment), model, effects, progress, end, explicit_step)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # diverging trials have a large cost
-        for run in (p for p in PASSES if explicit_step or p is not subtract_explicit_steps):
+        for run in PASSES:
             found = run(state)
             if isinstance(found, Diagnosis):
                 return _compared(found)

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any
 
 from ..effects import CHAIN
@@ -32,40 +31,12 @@ from .next_experiment import NextExperiment
 from .residual.localise import ResidualShare
 from .search.selection_result import Rejection, Selection
 from .unnamed.correction import Correction
+from .verdict import Conclusion, Verdict
+
+__all__ = ["Conclusion", "Diagnosis", "Verdict"]
 
 SCHEMA = 1
 """Version of the JSON answer."""
-
-
-class Verdict(StrEnum):
-    """The three possible verdicts."""
-
-    NAMED = "named"
-    NOTHING_MISSING = "nothing_missing"
-    UNKNOWN = "unknown"
-
-
-class Conclusion(StrEnum):
-    """What the diagnosis found: the verdict, and what it rests on. The headline of every report follows from it."""
-
-    MISSING_EFFECT = "missing_effect"
-    CHANGED_PARAMETER = "changed_parameter"
-    NOTHING_MISSING = "nothing_missing"
-    NOTHING_CHANGED = "nothing_changed"
-    TIME_LIMIT = "time_limit"
-    INSUFFICIENT_DATA = "insufficient_data"
-    UNEXPLAINED_GAP = "unexplained_gap"
-
-    @property
-    def verdict(self) -> Verdict:
-        """The verdict that this conclusion belongs to.
-
-        >>> str(Conclusion.CHANGED_PARAMETER.verdict), str(Conclusion.TIME_LIMIT.verdict)
-        ('named', 'unknown')
-        """
-        if self in (Conclusion.MISSING_EFFECT, Conclusion.CHANGED_PARAMETER):
-            return Verdict.NAMED
-        return Verdict.NOTHING_MISSING if self is Conclusion.NOTHING_MISSING else Verdict.UNKNOWN
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -77,7 +48,7 @@ class Diagnosis(Pictured):
     conclusion : Conclusion
         What was found; the verdict (named, nothing missing, or unknown) follows from it.
     reason : str
-        The verdict in one sentence.
+        What was found and why, in one or a few sentences.
     model : Model
         The model with the named effects; without any, the refitted baseline.
     baseline : Model
@@ -91,7 +62,7 @@ class Diagnosis(Pictured):
     gap : Gap or None
         Free-run error before and after.
     next_experiment : NextExperiment or None
-        Phase that would separate explanations that these data cannot separate.
+        Phase that would separate two explanations that these data cannot distinguish.
     experiment : Experiment
         Experiment that was compared with the model, without the noise of a measured voltage. Its notices describe the
         quality of the data, and the effects that the data cannot show.
@@ -138,10 +109,10 @@ class Diagnosis(Pictured):
             if self.verdict is Verdict.UNKNOWN and step.accepted:
                 closed = self.selection.explained(step.best.score)
                 kept = self.model is not None and step.best.name in self.model
-                said = f"it is in the model but not named: the effects up to this one explain {closed:.2f} of the gap"
+                said = f"it is in the model but not named: up to it, {100 * closed:.0f} % of the gap are explained"
                 rejections[step.best.name] = Rejection(
                     step.best.name,
-                    said if kept else f"it is the closest effect, but explains only {closed:.2f} of the gap",
+                    said if kept else f"it is the closest effect, but explains only {100 * closed:.0f} % of the gap",
                 )
             for rejection in step.rejected:
                 rejections[rejection.name] = rejection

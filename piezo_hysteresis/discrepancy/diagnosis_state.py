@@ -52,6 +52,8 @@ class DiagnosisState:
         Called with a message and the fraction done.
     end : float
         Time at which the search for effects has to end, on the clock of `time.monotonic` [s].
+    explicit_step : bool
+        Whether the error of an explicit step of the loop may be subtracted.
     setup : BaselineSetup or None
         Floors, records, and the baseline that was fitted to them.
     where : tuple of ResidualShare
@@ -65,6 +67,7 @@ class DiagnosisState:
     effects: Collection[type[Effect]]
     progress: Progress
     end: float = np.inf
+    explicit_step: bool = False
     setup: BaselineSetup | None = None
     where: tuple[ResidualShare, ...] = ()
     selection: Selection | None = None

@@ -32,7 +32,7 @@ from .search.cross_validation import ADEQUATE
 Array = NDArray[np.float64]
 
 FALLS = 0.9
-"""Share of V on the test records that may remain after an effect is named."""
+"""Largest ratio of V after to V before, on the test records, with which an effect is named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class Gap:
         """Whether the extended model is better, with every record in units of its own floor.
 
         Records with little noise, which show effects that the other records do not, then have the same weight. If there
-        is no gap before, the extended model must not be worse.
+        is no gap before, any improvement is sufficient.
         """
         before, after = (
             float(np.mean([(getattr(p, when) / p.floor) ** 2 for p in self.per_phase])) for when in ("before", "after")

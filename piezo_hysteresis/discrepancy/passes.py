@@ -144,8 +144,8 @@ def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
     return again if again.searched.in_time else state
 
 
-def subtract_explicit_steps(state: DiagnosisState) -> DiagnosisState:
-    """Subtract the error of an explicit step of the loop, which only simulated data contain.
+def treat_explicit_steps(state: DiagnosisState) -> DiagnosisState | Diagnosis:
+    """Data of a simulation with an explicit step of the loop: subtract its error if the user asked for it, or end.
 
     Before the search only if nothing else is missing; after it with the first effects with which the data show it.
     """
@@ -155,17 +155,28 @@ def subtract_explicit_steps(state: DiagnosisState) -> DiagnosisState:
         return state
     if selection is None:
         explicit = explicit_model(model, training_data, STEPS_LEAVE)
-        return state if explicit is None else fit_baseline(_freed(state, explicit))
+        return state if explicit is None else _freed(state, explicit)
     for step in (s.best for s in selection.accepted if selection.in_time):
         leaves_a_gap = step.score.excess > ADEQUATE
         explicit = explicit_model(step.fit.model, step.training_data) if leaves_a_gap else None
         if explicit is not None:
-            return search_effects(fit_baseline(_freed(state, explicit)))
+            freed = _freed(state, explicit)
+            return freed if isinstance(freed, Diagnosis) else search_effects(freed)
     return state
 
 
-def _freed(state: DiagnosisState, model: Model) -> DiagnosisState:
-    return replace(state, experiment=without_steps(state.experiment, model), selection=None)
+def _freed(state: DiagnosisState, explicit: Model) -> DiagnosisState | Diagnosis:
+    if state.explicit_step:
+        freed = without_steps(state.experiment, explicit)
+        return fit_baseline(replace(state, experiment=freed, selection=None))
+    reason = (
+        "No verdict is possible: the data were simulated with the explicit step of Eq. (7), which no real stage takes. "
+        "Diagnose them with --explicit-step (Python: explicit_step=True)."
+    )
+    model, where = state.fitted.baseline.model, state.where
+    return Diagnosis(
+        Conclusion.INSUFFICIENT_DATA, reason, model, model, None, None, where, None, None, state.experiment
+    )
 
 
 def conclude(state: DiagnosisState) -> Diagnosis:
@@ -180,9 +191,9 @@ PASSES: tuple[Pass, ...] = (
     compare_with_given_model,
     answer_few_records,
     fit_baseline,
-    subtract_explicit_steps,
+    treat_explicit_steps,
     search_effects,
-    subtract_explicit_steps,
+    treat_explicit_steps,
     search_again_with_sharper_samples,
     conclude,
 )

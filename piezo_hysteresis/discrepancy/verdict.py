@@ -12,23 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Derives the verdict from the search and the gap, with the reason in one sentence."""
+"""`Verdict` and `Conclusion`: the result of a diagnosis, from the search and the gap, and its reason in words."""
 
 from __future__ import annotations
+
+from enum import StrEnum
 
 import numpy as np
 
 from ..effects import ExtraResonance
-from .diagnosis import Conclusion
+from ..identification.fit.form_uncertainty import ADEQUACY
 from .gap import Gap
 from .search.cross_validation import ADEQUATE
 from .search.selection_result import Selection
 
 FEWEST_RECORDS = 4
 """Fewest records from which test records can be taken and an effect can be named."""
-FORESEEN, UNFORESEEN = 1.1, 1.5
-"""Error on the test records in units of the floor. Up to the first value nothing is missing, even if V of the training
-records is a little high. From the second value something is missing, even if V of the training records is low."""
+TEST_ADEQUATE, TEST_INADEQUATE = 1.1, 1.5
+"""Error on the test records in units of the floor. Up to the first value nothing is missing, even if V (mean squared
+error in floors²) of the training records is a little high. Above the second value something is missing, even if V of
+the training records is low."""
 NAMED, NAMED_FAR = 0.6, 0.75
 """Smallest explained fraction of the gap for a name, and the same if the remaining error is large."""
 FAR = 10.0
@@ -37,14 +40,55 @@ LINEAR_LEAVES = 2.0 * ADEQUATE
 """Largest V that a linear effect may leave. The dynamics are fitted together with it and explain the rest."""
 
 
+class Verdict(StrEnum):
+    """The three possible verdicts."""
+
+    NAMED = "named"
+    """Effects are named: they are missing in the model, or their parameter has changed."""
+    NOTHING_MISSING = "nothing_missing"
+    """The data show no missing effect."""
+    UNKNOWN = "unknown"
+    """Neither of the two."""
+
+
+class Conclusion(StrEnum):
+    """What the diagnosis found. The verdict and the headline of every report follow from it."""
+
+    MISSING_EFFECT = "missing_effect"
+    """The model does not contain one or more effects, which are named."""
+    CHANGED_PARAMETER = "changed_parameter"
+    """One parameter of the given model has changed, and it is named."""
+    NOTHING_MISSING = "nothing_missing"
+    """The error is at the noise floor."""
+    NOTHING_CHANGED = "nothing_changed"
+    """No effect is named, and the error of the given model is within its known error."""
+    TIME_LIMIT = "time_limit"
+    """The time limit ended the search before an effect was named."""
+    INSUFFICIENT_DATA = "insufficient_data"
+    """The data do not allow a verdict, or an effect does not improve the test records."""
+    UNEXPLAINED_GAP = "unexplained_gap"
+    """Something is missing that no effect of the catalogue explains."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict that follows from this conclusion.
+
+        >>> str(Conclusion.CHANGED_PARAMETER.verdict), str(Conclusion.TIME_LIMIT.verdict)
+        ('named', 'unknown')
+        """
+        if self in (Conclusion.MISSING_EFFECT, Conclusion.CHANGED_PARAMETER):
+            return Verdict.NAMED
+        return Verdict.NOTHING_MISSING if self is Conclusion.NOTHING_MISSING else Verdict.UNKNOWN
+
+
 def is_explained(selection: Selection) -> bool:
     """Whether the added effects explain enough of the gap for a name."""
     share = NAMED if selection.score.excess <= FAR else NAMED_FAR
     return bool(selection.accepted) and selection.explained(selection.score) >= share
 
 
-def is_makeshift(selection: Selection) -> bool:
-    """Whether a lag or a resonance leaves a gap. A real one leaves none; a substitute for poor dynamics does."""
+def is_substitute(selection: Selection) -> bool:
+    """Whether an added lag or resonance leaves a gap. A real one leaves none, so this one replaces other dynamics."""
     linear = any(s.best.effect.family == "lag" or s.best.name == ExtraResonance.name for s in selection.accepted)
     return linear and selection.score.excess > LINEAR_LEAVES
 
@@ -58,7 +102,7 @@ def not_predicted_live(name: str, live: float) -> str:
 
 
 def conclusion_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Conclusion, str]:
-    """What the search found, and the reason.
+    """What the search found, and the reason in words.
 
     Parameters
     ----------
@@ -88,28 +132,28 @@ def conclusion_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> t
             said += " The time limit ended the search; more effects may be missing."
         return Conclusion.MISSING_EFFECT, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
     many = gap.unseen and len(gap.per_phase) >= FEWEST_RECORDS
-    foreseen = many and gap.after <= FORESEEN * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
-    if not selection.accepted and (foreseen or selection.score.excess <= ADEQUATE):
-        if gap.after > UNFORESEEN * gap.floor:
+    is_adequate = many and gap.after <= TEST_ADEQUATE * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
+    if not selection.accepted and (is_adequate or selection.score.excess <= ADEQUATE):
+        if gap.after > TEST_INADEQUATE * gap.floor:
             message = f"the error on the test records is {gap.after / gap.floor:.1f} times the noise floor"
             return (
                 Conclusion.INSUFFICIENT_DATA,
-                f"No effect is named: nothing is missing on the training records, but {message}.",
+                f"No effect is named: the training records show no missing effect, but {message}.",
             )
         return (
             Conclusion.NOTHING_MISSING,
-            "No effect is missing: the error does not exceed the noise and the adequacy floor of 0.03 % of the range.",
+            f"No effect is missing: the error is at the noise floor (at least {100 * ADEQUACY:g} % of the range).",
         )
-    if is_explained(selection) and is_makeshift(selection):
+    if is_explained(selection) and is_substitute(selection):
         message = (
-            f"{names} {explain} only {100 * closed:.0f} % of the gap, and a linear effect that is really "
-            "there explains all of it"
+            f"{names} {explain} only {100 * closed:.0f} % of the gap, but a lag or resonance that the stage really has "
+            "would explain all of it"
         )
         return Conclusion.UNEXPLAINED_GAP, f"No effect is named: {message}."
     if selection.accepted and not falls:
         return (
             Conclusion.INSUFFICIENT_DATA,
-            f"No effect is named: {names} improves the training records, but not the test records.",
+            f"No effect is named: {names} reduced the error on the training records, but not on the test records.",
         )
     message = ""
     if selection.steps:

@@ -78,6 +78,14 @@ def test_a_rate_law_is_not_left_in_a_local_minimum():
     assert found.gap.after <= 1.2 * found.gap.floor
 
 
+def test_data_of_an_explicit_step_have_an_answer_on_request_only():
+    case = Case("effect_free", (), 3, 5e-4, "explicit")
+    found = answered(case)
+    assert found.conclusion is Conclusion.INSUFFICIENT_DATA
+    assert "--explicit-step" in found.reason
+    assert diagnose(case.experiment(), explicit_step=True).conclusion is Conclusion.NOTHING_MISSING
+
+
 def test_an_effect_outside_the_catalogue_is_unknown():
     found = answered(hidden(group="uncatalogued", extra={"unknown": UNKNOWN["line"], "unknown_name": ("line",)}))
     assert found.verdict is Verdict.UNKNOWN

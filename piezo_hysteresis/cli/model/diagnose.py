@@ -41,12 +41,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Declare the subcommand."""
     parser = subparsers.add_parser("diagnose", description=__doc__)
     reading_options.add_arguments(parser, needs_experiment=False)
-    parser.add_argument("--model", metavar="FILE", help="model file to start from; default: identify a model first")
+    parser.add_argument("--model", metavar="FILE", help="model file to start from (default: identify a model first)")
     parser.add_argument(
         "-o",
         "--output",
         metavar="FILE",
-        help="write the extended model to this file; with --stage: folder of the experiment",
+        help="file for the extended model; with --stage: folder for the recorded experiment",
     )
     parser.add_argument(
         "--correction",
@@ -59,12 +59,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=float,
         default=float("inf"),
         metavar="S",
-        help="seconds after which the search ends with the best answer so far; default: no limit",
+        help="time after which the search ends with the best answer so far [s] (default: no limit)",
     )
     parser.add_argument(
-        "--no-explicit-step",
+        "--explicit-step",
         action="store_true",
-        help="do not look for the explicit step of Eq. (7), which only simulated data can hold",
+        help="for data of a simulation: subtract the error of the explicit step of Eq. (7)",
     )
     add_stage_arguments(parser)
     add_results(parser, report="write the HTML page, and its figures beside it", json="write the answer as JSON")
@@ -120,8 +120,10 @@ def _save_corrected(found: Diagnosis, path: str | None) -> str:
 
 
 def _of_stage(args: argparse.Namespace) -> LiveDiagnosis:
-    if args.experiment or args.model is not None:
-        raise ParameterError("diagnose: got --stage beside a recording or a model, expected --stage alone")
+    if args.experiment or args.model is not None or args.explicit_step:
+        raise ParameterError(
+            "diagnose: got --stage beside a recording, a model or --explicit-step, expected --stage alone"
+        )
     for option, path in (("--report", args.report), ("--json", args.json), ("--correction", args.correction)):
         require_new_file(option, path, args.force)
     return diagnose_stage(args)
@@ -139,6 +141,6 @@ def _of_recording(args: argparse.Namespace) -> Diagnosis:
             experiment,
             start,
             progress=report_progress,
-            explicit_step=not args.no_explicit_step,
+            explicit_step=args.explicit_step,
             time_limit=args.time,
         )
