@@ -32,12 +32,12 @@ from matplotlib.figure import Figure
 from piezo_hysteresis.discrepancy import Diagnosis, diagnose
 from piezo_hysteresis.discrepancy.next_experiment import separations
 from piezo_hysteresis.discrepancy.residual.noise_floor import noise_floors, stroke
-from piezo_hysteresis.discrepancy.search.acceptance_tests import share_left
+from piezo_hysteresis.discrepancy.search.acceptance_tests import KEEPS, share_left
 from piezo_hysteresis.discrepancy.search.candidate_refits import LATER, LEAST_GAIN, refit_candidates
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen
 from piezo_hysteresis.discrepancy.search.cross_validation import ADEQUATE
 from piezo_hysteresis.discrepancy.search.refit import without
-from piezo_hysteresis.discrepancy.search.selection import KEEPS, REFITS
+from piezo_hysteresis.discrepancy.search.selection import REFITS
 from piezo_hysteresis.discrepancy.search.test_records import reporting
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
@@ -210,7 +210,7 @@ def acceptance(diagnosis: Diagnosis) -> Figure:
     gains.barh(at, [before.cost - c.score.cost for c in fitted], color=colours)
     gains.axvline(LEAST_GAIN, color=ORANGE, linestyle="--", label=f"limit: at least {LEAST_GAIN:g}")
     left.barh(at, [100.0 * share_left(c.score, before, null) for c in fitted], color=colours)
-    left.axvline(100.0 * KEEPS[0], color=ORANGE, linestyle="--", label=f"limit: at most {100 * KEEPS[0]:.0f} %")
+    left.axvline(100.0 * KEEPS, color=ORANGE, linestyle="--", label=f"limit: at most {100 * KEEPS:.0f} %")
     alone = without(fitted[0], LATER)
     if alone is not None:
         mark = {"marker": "D", "linestyle": "none", "color": BLACK, "label": "beside the model refitted without it"}

@@ -19,7 +19,7 @@ Every effect declares the drive that it needs as its `excitation_need`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -34,21 +34,23 @@ MOVED = 0.02
 DISTINCT = 0.8
 """Ratio of the smaller to the larger amplitude below which two amplitudes count as different."""
 REASONS = {
-    ExcitationNeed.HELD_LEVEL: ("", "no level is held for a second or more after a change"),
-    ExcitationNeed.REPEATED_PHASE: ("", "no kind of phase was recorded twice"),
-    ExcitationNeed.SEVERAL_AMPLITUDES: ("", "all loops have the same amplitude"),
-    ExcitationNeed.BROADBAND: (" and lags", "no drive excites the dynamics (noise, multisine)"),
+    ExcitationNeed.HELD_LEVEL: ((), "no level is held for a second or more after a change"),
+    ExcitationNeed.REPEATED_PHASE: ((), "no kind of phase was recorded twice"),
+    ExcitationNeed.SEVERAL_AMPLITUDES: ((), "all loops have the same amplitude"),
+    ExcitationNeed.BROADBAND: (("lags",), "no drive excites the dynamics (noise, multisine)"),
 }
 """For each kind of drive: what it shows besides the effects that declare it, and the message if it is missing."""
 
 
-def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
+def missing_excitation(records: Sequence[Record], found: Collection[str] = ()) -> tuple[Notice, ...]:
     """One notice for every kind of drive that the records do not contain, with the effects that need it.
 
     Parameters
     ----------
     records : sequence of Record
         Records that are used in the diagnosis.
+    found : collection of str
+        Public names of effects that the records have shown nevertheless; no notice names them.
     """
     span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
     contents = [excitation_content(r) for r in records]
@@ -59,13 +61,13 @@ def missing_excitation(records: Sequence[Record]) -> tuple[Notice, ...]:
         ExcitationNeed.SEVERAL_AMPLITUDES: _has_smaller_loops(records),
         ExcitationNeed.BROADBAND: any(c.is_broadband for c in contents),
     }
-    return tuple(_notice(need) for need, is_present in present.items() if not is_present)
-
-
-def _notice(need: ExcitationNeed) -> Notice:
-    names = " and ".join(dict.fromkeys(e.public_name() for e in CATALOGUE if e.excitation_need is need))
-    others, reason = REASONS[need]
-    return Notice("not_tested", f"these data can hardly show {names}{others}, because {reason}")
+    notices = []
+    for need in (n for n, is_present in present.items() if not is_present):
+        others, reason = REASONS[need]
+        names = dict.fromkeys((*(e.public_name() for e in CATALOGUE if e.excitation_need is need), *others))
+        if hidden := " and ".join(name for name in names if name not in found):
+            notices.append(Notice("not_tested", f"these data can hardly show {hidden}, because {reason}"))
+    return tuple(notices)
 
 
 def _longest_hold(record: Record, least: float) -> float:

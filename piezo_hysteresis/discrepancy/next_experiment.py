@@ -55,7 +55,7 @@ class NextExperiment:
     separates: tuple[str, ...]
 
 
-def menu(training_data: TrainingData, model: Model) -> dict[str, Record]:
+def possible_phases(training_data: TrainingData, model: Model) -> dict[str, Record]:
     """Phases to choose from, inside the recorded drive range; their displacement is not measured yet and set to 0."""
     extent, period = training_data.extent, model.sample_period
     fast = DriveLimits(
@@ -88,7 +88,7 @@ def menu(training_data: TrainingData, model: Model) -> dict[str, Record]:
 
 
 def separations(first: Model, second: Model, training_data: TrainingData) -> dict[str, float]:
-    """Difference of two fitted models on every phase of `menu`, after both have adjusted their parameters.
+    """Difference of two fitted models on every phase of `possible_phases`, after the first has adjusted its parameters.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def separations(first: Model, second: Model, training_data: TrainingData) -> dic
     dict of str to float
         Expected squared difference by phase name, in floors² per second of stage time.
     """
-    drives = menu(training_data, first)
+    drives = possible_phases(training_data, first)
     found = distances(first, second, training_data, drives)
     return {name: found[name] / record.duration for name, record in drives.items()}
 
@@ -147,7 +147,7 @@ def distances(
 
 
 def decide(selection: Selection, training_data: TrainingData) -> NextExperiment | None:
-    """Phase of `menu` that separates the first accepted effect with a rival best; None if there is no rival.
+    """The phase of `possible_phases` that best separates an accepted effect from its rival; None if no effect has one.
 
     Parameters
     ----------

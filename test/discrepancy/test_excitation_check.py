@@ -30,14 +30,20 @@ def loops(*peaks):
     return np.concatenate([peak * (1 - np.abs(2 * (TIME % 1) - 1)) for peak in peaks])
 
 
-def missing(*records):
-    return " ".join(n.message for n in missing_excitation(records))
+def missing(*records, found=()):
+    return " ".join(n.message for n in missing_excitation(records, found))
 
 
 def test_one_triangle_of_one_amplitude_shows_few_effects():
     said = missing(record(loops(4.0)))
     for name in ("creep", "thermal_drift", "gain_drift", "hysteresis_memory", "hysteresis_exponent", "extra_resonance"):
         assert name in said
+
+
+def test_an_effect_that_was_found_is_not_reported_as_hidden():
+    assert "creep" not in missing(record(loops(4.0)), found={"creep"})
+    assert "extra_resonance" not in missing(record(loops(4.0)), found={"extra_resonance"})
+    assert "can hardly show lags, because" in missing(record(loops(4.0)), found={"extra_resonance"})
 
 
 def test_smaller_loops_show_memory():

@@ -77,11 +77,19 @@ def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
         pairs = zip(straight, model.free_run(sharp), strict=True)
         changes.append([y.reshape(x.size, -1).mean(axis=1) - x for x, y in pairs])
     off = [r.displacement - y for r, y in zip(records, straight, strict=True)]
-    return [_better(e, a, b) for e, a, b in zip(off, *changes, strict=True)]
+    return [chosen_correction(e, a, b) for e, a, b in zip(off, *changes, strict=True)]
 
 
-def _better(residual: Array, gradual: Array, abrupt: Array) -> Array:
-    """The correction that leaves the smoother and smaller residual; zero if neither improves it much."""
+def chosen_correction(residual: Array, gradual: Array, abrupt: Array) -> Array:
+    """The correction that leaves the smoother and smaller residual; zero if neither improves it much.
+
+    Parameters
+    ----------
+    residual : (n,) ndarray
+        Measured minus simulated displacement without a correction [m].
+    gradual, abrupt : (n,) ndarray
+        Corrections for a drive that ramps, and for a drive that jumps, within a sample [m].
+    """
     change = min((gradual, abrupt), key=lambda c: _unevenness(residual - c) * np.var(residual - c))
     smoother = _unevenness(residual - change) < SMOOTHER * _unevenness(residual)
     return change if smoother or _holds(residual, change) else np.zeros_like(change)

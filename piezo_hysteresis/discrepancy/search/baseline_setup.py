@@ -38,7 +38,7 @@ from ..residual.sampling import at_period, common_period, less, shortened, slowe
 from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model
 from .cross_validation import ADEQUATE, Score
-from .refit import FAILURES, LAST, PRECISE, clearly_better, joint, renewed
+from .refit import FAILURES, LAST, PRECISE, clearly_better, joint
 from .selection_result import Selection
 from .test_records import reporting
 from .training_data import TrainingData
@@ -153,10 +153,12 @@ def prepare_baseline(
     starts = iter((first,)) if first is not None else start_models(records, fitted)
     start = exact(next(starts))
     extent = Extent.of([records[i] for i in usable], start.voltage_scale, start.displacement_scale)
+    earlier = known.training_data if known is not None else None
+    unfitted = start if earlier is None else earlier.start
 
     def gathered(records: Sequence[Record], least: Array) -> TrainingData:
         kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
-        return TrainingData(tuple(kept), np.array(sizes), Nuisance(), extent)
+        return TrainingData(tuple(kept), np.array(sizes), Nuisance(), extent, start=unfitted)
 
     training_data = gathered(records, least)
     progress("joint fit of the baseline", 0.2)
@@ -176,7 +178,6 @@ def prepare_baseline(
     if score.excess > ADEQUATE:
         for modal in modal_models(baseline.model, records, fitted):
             baseline, score = clearly_better(modal, baseline, score, training_data) or (baseline, score)
-        baseline, score = renewed(baseline, score, training_data)
     return BaselineSetup(
         straight, records, lost, noise, least, span, usable, fitted, test_records, training_data, baseline, score
     )

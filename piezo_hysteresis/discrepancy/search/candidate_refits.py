@@ -24,7 +24,7 @@ from ...identification.fit.fit import Progress
 from ...model.model import Model
 from .candidates import Candidate, FittedCandidate
 from .cross_validation import ADEQUATE, Score
-from .refit import better, from_all_starts, proceed, refit, restart
+from .refit import from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
@@ -41,11 +41,9 @@ WORTHWHILE = 0.8
 FIRST, LATER = 3, 9
 """Number of linearisations of a refit, before and after candidates far behind are dropped."""
 FEWEST_STARTS = 3
-"""Number of starts of an effect from which all are tried if the best start did not lead to the floor."""
+"""Number of starts from which an effect of the loop has several minima."""
 TIE = 0.02
-"""Difference in gain up to which the effect with the fewest parameters is taken."""
-FINER = 0.05
-"""Additional gain from which the form of an effect with more parameters is taken."""
+"""Difference in gain up to which the form and the effect with the fewest parameters are taken."""
 
 
 def refit_candidates(
@@ -70,15 +68,16 @@ def refit_candidates(
     ]
     field.sort(key=lambda c: c.score.cost)
     progress(f"refit with {field[0].name}", 0.9)
-    best = _from_elsewhere(settled(field[0], before), before)
+    best = settled(field[0], before)
     reach = best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
-    rest = [settled(c, before) if c.score.cost < reach and k < AGAIN else c for k, c in enumerate(field[1:], 1)]
+    rest = [settled(c, before) if c.score.cost < reach else c for c in field[1:]]
     return sorted([best, *rest], key=lambda c: c.score.cost)
 
 
 def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
     """Refits of effects of the drive and the loop that the dynamics have absorbed, so that no score test shows them."""
-    return _settled_from_all_starts(model, [c for c in candidates if _bends_dynamics(c)], before)
+    anew = (from_all_starts(model, c, FIRST) for c in candidates if _bends_dynamics(c))
+    return [settled(c, before) for c in anew if c is not None]
 
 
 def _bends_dynamics(candidate: Candidate) -> bool:
@@ -88,51 +87,19 @@ def _bends_dynamics(candidate: Candidate) -> bool:
     return effect.place is ChainPosition.DRIVE or (effect.host is not None and many)
 
 
-def refits_of_twins(
-    model: Model, candidates: Sequence[Candidate], best: FittedCandidate, before: Score
-) -> list[FittedCandidate]:
+def refits_of_twins(candidates: Sequence[Candidate], best: FittedCandidate, before: Score) -> list[FittedCandidate]:
     """Refits of candidates that are equal to the best one on slow drives; only other dynamics separate them.
 
-    Each refit begins with the fitted model of the best one, because the loop is the same. If the best one has not
-    reached the floor, its dynamics may be wrong; then every start value is tried as well.
+    Each refit begins with the fitted model of the best one, because the loop is the same.
     """
-    twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
+    twins = (c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name)
     beside = (refit(best.fit.model.without(best.name), c, LATER) for c in twins)
-    found = [settled(c, before) for c in beside if c is not None]
-    return found if best.score.excess <= ADEQUATE else [*found, *_settled_from_all_starts(model, twins, before)]
-
-
-def _settled_from_all_starts(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
-    anew = (from_all_starts(model, c, FIRST) for c in candidates)
-    return [settled(c, before) for c in anew if c is not None]
+    return [settled(c, before) for c in beside if c is not None]
 
 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:
-    """The refit with newly estimated dynamics; for an effect of the drive, from every start value."""
-    if candidate.score.cost <= LEAST_GAIN:  # no further gain is possible
-        return candidate
-    anew = restart(candidate, FIRST)
-    if anew.effect.place is not ChainPosition.DRIVE or anew.score.excess <= ADEQUATE:
-        return anew
-    return better(from_all_starts(anew.fit.model.without(anew.name), anew, FIRST), anew)
-
-
-def _from_elsewhere(best: FittedCandidate, before: Score) -> FittedCandidate:
-    """The best candidate, refitted from every start value of its effect if it has not reached the floor.
-
-    Effects of the drive have already used all start values; effects with few start values have one minimum.
-    """
-    starts = type(best.effect).starts(best.training_data.extent)
-    gains_nothing = before.cost - best.score.cost < LEAST_GAIN
-    if (
-        best.score.excess <= ADEQUATE
-        or gains_nothing
-        or best.effect.place is ChainPosition.DRIVE
-        or len(starts) < FEWEST_STARTS
-    ):
-        return best
-    anew = from_all_starts(best.fit.model.without(best.name), best, FIRST)
-    return best if anew is None else better(settled(anew, before), best)
+    """The refit with newly estimated dynamics, if a further gain is possible."""
+    return candidate if candidate.score.cost <= LEAST_GAIN else restart(candidate, FIRST)
 
 
 def _is_far_behind(candidate: Candidate, best: FittedCandidate, before: Score) -> bool:
@@ -161,21 +128,12 @@ def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     if finer is None or candidate.score.excess <= ADEQUATE or gain < LEAST_GAIN:
         return candidate
     refined = refit(candidate.fit.model, replace(candidate, effect=finer), LATER)
-    if refined is None or refined.score.cost > candidate.score.cost - FINER:
+    if refined is None or refined.score.cost > candidate.score.cost - TIE:
         return candidate
     return settled(refined, before)
 
 
 def simplest(refits: list[FittedCandidate]) -> FittedCandidate:
-    """The refit with the fewest parameters among those that are as good as the best.
-
-    If the law of an effect reaches the floor, an additional parameter must gain as much as an additional effect.
-    """
-    best = refits[0]
-
-    def is_form(candidate: FittedCandidate) -> bool:
-        alike = candidate.effect.public_name() == best.effect.public_name()
-        return alike and candidate.score.excess <= ADEQUATE
-
-    ties = [c for c in refits if c is best or c.score.cost - best.score.cost < (LEAST_GAIN if is_form(c) else TIE)]
+    """The refit with the fewest parameters among those that are as good as the best."""
+    ties = [c for c in refits if c.score.cost - refits[0].score.cost < TIE]
     return min(ties, key=lambda c: (len(c.fit.names), c.score.cost))

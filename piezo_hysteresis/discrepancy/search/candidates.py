@@ -212,33 +212,6 @@ def _screen_moves(model: Model, training_data: TrainingData, base: list[str], mo
     return found
 
 
-def alikeness(first: FittedCandidate, second: FittedCandidate, model: Model) -> float:
-    """|cos| between the signatures of two effects, orthogonal to the free parameters; 1 means indistinguishable.
-
-    For effects of several numbers the signature is the direction of the linearised step.
-    """
-    training_data = first.training_data
-    base = free_numbers(model, training_data)
-    now = model.free_run(training_data.records)
-    changes = []
-    for candidate in (first, second):
-        part = candidate.fit.model
-        changes.append([a - b for a, b in zip(part.free_run(training_data.records), now, strict=True)])
-    extra = [np.array([c[i] for c in changes]) for i in range(len(training_data.records))]
-    products = grams(model, training_data.records, base, training_data.nuisance, extra)
-    total = weighted_sum(products, training_data.floors)
-    q = len(base)
-    free = gauge(model, base)
-    inner = free.T @ total[:q, :q] @ free
-    cross = free.T @ total[:q, q : q + 2]
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
-    solved = scale[:, None] * (
-        np.linalg.pinv(inner * np.outer(scale, scale), rcond=1e-9, hermitian=True) @ (scale[:, None] * cross)
-    )
-    left = total[q : q + 2, q : q + 2] - cross.T @ solved
-    return float(abs(left[0, 1]) / np.sqrt(max(left[0, 0] * left[1, 1], 1e-300)))
-
-
 def weighted_sum(products: Sequence[Gram], floors: Array) -> Array:
     """Sum of the inner products, each record weighted by its size and floor."""
     total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(products, floors, strict=True))

@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import reduce
 
 from ...effects import Arx
 from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
@@ -36,15 +37,13 @@ from .cross_validation import Score
 from .time_limit import check_time
 from .training_data import TrainingData
 
-LINEAR = ("lag", "dynamics")
-"""Families of effects that dynamics of sufficient order can contain."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at convergence of a refit."""
 LAST, PRECISE = 25, 1e-4
 """Number of linearisations of a last fit, and relative decrease of the cost at convergence."""
-ANEW, CLEARLY = 3, 0.7
-"""Largest number of restarts of a baseline, and largest ratio of the new V to the old one: a small improvement may only
-be another way of absorbing the missing effect."""
+CLEARLY = 0.7
+"""Largest ratio of V from another start to V before: a small improvement may only be another way of absorbing the
+missing effect."""
 MODAL_GAIN = 0.1
 """Gain from which a sum of modes is used as the dynamics."""
 FAILURES = (DivergenceError, IdentificationError, ModelError, ParameterError)
@@ -107,20 +106,6 @@ def clearly_better(start: Model, found: Fit, score: Score, training_data: Traini
     return None
 
 
-def renewed(found: Fit, score: Score, training_data: TrainingData) -> tuple[Fit, Score]:
-    """A baseline and its score, refitted with newly estimated dynamics while this improves the score.
-
-    The new dynamics are estimated with the hysteresis of the model before.
-    """
-    for _ in range(ANEW):
-        anew = _behind_anew(found.model, training_data)
-        better_one = None if anew is None else clearly_better(anew.model, found, score, training_data)
-        if better_one is None:
-            break
-        found, score = better_one
-    return found, score
-
-
 def refit(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
     """Fit the model with the candidate jointly, from its start values; None if this diverges."""
     return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
@@ -143,12 +128,18 @@ def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> Fitted
 
 
 def restart(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
-    """The refit with newly estimated dynamics; the old one if this is not better.
+    """The refit with newly estimated dynamics, behind its own or the first loop; the old one if this is not better.
 
-    The missing effect biased the old dynamics. A joint fit that starts with them needs many iterations.
+    The missing effect biased the old dynamics. A joint fit that starts with them needs many iterations. It may also
+    have changed the loop so much that no step leads back, e.g. to a width of zero.
     """
-    anew = _behind_anew(candidate.fit.model, candidate.training_data)
-    return candidate if anew is None else better(_refitted(anew.model, candidate, max_iterations), candidate)
+    models = [candidate.fit.model]
+    if (first := candidate.training_data.start) is not None:
+        models.append(reduce(Model.with_effect, [e for e in models[0].effects if e.name not in first], first))
+    found = [_behind_anew(m, candidate.training_data) for m in models]
+    start = min((f for f in found if f is not None), key=lambda f: f.score.cost, default=None)
+    anew = None if start is None else _refitted(start.model, candidate, max_iterations)
+    return candidate if anew is None or anew.fit.cost >= candidate.fit.cost else anew
 
 
 def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
@@ -160,11 +151,7 @@ def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> 
     starts = type(candidate.effect).starts(candidate.training_data.extent)
     found = [_behind_anew(model.with_effect(start), candidate.training_data, (FEW_ITERATIONS,)) for start in starts]
     best = min((f for f in found if f is not None), key=lambda f: f.score.cost, default=None)
-    if best is None:
-        return None
-    more = _behind_anew(best.model, candidate.training_data, (ITERATIONS,))
-    best = best if more is None or more.score.cost > best.score.cost else more
-    return _refitted(best.model, candidate, max_iterations)
+    return None if best is None else _refitted(best.model, candidate, max_iterations)
 
 
 def _behind_anew(
@@ -197,47 +184,13 @@ def _behind_anew(
     return best
 
 
-def better(anew: FittedCandidate | None, candidate: FittedCandidate) -> FittedCandidate:
-    """The refit with the smaller cost; the first one is None if it failed."""
-    return candidate if anew is None or anew.fit.cost >= candidate.fit.cost else anew
-
-
 def without(candidate: FittedCandidate, max_iterations: int) -> Fitted | None:
     """The candidate's model refitted without its effect; None if this diverges.
 
     The gain of this model over the model before is due to dynamics and hysteresis, and not to the effect.
     """
-    model = candidate.fit.model.without(candidate.name)
     training_data = candidate.training_data.without(candidate.name)
-    starts = [model]
-    if (
-        candidate.effect.family in LINEAR
-        and (absorbed := _absorbed(model, candidate.fit.model, training_data)) is not None
-    ):
-        starts.append(absorbed)
-    found = []
-    for start in starts:
-        try:
-            fitted = joint(start, training_data, max_iterations)
-            found.append(Fitted(fitted.model, score_model(fitted.model, training_data)))
-        except FAILURES:
-            continue
-    return min(found, key=lambda f: f.score.cost, default=None)
-
-
-def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Model | None:
-    """The model with dynamics that imitate `extended`, which has one more linear effect; None without records.
-
-    A joint fit may have stopped before G contained this mode. An effect that G can contain is not a missing effect.
-    """
-    broadband = training_data.broadband()
-    if not broadband or not isinstance(model[Arx.name], Arx):
-        return None
-    inputs = hysteresis_signals(model, training_data.records, broadband)
-    outputs = extended.free_run(training_data.records)
-    signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
-    try:
-        found = identify_arx(signals, *form_of(model), ITERATIONS)
-        return with_dynamics(model, found.arx)
-    except (IdentificationError, ParameterError, DivergenceError):
-        return None
+    with suppress(*FAILURES):
+        model = joint(candidate.fit.model.without(candidate.name), training_data, max_iterations).model
+        return Fitted(model, score_model(model, training_data))
+    return None

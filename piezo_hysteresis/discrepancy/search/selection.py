@@ -21,49 +21,37 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from contextlib import suppress
-from dataclasses import replace
-
-import numpy as np
 
 from ...effects import CATALOGUE, Effect
 from ...identification.fit.fit import Progress
 from ...identification.fit.normal_equations import residuals
 from ...model.model import Model
-from .acceptance_tests import Trial, bends_all_along, first_rejection, share_left
+from .acceptance_tests import KEEPS, bends_all_along, first_rejection, share_left
 from .candidate_refits import (
     CLOSE,
-    FIRST,
     LATER,
     LEAST_GAIN,
     finest,
     refit_candidates,
     refits_behind_new_dynamics,
     refits_of_twins,
-    settled,
     simplest,
 )
-from .candidates import Candidate, FittedCandidate, alikeness, screen
+from .candidates import FittedCandidate, screen
 from .cross_validation import ADEQUATE, Score
-from .refit import Fitted, refit, restart, without
-from .selection_result import MANY, Rejection, Selection, Step
+from .refit import Fitted, without
+from .selection_result import Rejection, Selection, Step, typical
 from .time_limit import TimeSpentError
 from .training_data import TrainingData
 
 ALONE = 4.0
 """Residual in floors up to which a single record does not require a further effect."""
-KEEPS = (0.8, 0.5)
-"""Largest share of V beyond noise that may remain after the first accepted effect, and after further ones."""
 REFITS = 6
 """Number of candidates that are refitted jointly."""
 HOPELESS = 0.02
 """Linearised gain below which an effect that is not among the first two is not refitted."""
 MOST = 3
 """Largest number of effects."""
-MOST_TURNS = 5
-"""Largest number of steps."""
-ALIKE = 0.97
-"""|cos| between two signatures from which they count as equal."""
-
 NO_GAIN = 0.005
 """Smallest gain in cross-validation that is stated as a number: below it, it would read 0.00."""
 
@@ -96,8 +84,8 @@ def select(
     report = progress or (lambda word, fraction: None)
     baseline, steps, accepted, in_time = model, list[Step](), 0, False
     with suppress(TimeSpentError):
-        while not _is_enough(score, accepted) and len(steps) < MOST_TURNS and accepted < MOST:
-            step = _turn(model, training_data, score, null, effects, KEEPS[min(accepted, 1)], report)
+        while not _is_enough(score, accepted) and accepted < MOST:
+            step = _turn(model, training_data, score, null, effects, report)
             if step is None:
                 break
             steps.append(step)
@@ -108,38 +96,14 @@ def select(
                 model, score = step.renewed.model, step.renewed.score
             else:
                 break
-        model, score = _pruned(model, score, steps)
         in_time = True
     return Selection(baseline, model, score, tuple(steps), null, in_time, training_data)
 
 
 def _is_enough(score: Score, accepted: int) -> bool:
     """Whether the search ends: no second effect is added because of a small misfit of a single record."""
-    if score.excess <= ADEQUATE:
-        return True
-    worst = int(np.argmax(score.ratios))
-    others = np.delete(score.ratios, worst)
-    return bool(accepted and others.size >= MANY and np.mean(others**2) <= ADEQUATE and score.ratios[worst] <= ALONE)
-
-
-def _pruned(model: Model, score: Score, steps: list[Step]) -> tuple[Model, Score]:
-    """Remove effects that a later one makes superfluous; `steps` is updated."""
-    accepted = [k for k, step in enumerate(steps) if step.accepted]
-    for k in accepted[:-1]:
-        name, last = steps[k].best.name, steps[accepted[-1]].best
-        without_it = replace(last, effect=model[last.name], training_data=last.training_data.without(name))
-        lean = refit(model.without(name), without_it, FIRST)
-        if lean is None:
-            continue
-        lean = min(lean, restart(lean, FIRST), key=lambda c: c.score.cost)
-        if lean.score.cost - score.cost < 2.0 * LEAST_GAIN + 0.5:
-            lean = settled(lean, steps[0].before)
-        if lean.score.cost - score.cost < LEAST_GAIN:
-            rejection = Rejection(name, f"it is superfluous after {last.name} was added")
-            steps[k] = replace(steps[k], accepted=False, rejected=(rejection, *steps[k].rejected))
-            steps[accepted[-1]] = replace(steps[accepted[-1]], best=lean)
-            model, score = lean.fit.model, lean.score
-    return model, score
+    is_alone = accepted > 0 and typical(score, score)[1] <= ADEQUATE and score.ratios.max() <= ALONE
+    return bool(score.excess <= ADEQUATE or is_alone)
 
 
 def _turn(
@@ -148,7 +112,6 @@ def _turn(
     before: Score,
     null: float,
     effects: Collection[type[Effect]],
-    keeps: float,
     progress: Progress,
 ) -> Step | None:
     progress("score test of the catalogue", 0.0)
@@ -157,27 +120,18 @@ def _turn(
     twins = {e.name: t.name for e in effects for t in model.effects if e.twin == t.name or t.twin == e.name}
     absent = [e for e in effects if e.public_name() not in present and e.name not in twins]
     screened = screen(model, training_data, absent)
-    likely = [
-        c
-        for k, c in enumerate(screened)
-        # forms of the same effect are distinguished by their refits
-        if (k < REFITS or c.effect.public_name() == screened[0].effect.public_name())
-        and (k < 2 or before.cost - c.score.cost > HOPELESS)
-    ]
-    refits = refit_candidates(model, likely, before, progress)
+    likely = [c for k, c in enumerate(screened[:REFITS]) if k < 2 or before.cost - c.score.cost > HOPELESS]
+    refits = _best_of_each(refit_candidates(model, likely, before, progress))
     if not refits:
         return None
-    if others := refits_of_twins(model, screened, refits[0], before):
-        refits = _best_of_each([*refits, *others])
-    best, alone, rejection = _judged(refits, before, null, keeps)
+    refits = _best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])
+    best, alone, rejection = _judged(refits, before, null)
     if rejection is not None and (late := refits_behind_new_dynamics(model, screened, before)):
         refits = _best_of_each([*refits, *late])
-        best, alone, rejection = _judged(refits, before, null, keeps)
+        best, alone, rejection = _judged(refits, before, null)
     rejection = rejection or _untried_twin(type(best.effect), effects)
     accepted, rivals = rejection is None, list[FittedCandidate]()
-    rejected = [
-        Rejection(name, f"on slow drive it equals {twin}, which is in the model") for name, twin in twins.items()
-    ]
+    rejected = [Rejection(name, f"on slow drive it equals {t}, which is in the model") for name, t in twins.items()]
     rejected += [] if rejection is None else [rejection]
     better = alone is not None and before.cost - alone.score.cost > 0.5 * LEAST_GAIN
     renewed = alone if better and not accepted else None
@@ -186,50 +140,43 @@ def _turn(
             continue
         lead, error = best.score.better_than(candidate.score)
         close = lead < CLOSE * (before.cost - best.score.cost)
-        if accepted and close and (lead < 2.0 * error or alikeness(best, candidate, model) > ALIKE):
+        if accepted and close and lead < 2.0 * error:
             rivals.append(candidate)
         else:
             message = f"in cross-validation its mean ln R² is {lead:.2f} ± {error:.2f} higher than with {best.name}"
             rejected.append(Rejection(candidate.name, message))
-    for other in _others(screened, refits):
+    others = [c for c in screened if all(c.name != r.name for r in refits)]
+    for other in others:
         most = max(0.0, before.cost - other.score.cost)
         gains = f"it lowers mean ln R² by at most {most:.2f}" if most >= NO_GAIN else "it does not reduce the error"
         rejected.append(Rejection(other.name, f"in cross-validation {gains}"))
-    tried = (*refits, *_others(screened, refits))
-    return Step(before, best, accepted, tuple(rivals), tuple(rejected), tried, renewed)
+    return Step(before, best, accepted, tuple(rivals), tuple(rejected), (*refits, *others), renewed)
 
 
 def _best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
-    """The best refit of every effect, best first."""
-    worst_first = sorted(refits, key=lambda c: -c.score.cost)
+    """The best refit of every effect, best first; a limit that bends all along the drive is a curve and not a limit."""
+    worst_first = sorted((c for c in refits if not bends_all_along(c)), key=lambda c: -c.score.cost)
     return sorted({c.name: c for c in worst_first}.values(), key=lambda c: c.score.cost)
-
-
-def _others(screened: list[Candidate], refits: list[FittedCandidate]) -> list[Candidate]:
-    """Candidates that were not refitted."""
-    names = {r.name for r in refits}
-    return [c for c in screened if c.name not in names]
 
 
 def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Rejection | None:
     """Rejection of an effect whose twin is not among the candidates, because the data cannot distinguish the two."""
     twins = {e.public_name() for e in CATALOGUE if effect.twin == e.name or e.twin == effect.name}
-    untried = sorted(twins - {e.public_name() for e in effects})
-    if not untried:
-        return None
-    return Rejection(effect.name, f"on slow drive it equals {untried[0]}, which was not among the candidates")
+    for untried in sorted(twins - {e.public_name() for e in effects}):
+        return Rejection(effect.name, f"on slow drive it equals {untried}, which was not among the candidates")
+    return None
 
 
 def _judged(
-    refits: list[FittedCandidate], before: Score, null: float, keeps: float
+    refits: list[FittedCandidate], before: Score, null: float
 ) -> tuple[FittedCandidate, Fitted | None, Rejection | None]:
     """The best refit, the refit without the effect (None if not needed), and the rejection of the effect or None."""
-    best = finest(simplest([c for c in refits if not bends_all_along(c)] or refits), before)
+    best = finest(simplest(refits), before)
     gain, left = before.cost - best.score.cost, share_left(best.score, before, null)
-    if gain < LEAST_GAIN or left > keeps:
+    if gain < LEAST_GAIN or left > KEEPS:
         small = f"in cross-validation it lowers mean ln R² by {gain:.2f}, and {LEAST_GAIN:g} is needed"
-        much = f"{100 * left:.0f} % of the excess error remains, and {100 * keeps:.0f} % is allowed"
-        message = "; ".join(text for text, fails in ((small, gain < LEAST_GAIN), (much, left > keeps)) if fails)
+        much = f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed"
+        message = "; ".join(text for text, fails in ((small, gain < LEAST_GAIN), (much, left > KEEPS)) if fails)
         return best, None, Rejection(best.name, message)
     alone = without(best, LATER)
-    return best, alone, first_rejection(Trial(best, alone, null, keeps))
+    return best, alone, first_rejection(best, alone)

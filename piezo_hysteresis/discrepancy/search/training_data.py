@@ -26,6 +26,7 @@ from ...effects import MainsHum
 from ...effects.extent import Extent
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.excitation_content import excitation_content
+from ...model.model import Model
 from ...record import Record
 
 Array = NDArray[np.float64]
@@ -52,6 +53,8 @@ class TrainingData:
         Ranges that the records cover.
     alone : tuple of int
         Indices of records that are the only ones of their kind or alone determine a parameter; never left out.
+    start : Model, optional
+        The model before any joint fit; its hysteresis was fitted to slow records only.
     """
 
     records: tuple[Record, ...]
@@ -59,6 +62,7 @@ class TrainingData:
     nuisance: Nuisance
     extent: Extent
     alone: tuple[int, ...] = ()
+    start: Model | None = None
 
     @property
     def begins_at_levels(self) -> bool:

@@ -20,7 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from piezo_hysteresis.discrepancy.residual.intersample_error import intersample_error, sharp_drive
+from piezo_hysteresis.discrepancy.residual.intersample_error import chosen_correction, intersample_error, sharp_drive
 from piezo_hysteresis.effects import Arx, BoucWen, RateDependentHysteresis
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -124,6 +124,40 @@ def test_records_that_are_not_slow_are_not_changed():
     drive = np.random.default_rng(0).normal(size=500)
     record = Record(drive, 1e-6 * drive, PERIOD)
     assert not intersample_error(STAGE, [record])[0].any()
+
+
+SAMPLES = np.arange(1000)
+NOISE = 0.05 * np.random.default_rng(3).normal(size=SAMPLES.size)
+LEVELS = 1.0 * (SAMPLES % 100 == 0)
+"""Single samples in which the drive goes to its next level."""
+SLOW = np.sin(2.0 * np.pi * SAMPLES / 700.0)
+"""A change over many samples, as a loop keeps it or as wrong dynamics leave it."""
+
+
+def is_chosen(correction, residual, gradual, abrupt):
+    return np.array_equal(chosen_correction(residual, gradual, abrupt), correction)
+
+
+@pytest.mark.parametrize("slow", [0.0, 3.0])
+def test_the_correction_that_the_displacement_contains_is_chosen_also_beside_a_slow_misfit(slow):
+    gradual, abrupt = LEVELS, np.roll(LEVELS, 1)
+    misfit = slow * SLOW + NOISE
+    assert is_chosen(gradual, gradual + misfit, gradual, abrupt)
+    assert is_chosen(abrupt, abrupt + misfit, gradual, abrupt)
+
+
+def test_of_two_corrections_that_are_almost_equally_smooth_the_smaller_residual_decides():
+    gradual, abrupt = 0.95 * LEVELS + 0.2 * SLOW, LEVELS
+    assert is_chosen(gradual, LEVELS + 0.2 * SLOW + NOISE, gradual, abrupt)
+
+
+def test_a_correction_that_is_wrong_in_single_samples_is_not_chosen_because_it_reduces_a_slow_misfit():
+    gradual, abrupt = np.roll(LEVELS, 1) + 0.3 * SLOW, LEVELS
+    assert is_chosen(abrupt, LEVELS + 3.0 * SLOW + NOISE, gradual, abrupt)
+
+
+def test_no_correction_is_chosen_if_the_residual_contains_neither():
+    assert not chosen_correction(SLOW + NOISE, LEVELS, np.roll(LEVELS, 1)).any()
 
 
 @given(

@@ -1,0 +1,59 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Refits of candidates from other starts."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
+from piezo_hysteresis.discrepancy.search.cross_validation import ADEQUATE
+from piezo_hysteresis.discrepancy.search.refit import proceed, refit, restart
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
+from piezo_hysteresis.effects import HYSTERESIS, AmplifierSlewLimit, Arx, Offset
+from piezo_hysteresis.effects.extent import Extent
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.record import Record
+
+PERIOD, NOISE = 1e-4, 1e-9
+STAGE = Model(
+    (HYSTERESIS(A=-0.24, beta=4.9, gamma=-2.0, p2=1.0), Arx(a=(-1.6, 0.7), b=(0.1,)), Offset()), PERIOD, 10.0, 1e-5
+)
+SLEW_LIMIT = AmplifierSlewLimit(S=2000.0)
+NARROW = HYSTERESIS(A=-0.1, beta=5000.0, gamma=4999.0, p2=1.0)
+"""A loop with a width of almost zero, as fits without the slew limit find it."""
+
+
+def measured():
+    rng, time = np.random.default_rng(0), PERIOD * np.arange(6000)
+    drives = [5.0 * (1.0 - np.cos(2.0 * np.pi * f * time)) for f in (2.0, 5.0, 10.0)]
+    drives += [np.concatenate(([0.0] * 50, np.repeat(rng.uniform(0.0, 10.0, 119), 50))) for _ in range(2)]
+    records = [Record(u, np.zeros(u.size), PERIOD, initial_voltage=0.0) for u in drives]
+    moved = STAGE.with_effect(SLEW_LIMIT).simulate(records)
+    return tuple(
+        replace(r, displacement=y + NOISE * rng.normal(size=y.size)) for r, y in zip(records, moved, strict=True)
+    )
+
+
+def test_a_loop_that_lost_its_width_is_started_again():
+    records = measured()
+    extent = Extent.of(records, STAGE.voltage_scale, STAGE.displacement_scale)
+    data = TrainingData(records, np.full(len(records), NOISE), Nuisance(), extent, start=STAGE)
+    bent = STAGE.with_hysteresis(NARROW)
+    found = refit(bent, Candidate(SLEW_LIMIT, data, score_model(bent, data)), 9)
+    assert found is not None
+    assert proceed(found, 9).score.excess > 10.0 * ADEQUATE
+    assert restart(found, 9).score.excess < ADEQUATE
