@@ -136,7 +136,7 @@ def test_diagnose_names_a_filter_and_its_model_predicts_better(model, another_da
     assert found.verdict is Verdict.NAMED
     (effect,) = found.effects()
     assert effect["family"] == "lag" and effect["parameters"]["tau"]["value"] == pytest.approx(2e-3, rel=0.05)
-    assert found.reason.startswith("The stage is the same, but behind a low-pass")
+    assert found.reason.startswith("The stage is the same, but a low-pass")
     assert found.gap.after < 0.5 * found.gap.before
     assert found.answer()["effects"] == [effect]
     shown = compare_diagnosis(found)  # the page

@@ -27,7 +27,8 @@ from ...effects.sensor.second_order_low_pass import BUTTERWORTH
 BESSEL = 0.75**0.5
 """Damping ratio of a Bessel filter, whose delay is flat; a moving average of the same delay begins like it."""
 LEAVES = 6.0
-"""Largest V that a change may leave. If more remains, something else has changed too, or the form is different."""
+"""Largest V (mean R², with the error R in floors) that a change may leave. If more remains, something else has changed
+too, or the form is different."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ class ChangeKind:
     rows : tuple of str
         Linear changes; empty if the change acts on the whole prediction.
     words : str
-        Part of the sentence about the stage, with a place for the size.
+        What differs in the stage, with a place for the size.
     damping : float
         Damping ratio of a filter of second order.
     """
@@ -72,11 +73,13 @@ class ChangeKind:
 
 
 KINDS: dict[str, ChangeKind] = {
-    "delay": ChangeKind(ExtraDelay.name, "lag", "tau", "s", (), "{how} by {size}"),
-    "low_pass": ChangeKind(SensorBandwidth.name, "lag", "tau", "s", (), "behind a low-pass of time constant {size}"),
+    "delay": ChangeKind(ExtraDelay.name, "lag", "tau", "s", (), "its response is {how} by {size}"),
+    "low_pass": ChangeKind(
+        SensorBandwidth.name, "lag", "tau", "s", (), "a low-pass with time constant {size} follows it"
+    ),
     **{
         key: ChangeKind(
-            SecondOrderLowPass.name, "lag", "tau", "s", (), f"behind a {words} with time constant {{size}}", damping
+            SecondOrderLowPass.name, "lag", "tau", "s", (), f"a {words} with time constant {{size}} follows it", damping
         )
         for key, words, damping in (
             ("low_pass_2", "low-pass of second order (Butterworth)", BUTTERWORTH),
@@ -84,16 +87,28 @@ KINDS: dict[str, ChangeKind] = {
             ("low_pass_poles", "low-pass of second order (two equal poles)", 1.0),
         )
     },
-    Creep.name: ChangeKind(Creep.name, Creep.family, "relative", "1", (Creep.name,), "with creep changed by {size}"),
+    Creep.name: ChangeKind(Creep.name, Creep.family, "relative", "1", (Creep.name,), "its creep has changed by {size}"),
     "resonance": ChangeKind(
-        ExtraResonance.name, "dynamics", "f0", "Hz", ("resonance",), "with a resonance moved by {size}"
+        ExtraResonance.name, "dynamics", "f0", "Hz", ("resonance",), "its resonance has moved by {size}"
     ),
     Softening.name: ChangeKind(
-        Softening.name, "dynamics", "k3", "1", (Softening.name,), "with a stiffness that depends on position, {size}"
+        Softening.name,
+        "dynamics",
+        "k3",
+        "1",
+        (Softening.name,),
+        "its stiffness at the end of the range differs by {size}",
     ),
-    "drift": ChangeKind(ThermalDrift.name, "drift", "D", "m", ("drift",), "with a drift of {size} within a record"),
-    "gain": ChangeKind("gain", "static", "relative_change", "1", (), "with a gain changed by {size}"),
-    "loop": ChangeKind("loop_height", "hysteresis", "relative_change", "1", (), "with a loop changed by {size}"),
+    "drift": ChangeKind(ThermalDrift.name, "drift", "D", "m", ("drift",), "it drifts by {size} within a record"),
+    "gain": ChangeKind("gain", "static", "relative_change", "1", (), "its gain has changed by {size}"),
+    "loop": ChangeKind(
+        "loop_height",
+        "hysteresis",
+        "relative_change",
+        "1",
+        (),
+        "the height of its hysteresis loop has changed by {size}",
+    ),
 }
 """Changes by the key of their signature."""
 

@@ -34,11 +34,13 @@ Array = NDArray[np.float64]
 DAY = {"gain": 0.0075, "loop": 0.04}
 """Standard deviation of the relative changes of gain and loop height from one day to another."""
 PRICE = 0.5
-"""Cost in V of such a change of gain or loop height in addition to another change."""
+"""Cost, in units of V, of a gain or loop height that differs by one such standard deviation."""
 SHORTEST, LONGEST = 0.02, 100.0
-"""Range of delays in the search [samples]."""
+"""Range of delays and time constants in the search [samples]."""
 SHOWN = 0.3
 """Smallest share of the explained residual that must remain when a part of the records is left out."""
+CONSTANT = 1e-9
+"""Share of a column that varies within the records up to which it cannot be distinguished from a sensor zero."""
 AROUND = 0.2
 """Range of the repeated search without some of the pieces, relative to the size or to one sample."""
 
@@ -74,7 +76,9 @@ class ChangeSearch:
         self.used, self.period = list(used), model.sample_period
         self.sides = ["gain"] + (["loop"] if "loop" in self.predicted[0].rows else [])
         self.weights, self.labels = self._weights(records, floors)
-        self.origins = np.concatenate([np.full(records[i].size, i) for i in self.used])
+        self.sizes = [records[i].size for i in self.used]
+        self.origins = np.repeat(self.used, self.sizes)
+        self.measured = np.concatenate([records[i].displacement for i in self.used])
 
     def _weights(self, records: Sequence[Record], floors: Sequence[float]) -> tuple[Array, NDArray[np.int64]]:
         """Square root of the weight of every used sample, and the number of its piece."""
@@ -89,40 +93,37 @@ class ChangeSearch:
         floor = np.concatenate([np.full(records[i].size, floors[i]) for i in self.used])
         return root / np.sqrt(np.sum((root * floor) ** 2)), label
 
-    def _stack(self, signals: Sequence[Array]) -> Array:
-        return np.concatenate([signals[i] for i in self.used])
-
     def _columns(self, key: str, size: float, names: Sequence[str]) -> tuple[Array, Array]:
-        """Changed prediction of all used samples, and the columns `names` with the same change."""
-        shape = SHAPES.get(key)
+        """Changed prediction of all used samples (n,), and the columns `names` with the same change (q, n)."""
+        shape, used = SHAPES.get(key), [self.predicted[i] for i in self.used]
 
         def changed(p: ChangeablePrediction, signal: Array, before: float) -> Array:
             return signal if shape is None else shape(p, signal, before, size)
 
-        y = self._stack([changed(p, p.y, p.before) for p in self.predicted])
-        rows = [
-            self._stack([changed(p, p.rows[n], p.before if n == "gain" else 0.0) for p in self.predicted])
-            for n in names
-        ]
-        zeros = [
-            self._stack([np.full(p.y.size, float(i == j)) for j, p in enumerate(self.predicted)]) for i in self.used
-        ]
-        return y, np.array([*rows, *zeros])
+        y = np.concatenate([changed(p, p.y, p.before) for p in used])
+        rows = [np.concatenate([changed(p, p.rows[n], p.before if n == "gain" else 0.0) for p in used]) for n in names]
+        return y, np.array(rows)
+
+    def _weighted(self, signals: Array, root: Array) -> Array:
+        """Weighted signals (…, n) without the sensor zero that is fitted in every record."""
+        starts, weight = np.cumsum([0, *self.sizes[:-1]]), root**2
+        total = np.maximum(np.add.reduceat(weight, starts), np.finfo(np.float64).tiny)
+        zeros = np.add.reduceat(weight * signals, starts, axis=-1) / total
+        return np.asarray(root * (signals - np.repeat(zeros, self.sizes, axis=-1)))
 
     def account(
         self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: NDArray[np.bool_] | None = None
     ) -> Account:
-        """Least squares for the linear parameters, with a change of given size.
+        """Least squares for the linear parameters and for a zero in every record, with a change of given size.
 
         Gain and loop height have a penalty that corresponds to their change from day to day, unless they are in `free`.
         """
         names = (*self.sides, *(n for n in (KINDS[key].rows if key in KINDS else ())))
         y, columns = self._columns(key, size, names)
         root = self.weights if mask is None else np.where(mask, self.weights, 0.0)
-        measured = self._stack([p.record.displacement for p in self.predicted])
-        target, matrix = root * (measured - y), root * columns
+        target, matrix = self._weighted(self.measured - y, root), self._weighted(columns, root)
         scale = np.linalg.norm(matrix, axis=1)
-        scale[scale == 0.0] = 1.0
+        scale[scale <= CONSTANT * np.linalg.norm(root * columns, axis=1)] = np.inf
         price = np.zeros(len(matrix))
         for row, name in enumerate(names):
             if name in DAY and name not in free:
@@ -134,7 +135,7 @@ class ChangeSearch:
 
     def session(self, account: Account) -> dict[str, float]:
         """Relative changes of gain and loop height in an account."""
-        own = dict(zip(account.names, account.theta.tolist(), strict=False))
+        own = dict(zip(account.names, account.theta.tolist(), strict=True))
         numbers = {n: own[n] for n in self.sides}
         numbers["gain"] -= self.loop_share * numbers.get("loop", 0.0)
         return numbers
@@ -170,13 +171,13 @@ class ChangeSearch:
             return self.shaped(key, mask, near)
         found = self.account(key, free=(key,), mask=mask)
         rows = KINDS[key].rows or (key,)
-        values = dict(zip(found.names, found.theta.tolist(), strict=False))
+        values = dict(zip(found.names, found.theta.tolist(), strict=True))
         return Account(key, found.cost, sum(values[r] for r in rows), found.theta, found.names)
 
     def interval(self, best: Account) -> tuple[float, float]:
-        """95 % interval: the larger one of leaving out groups of pieces and leaving out records.
+        """95 % jackknife interval: the wider one of leaving out groups of pieces and leaving out records.
 
-        A part is not left out if little of the change remains without it.
+        A part without which little of the change remains is not used.
         """
         numbers = np.unique(self.labels)
         groups = [g for g in np.array_split(numbers, min(6, numbers.size)) if g.size]

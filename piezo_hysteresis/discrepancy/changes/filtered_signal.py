@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The answer of a filter of first or second order to a predicted signal, smooth between its samples.
+"""The response of a filter of first or second order to a predicted signal, smooth between its samples.
 
 If the signal were linear between samples, ringing with a quarter of the sampling rate would lose a fifth of its height,
 and the time constant of the filter would be found several per cent too small.
@@ -93,7 +93,7 @@ def averaged(between: Array, before: float, samples: float) -> Array:
     size = between.shape[1]
     powers = np.arange(1.0, 5.0)
     shares = between / np.array([1.0, 2.0, 6.0, 24.0])[:, None]
-    whole = np.concatenate(([0.0], np.cumsum(shares.sum(axis=0))))  # integral up to the begin of every interval
+    whole = np.concatenate(([0.0], np.cumsum(shares.sum(axis=0))))  # integral up to the beginning of every interval
     at = np.arange(size) - samples
     end = np.clip(np.ceil(at).astype(int), 0, size - 1)
     part = np.clip(at - (end - 1), 0.0, 1.0)

@@ -108,7 +108,7 @@ def fit_groups(model: Model, minute: Minute, baseline: Baseline, group: str, int
     Returns
     -------
     GroupFit
-        A fit whose residual is that of the baseline.
+        A fit whose RMS residual is at most `EXCESS` times that of the baseline.
 
     Raises
     ------
@@ -150,8 +150,8 @@ class _Fit:
         self._before = every[self._begun :]
         if len(self._before) < FEWEST_SCORES:
             raise IdentificationError(
-                f"got {BLOCK_TIME * len(self._before):.1f} s since the change under a drive of the baseline, "
-                f"expected at least {BLOCK_TIME * FEWEST_SCORES:g} s; try again later"
+                f"got {BLOCK_TIME * len(self._before):.1f} s since the change under the kinds of drive of the "
+                f"baseline, expected at least {BLOCK_TIME * FEWEST_SCORES:g} s; try again later"
             )
         classes = [drive_class(score) for score in self._before]
         self._main = baseline.scatter[max(set(classes), key=classes.count)]
@@ -184,15 +184,15 @@ class _Fit:
         return _Fitted(model, change, deviation, scores, self._remaining(scores, free))
 
     def checked(self, groups: tuple[str, ...], found: _Fitted) -> GroupFit:
-        """The fit, if its residual is that of the baseline and its parameters have changed significantly."""
+        """The fit, if its residual is nearly that of the baseline and its parameters have changed significantly."""
         before, after = (float(np.sqrt(residual_power(s))) for s in (self._before, found.scores))
         floor = float(np.sqrt(np.mean([self._scatter(s).power for s in self._before])))
         names = " and ".join(groups)
         if found.remaining or after > EXCESS * floor:
             left = f", and {found.remaining} still differs" if found.remaining else ""
             raise IdentificationError(
-                f"after a fit of {names} the residual is {1e9 * after:.3g} nm, expected {1e9 * floor:.3g} nm as in the "
-                f"baseline{left}; {FULL}"
+                f"after a fit of {names} the residual is {1e9 * after:.3g} nm, expected at most {EXCESS:g} times the "
+                f"{1e9 * floor:.3g} nm of the baseline{left}; {FULL}"
             )
         moved = [GROUPS.index(g) for g in groups]
         if (np.abs(found.change[moved]) < SURE * found.deviation[moved]).all():

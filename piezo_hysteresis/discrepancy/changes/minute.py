@@ -58,7 +58,7 @@ class Minute:
         drive, loop = self.drive, loop_heights(model)
         displacement = self.displacement[max(0, self.displacement.size - drive.full.size) :]
         first = drive.full.size - displacement.size
-        chain, state, tangent = _brought_up(model, drive, first, loop)
+        chain, state, tangent = _state_before(model, drive, first, loop)
         scores, counted = Scores(chain, state, loop, tangent), list[ChangeScore]()
         for start in range(0, displacement.size, _PIECE):
             voltage = np.ascontiguousarray(drive.full[first + start : first + start + _PIECE])
@@ -67,7 +67,7 @@ class Minute:
         return counted
 
 
-def _brought_up(
+def _state_before(
     model: Model, drive: DriveHistory, first: int, loop: dict[str, float]
 ) -> tuple[Chain, ChainState, ChainTangent]:
     """Chain, state and sensitivities of a model before sample `first` of the part of the drive stored in full."""

@@ -53,7 +53,7 @@ def group_to_fit(groups: Sequence[str]) -> str:
     if len(groups) > 1:
         raise IdentificationError(
             f"the present drive cannot distinguish {' and '.join(groups)}; drive the stage at another frequency too, "
-            f"or {FULL}"
+            f"otherwise {FULL}"
         )
     if groups[0] == "slow":
         raise IdentificationError(f"the model has no parameter for a slow change; {FULL}")

@@ -16,7 +16,7 @@
 
 Gain and loop height differ a little from day to day. They are fitted together with every change, with a quadratic
 penalty, and are named themselves if they changed by more. A change is named if it explains the residual that these
-small changes leave, and if no other change explains as much.
+small changes leave. Other changes that explain as much are its rivals.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ MOVED = (0.9, 0.95, 0.98, 1.02, 1.05, 1.1)
 TURNS = 4
 """Number of linearisations of that search."""
 UNCERTAIN = 0.6
-"""Share of the remaining error, at least of the floors of the records, that can resemble a change."""
+"""Share of the remaining error that can resemble a change. The remaining error counts at least as the floor."""
 FORMS = 6.0
 """Largest ratio of V for which the lag of another form counts in the interval."""
 SURE = 2.5
@@ -78,7 +78,7 @@ def find_change(
     Returns
     -------
     ParameterChange or None
-        None if nothing changed, or if none of the known changes explains the residual.
+        None if nothing changed, if no known change explains the residual, or if the change is not significant.
     """
     search = ChangeSearch(model, records, used, floors)
     day = search.account("none")
@@ -90,7 +90,7 @@ def find_change(
     found = [_Explanation(search, a) for a in accounts]
     if "resonance" in keys and min(e.account.cost for e in found) > LEAVES:
         found.append(_moved_resonance(model, records, used, floors))
-    # the simpler lag first
+    # at similar cost, a delay or a filter of first order comes before one of second order
     found.sort(key=lambda e: e.account.cost * (RIVAL if e.account.key in SECOND_ORDER else 1.0))
     alike = RIVAL * max(1.0, found[0].account.cost)
     found[0] = _simulated(found[0], model, records, used, floors)
@@ -111,7 +111,7 @@ def find_change(
 
 
 def is_unchanged(model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> bool:
-    """Whether gain and loop height as they differ from day to day explain the residual; arguments as `find_change`."""
+    """Whether day-to-day differences of gain and loop height explain the residual; arguments as `find_change`."""
     return ChangeSearch(model, records, used, floors).account("none").cost <= ADEQUATE
 
 

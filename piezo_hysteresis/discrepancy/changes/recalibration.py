@@ -15,7 +15,7 @@
 """`recalibrate`: fits an old model of the same stage to new records, by gain, offset, loop height and lag only.
 
 Records of one stage differ by about 0.5 % from one day to another. A model of many records with these four new numbers
-predicts more than a new model of one new record.
+predicts better than a new model of one new record.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Recalibration:
     Parameters
     ----------
     model : Model
-        The new model; the old one if the error does not become smaller.
+        The new model. If its error is not smaller, the old model with the new offset.
     gain, loop_height : float
         Relative changes [1]; 0 if the model has no loop.
     lag : float

@@ -170,7 +170,9 @@ def read_numbers(text: str, source: str) -> tuple[RecalibratedNumber, ...]:
             ):
                 raise ValueError
         except ValueError:
-            raise RecordingError(f"{source}, line {number}: got {','.join(cells)}, expected finite numbers") from None
+            raise RecordingError(
+                f"{source}, line {number}: got {','.join(cells)}, expected {len(_COLUMNS)} values, finite numbers"
+            ) from None
         found.append(RecalibratedNumber(**values))  # type: ignore[arg-type]
     return tuple(found)
 

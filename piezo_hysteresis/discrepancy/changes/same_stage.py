@@ -38,7 +38,7 @@ from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_
 ERROR, HASH = "free_run_error", "data_hash"
 """Keys of the provenance."""
 UNCHANGED = "unchanged"
-"""Kind of the notice that the given model is as good as on the day on which it was identified."""
+"""Kind of the notice that the given model is still as good as when it was identified."""
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 """Units of time."""
 
@@ -71,8 +71,8 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
             return Notice(
                 UNCHANGED,
                 "nothing has changed since the model was identified: apart from its zero, gain and loop height, which "
-                f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; a gap was there "
-                "before",
+                f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; a gap that is "
+                "found now existed then too",
             )
         change = find_change(model, records, used, limits)
         if change is None:
@@ -112,7 +112,7 @@ def sentence_of(change: ParameterChange) -> str:
     late = f" It delays slow signals by {_with_interval(change.lag, 's')}." if kind.damping else ""
     names = change.others
     alike = f" It cannot be distinguished from {' and '.join(names)} in these records." if names else ""
-    left = "" if change.after < LEAVES else " The remaining error is above the known error: the form is not certain."
+    left = "" if change.after < LEAVES else " The remaining error is above the known error, so the form is not certain."
     return f"The stage is the same, but {words}: {kind.name} ({kind.family}).{late}{alike}{left}"
 
 

@@ -177,7 +177,7 @@ def filtered_by(
 
 
 def averaged_by(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
-    """The mean of a signal of the record over twice `tau` [s], by which it is later."""
+    """The mean of a signal of the record over the last 2 `tau` [s], which delays it by `tau`."""
     samples = 2.0 * tau / prediction.record.sample_period
     return averaged(prediction.between(signal, before), before, samples) if samples > 0.0 else signal
 

@@ -67,7 +67,7 @@ def write_task(folder: Path, minute: Minute, baseline: Baseline, group: str, int
     baseline.save(folder / _BASELINE)
 
 
-def recalibration(folder: Path, model: str, report: Report) -> Outcome:
+def recalibration(folder: Path, model: str, report: Report) -> RecalibrationOutcome:
     """Fit the changed group to the minute of samples in a folder."""
     report("reading", 0.0)
     with np.load(folder / _MINUTE, allow_pickle=False) as file:

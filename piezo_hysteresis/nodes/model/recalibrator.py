@@ -201,7 +201,7 @@ class _Fit:
     def __init__(self, write: Callable[[Path], None], model: Model, predictor: Predictor, offset: float) -> None:
         self.model, self.predictor, self.offset = model, predictor, offset
         self._folder = tempfile.TemporaryDirectory(prefix="piezo_recalibration_", ignore_cleanup_errors=True)
-        self._process: FitProcess | None = None
+        self._process: FitProcess[RecalibrationOutcome] | None = None
         self._failure: OSError | None = None
 
         def prepare() -> None:
@@ -221,9 +221,7 @@ class _Fit:
             raise IdentificationError(f"the samples cannot be written ({self._failure.strerror}); is the disk full?")
         if self._process is None:
             self._process = FitProcess(recalibration, Path(self._folder.name), dumps(self.model))
-        outcome = self._process.poll()
-        assert outcome is None or isinstance(outcome, RecalibrationOutcome)
-        return outcome
+        return self._process.poll()
 
     def close(self) -> None:
         """End the fit, finished or not."""
